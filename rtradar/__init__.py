@@ -1,0 +1,68 @@
+"""From motion capture of a person to what a 4D TDM-MIMO FMCW radar would receive, and on to point clouds.
+
+Everything named here loads on first use, so that ``import rtradar`` is quick.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rtradar import process, rcs, signal
+    from rtradar.body import Body, Ellipsoids
+    from rtradar.echoes import Echoes
+    from rtradar.errors import BackendError, InputError, ValidityWarning
+    from rtradar.motion import Motion, load_motion, synthetic_motion
+    from rtradar.pipeline import Result, run
+    from rtradar.radar import Radar
+    from rtradar.scatter import scattering_length
+    from rtradar.scene import Scene
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "BackendError": "errors",
+    "Body": "body",
+    "Echoes": "echoes",
+    "Ellipsoids": "body",
+    "InputError": "errors",
+    "Motion": "motion",
+    "Radar": "radar",
+    "Result": "pipeline",
+    "Scene": "scene",
+    "ValidityWarning": "errors",
+    "load_motion": "motion",
+    "run": "pipeline",
+    "scattering_length": "scatter",
+    "synthetic_motion": "motion",
+}
+_MODULES = ("process", "rcs", "signal")
+
+__all__ = [
+    "BackendError",
+    "Body",
+    "Echoes",
+    "Ellipsoids",
+    "InputError",
+    "Motion",
+    "Radar",
+    "Result",
+    "Scene",
+    "ValidityWarning",
+    "load_motion",
+    "process",
+    "rcs",
+    "run",
+    "scattering_length",
+    "signal",
+    "synthetic_motion",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f"rtradar.{name}")
+    if name in _HOME:
+        return getattr(import_module(f"rtradar.{_HOME[name]}"), name)
+    raise AttributeError(f"module 'rtradar' has no attribute '{name}'")

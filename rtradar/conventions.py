@@ -1,0 +1,45 @@
+"""Axes, signs, units and constants that every module of rtradar shares.
+
+World axes
+    x points from the radar to the person, y to the left, z up; metres; the floor is z = 0.
+    Motion capture is y-up: world (x, y, z) = mocap (z, x, y).
+    The radar of the paper stands at (-4, 1, 1) m, its boresight along +x, its axes parallel to the world's.
+
+Angles
+    azimuth = atan2(y, x), elevation = asin(z / r), both in the radar's frame.
+
+Velocity
+    The rate of range [m/s]: positive recedes, and so is positive Doppler frequency.
+
+Phase
+    Scattering code uses exp(+j omega t), so a path of ``length`` metres turns a field by exp(-j k length).
+    The intermediate frequency (IF) signal is the transmitted chirp times the conjugate of the received one
+    (paper, eq. 9), so it turns with exp(+j 2 pi f tau), tau = length / c. An echo's ``amplitude`` is the conjugate
+    of the scattering length with the phase of ``length`` taken out: the received spectrum is
+    H(f) = sum conj(amplitude) exp(-j 2 pi f length / c). A conducting sphere of radius a has the specular
+    amplitude +sqrt(pi) a, real; |amplitude|^2 is a radar cross-section [m^2] when spreading is left out.
+
+Spreading
+    Spherical spreading sits in ``amplitude``, a factor 1 / (R1 R2) normalised to 1 at R1 = R2 = 1 m, so that the
+    amplitude stays in metres.
+
+Wavelength
+    Doppler, angle and near-field phases belong to the CENTRE frequency of the sweep, for that is how fast the phase
+    of a range bin turns. The antenna spacing of the paper's Table 1 belongs to the START frequency.
+
+Arrays
+    Axes stand in the order ``(chirp, rx, sample)``; per frame ``(cycle, tx, rx, sample)``. SI units; a unit that is
+    not SI is in the name (``_db``, ``_dbsm``, ``_deg``). Lengths and phases are float64.
+
+Windows
+    Periodic (DFT-even).
+"""
+
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+"""Speed of light in vacuum [m/s], exact by the definition of the metre."""
+
+MINIMUM_ANTENNA_DISTANCE_M = 0.3
+"""A body part nearer to an antenna than this is refused: the echo model has no meaning there."""
+
+MINIMUM_KA = 5.0
+"""Below this product of wavenumber and radius of curvature, geometric and physical optics are off by decibels."""

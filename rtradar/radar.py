@@ -1,0 +1,326 @@
+"""The radar: waveform, array, TDM schedule, and every limit that follows from them (the paper's Tables 1 and 2)."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+
+PRESETS: dict[str, dict[str, Any]] = {
+    "paper-12ghz": {"start_frequency_hz": 12e9, "chirp_duration_s": 62.5e-6},
+    "paper-77ghz": {"start_frequency_hz": 77e9, "chirp_duration_s": 12.5e-6},
+}
+"""The paper's Table 1, and its 77 GHz sister with chirps five times shorter; what is not named is the default."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Radar:
+    """A TDM-MIMO FMCW radar with a cross of two linear arrays.
+
+    Antennas are numbered y-line first, then z-line; the index rises with y or z. Tx take turns chirp by chirp,
+    without a gap: chirp m comes from Tx ``m mod n_tx``.
+
+    Parameters
+    ----------
+    name : str
+        Shown in reports.
+    start_frequency_hz, bandwidth_hz : float
+        The sweep runs from ``start_frequency_hz`` up by ``bandwidth_hz``.
+    chirp_duration_s : float
+        One chirp; the next begins as it ends.
+    samples_per_chirp : int
+        Complex IF samples in one chirp.
+    frame_duration_s, frame_hop_s : float
+        Length of one coherent processing window and the step between windows.
+    tx_y, tx_z, rx_y, rx_z : int
+        Antennas along y and along z.
+    tx_spacing_wavelengths, rx_spacing_wavelengths : float
+        In wavelengths of the START frequency, as in the paper's Table 1.
+    position_m : tuple of float
+        Centre of both lines, world axes.
+    channels : {"pairs", "all"}
+        ``pairs``: y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper). ``all``: every Tx with every Rx (192).
+    polarization : {"v", "h"}
+        Co-polar: v is world z, h is world y.
+
+    Raises
+    ------
+    InputError
+        Where a value has no physical meaning; the message names the field and what is allowed.
+    """
+
+    name: str = "custom"
+    start_frequency_hz: float = 12e9
+    bandwidth_hz: float = 4e9
+    chirp_duration_s: float = 62.5e-6
+    samples_per_chirp: int = 256
+    frame_duration_s: float = 0.1
+    frame_hop_s: float = 0.025
+    tx_y: int = 6
+    tx_z: int = 6
+    rx_y: int = 8
+    rx_z: int = 8
+    tx_spacing_wavelengths: float = 4.0
+    rx_spacing_wavelengths: float = 0.5
+    position_m: tuple[float, float, float] = (-4.0, 1.0, 1.0)
+    channels: Literal["pairs", "all"] = "pairs"
+    polarization: Literal["v", "h"] = "v"
+
+    def __post_init__(self) -> None:
+        for field in (
+            "start_frequency_hz",
+            "bandwidth_hz",
+            "chirp_duration_s",
+            "frame_duration_s",
+            "frame_hop_s",
+            "tx_spacing_wavelengths",
+            "rx_spacing_wavelengths",
+        ):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
+                raise InputError(f"radar '{self.name}': {field} = {value!r}; it must be a positive, finite number")
+        for field, least in (("samples_per_chirp", 1), ("tx_y", 0), ("tx_z", 0), ("rx_y", 0), ("rx_z", 0)):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int) or value < least:
+                raise InputError(f"radar '{self.name}': {field} = {value!r}; it must be a whole number, at least {least}")
+        for field, allowed in (("channels", ("pairs", "all")), ("polarization", ("v", "h"))):
+            if getattr(self, field) not in allowed:
+                raise InputError(f"radar '{self.name}': {field} = {getattr(self, field)!r}; allowed: {', '.join(allowed)}")
+        try:
+            position = tuple(float(value) for value in self.position_m)
+        except (TypeError, ValueError):
+            position = ()
+        if len(position) != 3 or not all(math.isfinite(value) for value in position):
+            raise InputError(f"radar '{self.name}': position_m = {self.position_m!r}; it must be three finite numbers [m]")
+        object.__setattr__(self, "position_m", position)
+        self._check_array()
+        if self.cycles_per_frame < 1:
+            raise InputError(
+                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole TDM cycle of "
+                f"{self.cycle_duration_s:.3g} s; lengthen the frame or shorten the chirp"
+            )
+
+    def _check_array(self) -> None:
+        if self.n_tx == 0 or self.rx_y + self.rx_z == 0:
+            raise InputError(f"radar '{self.name}': the array has no Tx or no Rx; give at least one of each")
+        if self.channels == "pairs":
+            lines = [rx for tx, rx in ((self.tx_y, self.rx_y), (self.tx_z, self.rx_z)) if tx]
+            if min(lines) == 0 or len(set(lines)) > 1:
+                raise InputError(
+                    f"radar '{self.name}': channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
+                    f"{self.rx_y} and {self.rx_z}; make them equal or set channels = 'all'"
+                )
+
+    @classmethod
+    def preset(cls, name: str) -> Radar:
+        """The radar of that name; `PRESETS` lists them.
+
+        Raises
+        ------
+        InputError
+            Where there is no such preset.
+        """
+        if name not in PRESETS:
+            raise InputError(f"radar '{name}' is unknown; allowed: {', '.join(PRESETS)}, or the path of a TOML file")
+        return cls(name=name, **PRESETS[name])
+
+    @classmethod
+    def load(cls, source: str | Path) -> Radar:
+        """A preset by its name, or a TOML file whose keys are the fields of this class.
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be read, is not TOML, or has an unknown key or a value without meaning.
+        """
+        if str(source) in PRESETS:
+            return cls.preset(str(source))
+        path = Path(source)
+        if path.suffix != ".toml":
+            return cls.preset(str(source))
+        try:
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
+        except OSError as error:
+            raise InputError(f"radar file '{path}': {error.strerror}; give a TOML file or one of: {', '.join(PRESETS)}") from None
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"radar file '{path}' is not TOML: {str(error).splitlines()[0]}") from None
+        fields = {field.name for field in dataclasses.fields(cls)}
+        for key in table:
+            if key not in fields:
+                raise InputError(f"radar file '{path}': unknown key '{key}'; allowed: {', '.join(sorted(fields))}")
+        try:
+            return cls(**{"name": path.stem, **table})
+        except InputError as error:
+            raise InputError(f"radar file '{path}': {error}") from None
+
+    # -- waveform ------------------------------------------------------------------------------------------------
+
+    @property
+    def centre_frequency_hz(self) -> float:
+        """Middle of the sweep [Hz]; phases at a range bin turn with this one."""
+        return self.start_frequency_hz + self.bandwidth_hz / 2
+
+    @property
+    def wavelength_m(self) -> float:
+        """Wavelength at the sweep centre [m]."""
+        return SPEED_OF_LIGHT_MPS / self.centre_frequency_hz
+
+    @property
+    def start_wavelength_m(self) -> float:
+        """Wavelength at the sweep start [m], the unit of the antenna spacings."""
+        return SPEED_OF_LIGHT_MPS / self.start_frequency_hz
+
+    @property
+    def slope_hz_per_s(self) -> float:
+        """Sweep rate [Hz/s]."""
+        return self.bandwidth_hz / self.chirp_duration_s
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Complex IF samples a second [Hz]."""
+        return self.samples_per_chirp / self.chirp_duration_s
+
+    # -- TDM schedule --------------------------------------------------------------------------------------------
+
+    @property
+    def n_tx(self) -> int:
+        """Transmitters, and chirps in one TDM cycle."""
+        return self.tx_y + self.tx_z
+
+    @property
+    def n_rx(self) -> int:
+        """Length of the rx axis: receivers that are kept in one chirp."""
+        return self.rx_y + self.rx_z if self.channels == "all" else (self.rx_y if self.tx_y else self.rx_z)
+
+    @property
+    def n_channels(self) -> int:
+        """Virtual channels, ``n_tx * n_rx``; channel = tx * n_rx + rx."""
+        return self.n_tx * self.n_rx
+
+    @property
+    def cycle_duration_s(self) -> float:
+        """One turn through all Tx [s]."""
+        return self.n_tx * self.chirp_duration_s
+
+    @property
+    def cycles_per_frame(self) -> int:
+        """Whole TDM cycles in one frame (133 of the paper's 133.3)."""
+        return math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
+
+    @property
+    def chirps_per_frame(self) -> int:
+        """Chirps in the whole cycles of one frame."""
+        return self.cycles_per_frame * self.n_tx
+
+    def tx_of_chirp(self, chirp: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Transmitter of each chirp, numbered from the start of the capture."""
+        return np.asarray(chirp, dtype=np.int64) % self.n_tx
+
+    def chirp_times(self, n: int, first: int = 0) -> NDArray[np.float64]:
+        """Centres of ``n`` chirps from chirp ``first`` on, (chirp,) [s] since the start of the capture."""
+        return np.asarray((np.arange(first, first + n) + 0.5) * self.chirp_duration_s, dtype=np.float64)
+
+    def window_starts(self, n_chirps: int) -> NDArray[np.int64]:
+        """First cycle of each processing window in a capture of ``n_chirps``, (window,).
+
+        A window starts at the cycle boundary nearest to a multiple of ``frame_hop_s`` and takes ``cycles_per_frame``.
+        """
+        last = n_chirps // self.n_tx - self.cycles_per_frame
+        if last < 0:
+            return np.zeros(0, dtype=np.int64)
+        hop = self.frame_hop_s / self.cycle_duration_s
+        starts = np.rint(np.arange(math.floor((last + 0.5) / hop) + 1) * hop).astype(np.int64)
+        return np.unique(starts[starts <= last])
+
+    def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Centres of the windows that start at these cycles, (window,) [s]."""
+        return np.asarray((np.asarray(starts) + self.cycles_per_frame / 2) * self.cycle_duration_s, dtype=np.float64)
+
+    # -- array ---------------------------------------------------------------------------------------------------
+
+    def _lines(self, along_y: int, along_z: int, spacing_m: float) -> NDArray[np.float64]:
+        places = np.zeros((along_y + along_z, 3))
+        places[:along_y, 1] = (np.arange(along_y) - (along_y - 1) / 2) * spacing_m
+        places[along_y:, 2] = (np.arange(along_z) - (along_z - 1) / 2) * spacing_m
+        return places + np.asarray(self.position_m)
+
+    @cached_property
+    def tx(self) -> NDArray[np.float64]:
+        """Transmitters (tx, 3) [m], world."""
+        return self._lines(self.tx_y, self.tx_z, self.tx_spacing_wavelengths * self.start_wavelength_m)
+
+    @cached_property
+    def rx(self) -> NDArray[np.float64]:
+        """Receivers (rx, 3) [m], world: the y-line, then the z-line."""
+        return self._lines(self.rx_y, self.rx_z, self.rx_spacing_wavelengths * self.start_wavelength_m)
+
+    @cached_property
+    def rx_of_tx(self) -> NDArray[np.int64]:
+        """Indices into `rx` of the receivers kept while each Tx transmits, (tx, rx)."""
+        if self.channels == "all":
+            return np.tile(np.arange(self.rx_y + self.rx_z), (self.n_tx, 1))
+        y_line = np.tile(np.arange(self.rx_y), (self.tx_y, 1)) if self.tx_y else np.zeros((0, self.n_rx), np.int64)
+        z_line = np.tile(np.arange(self.rx_z) + self.rx_y, (self.tx_z, 1)) if self.tx_z else np.zeros((0, self.n_rx), np.int64)
+        return np.concatenate([y_line, z_line])
+
+    # -- what it can measure (the paper's Table 2, by the physics) ---------------------------------------------------
+
+    @property
+    def range_bin_m(self) -> float:
+        """Range resolution and width of one range bin, c / 2B [m] (paper, eq. 2)."""
+        return SPEED_OF_LIGHT_MPS / (2 * self.bandwidth_hz)
+
+    @property
+    def max_range_m(self) -> float:
+        """Range whose beat frequency reaches the sample rate, c Fs / 2s [m] (paper, eq. 1)."""
+        return self.range_bin_m * self.samples_per_chirp
+
+    @property
+    def max_velocity_mps(self) -> float:
+        """Unambiguous velocity, lambda / (4 cycle) with the centre wavelength [m/s] (paper, eq. 3)."""
+        return self.wavelength_m / (4 * self.cycle_duration_s)
+
+    @property
+    def velocity_bin_mps(self) -> float:
+        """Velocity resolution and width of one Doppler bin, centre wavelength [m/s] (paper, eq. 4)."""
+        return self.wavelength_m / (2 * self.cycles_per_frame * self.cycle_duration_s)
+
+    @property
+    def max_angle_deg(self) -> float:
+        """Unambiguous azimuth and elevation, asin(lambda / 2d) with the centre wavelength [deg] (paper, eq. 5)."""
+        return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
+
+    @property
+    def angle_resolution_deg(self) -> float:
+        """Half-power beam width of one uniform virtual line in its far field at broadside, 0.886 lambda / N d [deg].
+
+        Where Tx and Rx spacing do not fill a line without gaps this is that of the line of the same element count.
+        """
+        elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
+        if elements < 2:
+            return 180.0
+        return math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths))
+
+    @property
+    def _virtual_spacing_wavelengths(self) -> float:
+        return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+
+    @cached_property
+    def range_m(self) -> NDArray[np.float64]:
+        """Range of each range bin (range,) [m], half the Tx..Rx path."""
+        return np.arange(self.samples_per_chirp) * self.range_bin_m
+
+    def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
+        """Velocity of each Doppler bin (velocity,) [m/s], ascending, zero at index ``n_cycles // 2``."""
+        frequency = np.fft.fftshift(np.fft.fftfreq(n_cycles, self.cycle_duration_s))
+        return np.asarray(frequency * (self.wavelength_m / 2), dtype=np.float64)
