@@ -1,0 +1,6 @@
+"""Closed forms of scattering: the judge. Nothing here knows of rays, meshes or the fidelity ladder."""
+
+from rtradar.rcs.ellipsoid import ellipsoid, ellipsoid_radii
+from rtradar.rcs.sphere import sphere
+
+__all__ = ["ellipsoid", "ellipsoid_radii", "sphere"]

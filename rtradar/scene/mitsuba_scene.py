@@ -1,0 +1,62 @@
+"""The posed body as a Mitsuba scene.
+
+Every part is an instance of one unit sphere of triangles, moved, turned and stretched by its ``to_world``: a new pose
+costs 21 matrices and the small upper tree of the ray tracer, where new vertices cost a full rebuild (3 ms against 22 ms
+for 21 x 1280 triangles on the machine it was tried on). Mitsuba's own ``sphere`` is not used, for it is silently wrong
+under a stretch that is not uniform, nor its ``ellipsoids``, which cull back faces.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+def _part_key(part: int) -> str:
+    return f"part{part:04d}"
+
+
+def build_body_scene(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer], n_parts: int) -> Any:
+    """Build a Mitsuba scene of ``n_parts`` instances of one closed triangle mesh.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    vertices, faces : (vertex, 3) float64, (face, 3) int
+        The unit sphere of triangles.
+    n_parts : int
+        How many instances.
+
+    Returns
+    -------
+    mitsuba.Scene
+    """
+    mesh = mi.Mesh("unit_sphere", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
+    parameters["faces"] = np.ravel(faces).astype(np.uint32)
+    parameters.update()
+    description: dict[str, Any] = {"type": "scene", "shapes": {"type": "shapegroup", "unit_sphere": mesh}}
+    for part in range(n_parts):
+        description[_part_key(part)] = {"type": "instance", "group": {"type": "ref", "id": "shapes"}}
+    return mi.load_dict(description)
+
+
+def pose_body_scene(mi: Any, parameters: Any, matrices: NDArray[np.float64]) -> None:
+    """Move the instances.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    parameters : mitsuba.SceneParameters
+        Of a scene from `build_body_scene`.
+    matrices : (part, 4, 4) float64
+        From the unit sphere to the scene.
+    """
+    for part, matrix in enumerate(matrices):
+        parameters[f"{_part_key(part)}.to_world"] = mi.Transform4f(matrix)
+    parameters.update()

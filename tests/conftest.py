@@ -1,0 +1,53 @@
+"""What tests share: a repeatable hypothesis, one run per ray-tracing backend, the recordings."""
+
+from __future__ import annotations
+
+import gc
+import os
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+from rtradar.trace.backend import Backend, available, select, use
+
+# The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
+hypothesis.settings.register_profile("rtradar", deadline=None, derandomize=True, database=None)
+hypothesis.settings.load_profile("rtradar")
+
+
+@cache
+def _available() -> tuple[str, ...]:
+    return available()
+
+
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    """Run a test that asks for ``backend`` once on each that works here; without such tests nothing is probed."""
+    if "backend" in metafunc.fixturenames:
+        metafunc.parametrize("backend", _available(), indirect=True)
+
+
+@pytest.fixture
+def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
+    """A backend, in use: ``rtradar.trace.backend.use(backend)`` gives Mitsuba. Its kernels and memory are let go after."""
+    chosen = select(request.param)
+    use(chosen)
+    yield chosen
+    import drjit as dr  # not before the libLLVM is chosen
+
+    gc.collect()
+    dr.sync_thread()
+    dr.flush_malloc_cache()
+
+
+@pytest.fixture(scope="session")
+def mocap() -> Path:
+    """The folder of real recordings."""
+    named = os.environ.get("RTRADAR_MOCAP")
+    if not named:
+        pytest.skip("RTRADAR_MOCAP is not set: it names the folder of real recordings")
+    folder = Path(named)
+    assert folder.is_dir(), f"RTRADAR_MOCAP names no folder: {folder}"
+    return folder

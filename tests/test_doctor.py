@@ -1,0 +1,93 @@
+"""The doctor finds what is there, advises where something is missing, and says by its status whether rays can be traced."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from rtradar import doctor
+from rtradar.errors import InputError
+from rtradar.trace import backend as backends
+from rtradar.trace.llvm import Library
+from rtradar.trace.verdict import Verdict
+
+LIBRARIES = [Library("/lib/libLLVM-15.so.1", "environment"), Library("/venv/libLLVM.so.23.1", "wheel")]
+
+
+def _machine(monkeypatch: pytest.MonkeyPatch, libraries: list[Library], *, scalar: str = "good") -> None:
+    def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+        if variant.startswith("llvm"):
+            assert library is not None
+            return Verdict("good", "23.1.4") if "23" in library.path else Verdict("aborts the process", "15.0.6")
+        return Verdict(scalar if variant.startswith("scalar") else "no CUDA driver or no GPU")
+
+    for module in (doctor, backends):
+        monkeypatch.setattr(module, "candidates", lambda: libraries)
+        monkeypatch.setattr(module, "judge", judge)
+    monkeypatch.setattr(backends, "loaded_llvm_version", lambda: None)
+
+
+def test_all_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    _machine(monkeypatch, LIBRARIES)
+    found = doctor.examine()
+    assert (found.chosen, found.exit_status) == ("llvm_ad_rgb", 0)
+    assert [(row["version"], row["finding"], row["chosen"]) for row in found.llvm] == [
+        ("15.0.6", "aborts the process", False),
+        ("23.1.4", "good", True),
+    ]
+    assert found.backends == {"llvm": "good", "scalar": "good", "cuda": "no CUDA driver or no GPU"}
+    text = doctor.report_text(found)
+    assert "ready, on llvm_ad_rgb" in text
+    assert "aborts the process" in text
+
+
+@pytest.mark.parametrize("libraries", [[], LIBRARIES[:1]])
+def test_scalar_serves_and_the_cure_is_named(monkeypatch: pytest.MonkeyPatch, libraries: list[Library]) -> None:
+    _machine(monkeypatch, libraries)
+    found = doctor.examine()
+    assert (found.chosen, found.exit_status) == ("scalar_rgb", 0)
+    assert any("install one: " in line for line in found.advice)
+    assert "To do" in doctor.report_text(found)
+
+
+def test_nothing_works(monkeypatch: pytest.MonkeyPatch) -> None:
+    _machine(monkeypatch, [], scalar="fails: broken")
+    found = doctor.examine()
+    assert (found.chosen, found.exit_status) == (None, 1)
+    assert "no backend works" in doctor.report_text(found)
+
+
+def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
+    _machine(monkeypatch, LIBRARIES)
+    monkeypatch.setattr(doctor, "PACKAGES", ("numpy", "no-such-package"))
+    found = doctor.examine()
+    assert found.packages["no-such-package"] is None
+    assert found.packages["numpy"]
+    assert any("pip install no-such-package" in line for line in found.advice)
+
+
+def test_the_report_goes_to_the_terminal_and_to_json(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    _machine(monkeypatch, LIBRARIES)
+    assert doctor.report(tmp_path / "doctor.json") == 0
+    assert "Cores" in capsys.readouterr().out
+    assert json.loads((tmp_path / "doctor.json").read_text()) == doctor.examine().as_dict() | _memory(tmp_path / "doctor.json")
+    with pytest.raises(InputError, match="cannot be written"):
+        doctor.report(tmp_path / "no" / "doctor.json")
+
+
+def _memory(file: Path) -> dict[str, float]:
+    """The one thing that may change between two looks."""
+    return {"memory_available_mb": json.loads(file.read_text())["memory_available_mb"]}
+
+
+def test_this_machine() -> None:
+    """Whatever it has, a backend that works is found, and the figures make sense."""
+    found = doctor.examine()
+    assert found.exit_status == 0
+    assert found.cores >= 1
+    if found.memory_total_mb is not None and found.memory_available_mb is not None:
+        assert 0 < found.memory_available_mb <= found.memory_total_mb

@@ -1,0 +1,266 @@
+"""Which backend is chosen, and that no libLLVM gets near a kernel before it was tried elsewhere."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from rtradar.errors import BackendError, InputError
+from rtradar.trace import backend as backends
+from rtradar.trace import llvm, verdict
+from rtradar.trace.backend import Backend, BackendWarning, select, use
+from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, Library
+from rtradar.trace.verdict import Verdict
+
+BAD = Library("/lib/libLLVM-15.so.1", "environment")
+WHEEL = Library("/venv/lib/libLLVM.so.23.1", "wheel")
+OLD = Library("/lib/libLLVM-14.so.1", "system")
+FINDINGS = {
+    BAD.path: Verdict("aborts the process", "15.0.6"),
+    WHEEL.path: Verdict("good", "23.1.4"),
+    OLD.path: Verdict("refused by Dr.Jit: too old", "14"),
+}
+
+Machine = Callable[..., None]
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+    """Let the machine have these libraries, and a GPU or none; nothing is probed, and Dr.Jit is as if never imported."""
+
+    def set_up(*libraries: Library, gpu: bool = False, loaded: str | None = None) -> None:
+        def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+            if variant == "cuda_ad_rgb":
+                return Verdict("good" if gpu else "no CUDA driver or no GPU")
+            assert library is not None
+            return FINDINGS[library.path]
+
+        monkeypatch.setattr(backends, "candidates", lambda: list(libraries))
+        monkeypatch.setattr(backends, "judge", judge)
+        monkeypatch.setattr(backends, "loaded_llvm_version", lambda: loaded)
+
+    return set_up
+
+
+def test_auto_passes_over_a_bad_library_to_the_next_good_one(machine: Machine) -> None:
+    machine(BAD, WHEEL, OLD)
+    assert select("auto") == Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4")
+
+
+@pytest.mark.parametrize("bad", [BAD, OLD])
+def test_llvm_by_name_passes_over_bad_ones_too(machine: Machine, bad: Library) -> None:
+    machine(bad, WHEEL)
+    assert select("llvm").llvm_path == WHEEL.path
+
+
+@pytest.mark.parametrize("libraries", [(), (OLD,)])
+def test_without_a_good_library_auto_takes_scalar_and_says_how_to_mend_it(machine: Machine, libraries: tuple[Library]) -> None:
+    machine(*libraries)
+    with pytest.warns(BackendWarning, match=r"install one: .*scalar_rgb") as caught:
+        backend = select("auto")
+    assert (backend.kind, backend.variant, backend.llvm_path) == ("scalar", "scalar_rgb", None)
+    assert backend.warning == str(caught[0].message)
+
+
+def test_without_a_good_library_llvm_by_name_is_refused_with_the_cure(machine: Machine) -> None:
+    machine(OLD)
+    with pytest.raises(BackendError, match=r"libLLVM-14.*too old.*install one: ") as caught:
+        select("llvm")
+    assert "\n" not in str(caught.value)
+
+
+def test_a_good_library_does_not_help_when_drjit_has_taken_another_one(machine: Machine) -> None:
+    machine(WHEEL, loaded="15.0.6")
+    with pytest.raises(BackendError, match=r"imported with libLLVM 15\.0\.6 before"):
+        select("llvm")
+    machine(WHEEL, loaded="23.1.4")
+    assert select("llvm").llvm_version == "23.1.4"
+
+
+def test_cuda_only_where_its_probe_succeeds(machine: Machine) -> None:
+    machine(WHEEL)
+    with pytest.raises(BackendError, match="no CUDA driver"):
+        select("cuda")
+    machine(WHEEL, gpu=True)
+    assert select("cuda") == Backend("cuda", "cuda_ad_rgb", WHEEL.path, "23.1.4")
+    assert select("auto").kind == "llvm"
+
+
+def test_available_lists_what_works(machine: Machine) -> None:
+    machine(OLD)
+    assert backends.available() == ("scalar",)
+    machine(WHEEL, gpu=True)
+    assert backends.available() == ("llvm", "scalar", "cuda")
+
+
+def test_unknown_variant() -> None:
+    with pytest.raises(InputError, match="'metal' is unknown; allowed: auto, llvm, scalar, cuda"):
+        select("metal")
+
+
+def test_use_sets_the_variant_however_often(backend: Backend) -> None:
+    for _ in range(2):
+        mi = use(backend)
+        assert mi.variant() == backend.variant
+        sphere = mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
+        hit = sphere.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(0, 0, 4), mi.Vector3f(0, 0, -1)))
+        assert hit.t == 3.0  # exact in float32
+
+
+def test_use_refuses_llvm_when_another_library_was_loaded_since(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(backends, "loaded_llvm_version", lambda: "15.0.6")
+    with pytest.raises(BackendError, match="before"):
+        use(Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4"))
+
+
+# -- where libraries are looked for ----------------------------------------------------------------------------------
+
+
+def test_environment_then_wheel_then_system_newest_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    files = {}
+    for name in (
+        "libLLVM-9.so.1",
+        "libLLVM-19.so.1",
+        "libLLVM.so.18.1",
+        "libLLVM.so.23.1",
+        "libLLVMSPIRVLib.so.14",
+        "libLLVM-15.so.1",
+    ):
+        files[name] = tmp_path / name
+        files[name].touch()
+    (tmp_path / "libLLVM-19.0.so").symlink_to(files["libLLVM-19.so.1"])
+    monkeypatch.setattr(llvm, "_SYSTEM_PATTERNS", {sys.platform: (f"{tmp_path}/libLLVM*",)})
+    monkeypatch.setattr(llvm, "_of_wheel", lambda: iter([str(files["libLLVM.so.23.1"])]))
+    monkeypatch.setattr(sys, "prefix", str(tmp_path / "none"))
+    monkeypatch.setattr(sys, "base_prefix", str(tmp_path / "none"))
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, str(files["libLLVM-15.so.1"]))
+    found = [(Path(library.path).name, library.origin) for library in llvm.candidates()]
+    assert found == [
+        ("libLLVM-15.so.1", "environment"),
+        ("libLLVM.so.23.1", "wheel"),
+        ("libLLVM-19.so.1", "system"),
+        ("libLLVM.so.18.1", "system"),
+        ("libLLVM-9.so.1", "system"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "version"),
+    [("libLLVM-15.so.1", "15"), ("libLLVM.so.23.1", "23.1"), ("libLLVM-14.0.6.so.1", "14.0.6"), ("libLLVM.dylib", None)],
+)
+def test_version_by_name(name: str, version: str | None) -> None:
+    assert Library(f"/lib/{name}", "system").version == version
+
+
+# -- probing ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("RTRADAR_CACHE", str(tmp_path / "cache"))
+    return tmp_path / "cache"
+
+
+def _counted(monkeypatch: pytest.MonkeyPatch, finding: str) -> list[str]:
+    probes: list[str] = []
+
+    def probe(variant: str, library: Library | None) -> Verdict:
+        probes.append(variant)
+        return Verdict(finding)
+
+    monkeypatch.setattr(verdict, "_probe", probe)
+    return probes
+
+
+def test_a_verdict_is_kept_until_the_library_changes(empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    probes = _counted(monkeypatch, "aborts the process")
+    file = tmp_path / "libLLVM-15.so.1"
+    file.touch()
+    library = Library(str(file), "system")
+    assert verdict.judge("llvm_ad_rgb", library) == verdict.judge("llvm_ad_rgb", library) == Verdict("aborts the process")
+    assert len(probes) == 1
+    verdict.judge("llvm_ad_rgb", library, fresh=True)
+    assert len(probes) == 2
+    os.utime(file, (1, 1))
+    verdict.judge("llvm_ad_rgb", library)
+    assert len(probes) == 3
+    assert [path.name for path in empty_cache.iterdir()] == ["verdicts.json"]
+
+
+def test_verdicts_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    probes = _counted(monkeypatch, "good")
+    verdict.judge("cuda_ad_rgb", None)
+    verdict.judge("cuda_ad_rgb", None)
+    assert len(probes) == 2
+    assert not empty_cache.exists()
+
+
+@pytest.mark.parametrize("content", ["", "{", "[1]", "\x00"])
+def test_a_spoilt_cache_is_written_anew(empty_cache: Path, monkeypatch: pytest.MonkeyPatch, content: str) -> None:
+    probes = _counted(monkeypatch, "good")
+    empty_cache.mkdir()
+    (empty_cache / "verdicts.json").write_text(content, encoding="utf-8")
+    for _ in range(2):
+        assert verdict.judge("scalar_rgb", None).good
+    assert len(probes) == 1
+
+
+def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    _counted(monkeypatch, "good")
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("RTRADAR_CACHE", str(tmp_path / "file" / "cache"))
+    assert verdict.judge("scalar_rgb", None).good
+
+
+def test_a_probe_that_takes_too_long_is_no_good_and_is_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(verdict, "TIMEOUT_S", 0.01)
+    assert verdict.judge("scalar_rgb", None).finding.startswith("hangs")
+    assert not empty_cache.exists()
+
+
+def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: Path) -> None:
+    file = tmp_path / "libLLVM-23.so.1"
+    file.write_text("not a library")
+    assert verdict.judge("llvm_ad_rgb", Library(str(file), "environment")) == Verdict("cannot be loaded", "23")
+    assert verdict.judge("scalar_rgb", Library(str(file), "environment")).good
+
+
+def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
+    """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
+    libraries = [library for library in llvm.candidates() if library.version]
+    for library in libraries:
+        found = verdict.judge("llvm_ad_rgb", library)
+        major = int((found.version or library.version or "0").split(".")[0])
+        assert found.good or major < 19, (library, found)
+        assert not (found.good and major < 17), (library, found)
+
+
+def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
+    bad = [library.path for library in llvm.candidates() if not verdict.judge("llvm_ad_rgb", library).good]
+    if not bad:
+        pytest.skip("this machine has no libLLVM that is bad")
+    script = """
+import warnings
+from rtradar.trace.backend import loaded_llvm_version, select, use
+warnings.simplefilter("ignore")
+backend = select("auto")
+mi = use(backend)
+import drjit as dr
+assert backend.llvm_version in (None, loaded_llvm_version()), loaded_llvm_version()
+print(backend.kind, dr.minimum(mi.Float(3.0), 2.0))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script],
+        env={**os.environ, ENVIRONMENT_VARIABLE: bad[0]},
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.split()[0] in ("llvm", "scalar")
+    assert done.stdout.strip("[]\n").endswith("2")
