@@ -1,0 +1,116 @@
+"""Point clouds to files that are whole or not there: written beside their place, then moved into it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+
+RDT_AXES = ("time", "range", "velocity")
+"""Names of the coordinates of an RDT cloud."""
+
+RDT_UNITS = ("s", "m", "m/s")
+"""Their units."""
+
+
+@contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A binary file to write; it takes its name when all went well, and leaves nothing otherwise.
+
+    Parameters
+    ----------
+    path : path
+        Where the file shall be; one that is there already is replaced.
+
+    Yields
+    ------
+    binary file
+        Open for writing, in the same folder under another name.
+
+    Raises
+    ------
+    InputError
+        Where the folder is missing or cannot be written.
+    """
+    target = Path(path)
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        file = open(beside, "wb")  # noqa: SIM115 - closed below, before the file is moved
+    except OSError as error:
+        raise InputError(f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written") from None
+    try:
+        with file:
+            yield file
+        os.replace(beside, target)
+    except OSError as error:
+        raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def save_cloud_npz(
+    path: str | os.PathLike[str], points: ArrayLike, axes: Sequence[str] = RDT_AXES, units: Sequence[str] = RDT_UNITS
+) -> None:
+    """Write a cloud as a NumPy archive with ``points (n, 3) float64``, ``axes (3,)`` and ``units (3,)``.
+
+    Parameters
+    ----------
+    path : path
+        Replaced if it is there.
+    points : (n, 3) float
+        May be empty.
+    axes, units : sequence of str
+        Name and unit of the three coordinates.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit or the file cannot be written.
+    """
+    places = _checked(points, axes, units)
+    with atomic_file(path) as file:
+        np.savez_compressed(file, points=places, axes=np.array(list(axes)), units=np.array(list(units)))
+
+
+def save_ply(
+    path: str | os.PathLike[str], points: ArrayLike, axes: Sequence[str] = RDT_AXES, units: Sequence[str] = RDT_UNITS
+) -> None:
+    """Write a cloud as a binary little-endian PLY; a comment line says what x, y and z are.
+
+    Parameters
+    ----------
+    path, points, axes, units
+        As in `save_cloud_npz`; coordinates are written as double.
+
+    Raises
+    ------
+    InputError
+        As in `save_cloud_npz`.
+    """
+    places = _checked(points, axes, units)
+    meaning = ", ".join(f"{letter} = {axis} [{unit}]" for letter, axis, unit in zip("xyz", axes, units, strict=True))
+    header = (
+        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {meaning}\nelement vertex {len(places)}\n"
+        "property double x\nproperty double y\nproperty double z\nend_header\n"
+    )
+    with atomic_file(path) as file:
+        file.write(header.encode("ascii"))
+        file.write(places.astype("<f8").tobytes())
+
+
+def _checked(points: ArrayLike, axes: Sequence[str], units: Sequence[str]) -> NDArray[np.float64]:
+    places = np.asarray(points, dtype=np.float64)
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise InputError(f"cloud: points have shape {places.shape}; they must be (n, 3)")
+    if not np.isfinite(places).all():
+        raise InputError("cloud: points hold NaN or infinity; every coordinate must be finite")
+    if len(axes) != 3 or len(units) != 3:
+        raise InputError(f"cloud: {len(axes)} axes and {len(units)} units are named; give three of each")
+    return places

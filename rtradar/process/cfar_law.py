@@ -1,0 +1,192 @@
+"""Multipliers of CFAR detectors: how far above its neighbours a cell must stand for an asked false-alarm rate.
+
+The power of one channel of complex Gaussian noise is exponential; the sum over L channels ("looks") follows the Gamma
+law of shape L. With the training cells independent of the cell under test and of each other, all of one law:
+
+- cell averaging: the ratio to the mean of N training cells follows the F law with 2L and 2NL degrees of freedom;
+- order statistic: the k-th smallest of N training cells stands at the quantile U of the Gamma law, U ~ Beta(k, N-k+1), so
+  Pfa(alpha) = E[Q(L, alpha z)], z = P^-1(L, U), Q and P the regularised incomplete Gamma functions. For one look this is
+  Rohling's product of (N - i) / (N - i + alpha), i = 0 .. k-1 (H. Rohling, IEEE Trans. AES 19(4), 1983, eq. 22).
+
+In windowed maps neighbouring cells are correlated: the training cells count for fewer, and the rate comes out higher than
+asked; validation/cfar.py measures by how much.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+from scipy.special import betainccinv, betaincinv, gammainc, gammaincc, gammaln
+
+from rtradar.errors import InputError
+
+_DEPTH = 46.0
+"""The integrand is followed down to exp(-46) = 1e-20 of its peak."""
+
+_NODES = 160
+"""Nodes of the trapezoidal rule on the smooth, bell-shaped integrand; 160 leave less than 1e-9 of the integral."""
+
+
+_TINY = 1e-290
+"""Below this the incomplete Gamma functions lose digits; far outside the peak a leading term will do."""
+
+
+def order_rank(n_train: int, quantile: float) -> int:
+    """Rank ``k = ceil(quantile * n_train)`` of the order statistic, counted from the smallest, at least 1.
+
+    A product that exceeds a whole number only by rounding (0.1 * 30) counts as that number.
+    """
+    return max(1, math.ceil(quantile * n_train * (1 - 1e-12)))
+
+
+def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float:
+    """Multiplier of the order-statistic detector.
+
+    Parameters
+    ----------
+    n_train : int
+        Training cells N.
+    quantile : float
+        In (0, 1]; the rank is ceil(quantile N).
+    pfa : float
+        Asked false-alarm rate, in (0, 1).
+    looks : int
+        Independent exponential powers summed in each cell.
+
+    Returns
+    -------
+    float
+        alpha such that a cell above alpha times the order statistic is a false alarm with probability ``pfa``.
+
+    Raises
+    ------
+    InputError
+        Where an argument is out of its range.
+    """
+    _check_law(n_train, pfa, looks)
+    check_quantile(quantile)
+    return _os_scale(int(n_train), order_rank(n_train, quantile), float(pfa), int(looks))
+
+
+def ca_scale(n_train: int, pfa: float, looks: int = 1) -> float:
+    """Multiplier of the cell-averaging detector, on the mean of the training cells.
+
+    Parameters
+    ----------
+    n_train : int
+        Training cells N.
+    pfa : float
+        Asked false-alarm rate, in (0, 1).
+    looks : int
+        Independent exponential powers summed in each cell.
+
+    Returns
+    -------
+    float
+        alpha such that a cell above alpha times the mean is a false alarm with probability ``pfa``; for one look
+        N (pfa^(-1/N) - 1).
+
+    Raises
+    ------
+    InputError
+        Where an argument is out of its range.
+    """
+    _check_law(n_train, pfa, looks)
+    # F.isf(pfa, 2L, 2NL) = N (1 - y) / y with y the pfa-quantile of Beta(NL, L); 1 - y by itself, without cancellation.
+    remainder = betainccinv(looks, n_train * looks, pfa)
+    return float(n_train * remainder / betaincinv(n_train * looks, looks, pfa))
+
+
+def check_quantile(quantile: float) -> None:
+    """Raise InputError unless the quantile lies in (0, 1]."""
+    if not 0 < quantile <= 1:
+        raise InputError(f"CFAR: quantile = {quantile!r}; it must be above 0 and at most 1")
+
+
+def check_pfa(pfa: float) -> None:
+    """Raise InputError unless the false-alarm rate lies in (0, 1)."""
+    if not 0 < pfa < 1:
+        raise InputError(f"CFAR: pfa = {pfa!r}; a false-alarm rate must lie between 0 and 1")
+
+
+def check_looks(looks: int) -> None:
+    """Raise InputError unless the number of looks is a positive whole number."""
+    if isinstance(looks, bool) or looks != int(looks) or looks < 1:
+        raise InputError(f"CFAR: looks = {looks!r}; it must be a whole number, at least 1")
+
+
+def _check_law(n_train: int, pfa: float, looks: int) -> None:
+    if isinstance(n_train, bool) or n_train != int(n_train) or n_train < 1:
+        raise InputError(f"CFAR: n_train = {n_train!r}; it must be a whole number, at least 1")
+    check_pfa(pfa)
+    check_looks(looks)
+
+
+@lru_cache(maxsize=4096)
+def _os_scale(n_train: int, rank: int, pfa: float, looks: int) -> float:
+    goal = math.log(pfa)
+    index = np.arange(n_train, n_train - rank, -1.0)
+
+    def excess(log_alpha: float) -> float:
+        alpha = math.exp(log_alpha)
+        if looks == 1:
+            return -float(np.log1p(alpha / index).sum()) - goal
+        return _log_os_pfa(alpha, n_train, rank, looks) - goal
+
+    low, high = -1.0, 1.0
+    while excess(low) < 0:
+        low -= 2.0
+    while excess(high) > 0:
+        high += 1.0
+    return math.exp(brentq(excess, low, high, xtol=1e-12, rtol=1e-14))
+
+
+def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
+    """Logarithm of the false-alarm rate: the expectation over the order statistic z, integrated over t = log z.
+
+    The integrand has one peak and falls at least exponentially on both sides, so the trapezoidal rule between the points
+    where it has died away converges faster than any power of the step.
+    """
+
+    def log_integrand(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        z = np.exp(t)
+        below, above, alarm = _log_lower(looks, z), _log_upper(looks, z), _log_upper(looks, alpha * z)
+        return constant + looks * t - z + (rank - 1) * below + (n_train - rank) * above + alarm
+
+    constant = float(gammaln(n_train + 1) - gammaln(rank) - gammaln(n_train - rank + 1) - gammaln(looks))
+    t = np.linspace(*_support(log_integrand, looks), _NODES)
+    values = log_integrand(t)
+    peak = values.max()
+    return float(peak + np.log(np.exp(values - peak).sum() * (t[1] - t[0])))
+
+
+def _log_lower(looks: int, z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logarithm of the regularised lower incomplete Gamma function; its leading term where that underflows."""
+    value = gammainc(looks, z)
+    small = value < _TINY
+    leading = looks * np.log(z) - z - gammaln(looks + 1)
+    return np.where(small, leading, np.log(np.where(small, 1.0, value)))
+
+
+def _log_upper(looks: int, z: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logarithm of the regularised upper incomplete Gamma function; its leading term where that underflows."""
+    value = gammaincc(looks, z)
+    small = value < _TINY
+    leading = (looks - 1) * np.log(z) - z - gammaln(looks)
+    return np.where(small, leading, np.log(np.where(small, 1.0, value)))
+
+
+def _support(log_integrand: Callable[[NDArray[np.float64]], NDArray[np.float64]], looks: int) -> tuple[float, float]:
+    """Where the integrand lies less than `_DEPTH` under its peak, found by narrowing a grid."""
+    low, high = math.log(looks) - 60.0, math.log(looks) + 8.0
+    for _ in range(4):
+        t = np.linspace(low, high, 64)
+        values = log_integrand(t)
+        alive = np.flatnonzero(values > values.max() - _DEPTH)
+        low, high = t[max(alive[0] - 1, 0)], t[min(alive[-1] + 1, t.size - 1)]
+    return float(low), float(high)

@@ -1,0 +1,244 @@
+"""IF samples to range spectra, range-Doppler spectra and the power map that CFAR reads.
+
+The IF turns with exp(+j 2 pi f tau), so an echo at range R peaks in range bin R / range_bin (paper, eq. 12) and one
+that recedes in a positive Doppler bin (paper, eq. 16). Windows are periodic Hann unless others are given. Spectra are
+divided by the sums of their windows: a tone of amplitude 1 on the middle of a bin reads 1.
+
+The streaming pieces keep complex64: their rounding stays some 140 dB below the strongest echo, and a map of 666 cycles
+takes 131 MB instead of 262 MB.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TypeVar
+
+import numpy as np
+import scipy.fft
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+_Result = TypeVar("_Result")
+
+_CHIRPS_PER_BATCH = 128
+"""Chirps transformed at once: 8 receivers x 256 samples x 8 bytes make 2 MB, which stays in the cache of a core."""
+
+
+@dataclass(frozen=True)
+class RangeDoppler:
+    """Range-Doppler spectra of one coherent processing window, every channel apart.
+
+    Parameters
+    ----------
+    values : (range, velocity, channel) complex
+        Spectra with coherent gain 1, in the unit of the IF; channel = tx * n_rx + rx. The Tx of one cycle transmit
+        one after the other; the phase that a moving echo gains meanwhile is left in.
+    range_m : (range,) float64
+        Range of each range bin [m], half the Tx..Rx path.
+    velocity : (velocity,) float64
+        Range rate of each Doppler bin [m/s], positive receding, ascending, zero at index ``n_cycles // 2``.
+    """
+
+    values: NDArray[np.complexfloating]
+    range_m: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+def hann(n: int) -> NDArray[np.float64]:
+    """Periodic (DFT-even) Hann window (sample,); one sample alone is 1."""
+    if n == 1:
+        return np.ones(1)
+    return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
+
+
+def range_doppler(
+    x: ArrayLike, radar: Radar, *, range_window: ArrayLike | None = None, doppler_window: ArrayLike | None = None
+) -> RangeDoppler:
+    """Windowed range and Doppler spectra of IF samples, every channel apart.
+
+    Parameters
+    ----------
+    x : (chirp, rx, sample) complex
+        IF samples; chirp 0 comes from Tx 0. Whole TDM cycles are used, the chirps after the last are left out.
+    radar : Radar
+        Gives the schedule and the axes.
+    range_window : (sample,) float, optional
+        Instead of the periodic Hann window in fast time.
+    doppler_window : (cycle,) float, optional
+        Instead of the periodic Hann window in slow time.
+
+    Returns
+    -------
+    RangeDoppler
+        In complex64 where ``x`` is complex64 or float32, else in complex128.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, not one whole cycle is there, a sample is not finite, or a window has
+        the wrong length or no weight.
+    """
+    samples = _checked_if(x, radar)
+    n_cycles = samples.shape[0] // radar.n_tx
+    if n_cycles < 1:
+        raise InputError(
+            f"range_doppler: {samples.shape[0]} chirps hold no whole TDM cycle; give at least {radar.n_tx}, one for each Tx"
+        )
+    if not np.isfinite(samples).all():
+        raise InputError("range_doppler: x holds NaN or infinity; every IF sample must be finite")
+    fast = _weights(range_window, samples.shape[2], "range_window")
+    slow = _weights(doppler_window, n_cycles, "doppler_window")
+    kind = _complex_kind(samples)
+    cube = samples[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_channels, samples.shape[2])
+    weighted = cube * fast.astype(kind) * slow.astype(kind)[:, None, None]
+    spectra = scipy.fft.fft(weighted, axis=2, overwrite_x=True, workers=_workers())
+    spectra = scipy.fft.fft(spectra, axis=0, overwrite_x=True, workers=_workers())
+    values = np.fft.fftshift(spectra, axes=0).transpose(2, 0, 1)
+    return RangeDoppler(np.ascontiguousarray(values), radar.range_m, radar.velocity_mps(n_cycles))
+
+
+def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = None) -> NDArray[np.complex64]:
+    """Range spectrum of each chirp, the part of the work that overlapping windows share.
+
+    Parameters
+    ----------
+    x : (chirp, rx, sample) complex
+        IF samples of any number of chirps.
+    radar : Radar
+        Gives the shape.
+    window : (sample,) float, optional
+        Instead of the periodic Hann window.
+
+    Returns
+    -------
+    (chirp, rx, range) complex64
+        Spectra with coherent gain 1.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar or the window has the wrong length or no weight.
+    """
+    samples = _checked_if(x, radar)
+    weights = _weights(window, samples.shape[2], "window").astype(np.float32)
+    spectra = np.empty(samples.shape, dtype=np.complex64)
+
+    def transform(first: int) -> None:
+        block = slice(first, first + _CHIRPS_PER_BATCH)
+        weighted = np.multiply(samples[block], weights, dtype=np.complex64, casting="same_kind")
+        spectra[block] = scipy.fft.fft(weighted, axis=2, overwrite_x=True)
+
+    _in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
+    return spectra
+
+
+def power_map(
+    spectra: NDArray[np.complexfloating], radar: Radar, *, channel: int | None = None, doppler_window: ArrayLike | None = None
+) -> NDArray[np.floating]:
+    """Range-Doppler power of one window: the squared magnitudes of all channels summed, or of one channel.
+
+    Parameters
+    ----------
+    spectra : (cycle, tx, rx, range) complex
+        Range spectra of whole TDM cycles, from `range_spectrum`.
+    radar : Radar
+        Gives the shape.
+    channel : int, optional
+        Only this channel, tx * n_rx + rx; all of them when left out.
+    doppler_window : (cycle,) float, optional
+        Instead of the periodic Hann window.
+
+    Returns
+    -------
+    (range, velocity) float32 or float64
+        Power, in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian noise a cell follows the
+        Gamma law of as many looks as there are channels in the sum.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, there is no such channel, or the window has the wrong length or no weight.
+    """
+    cube = np.asarray(spectra)
+    if cube.ndim != 4 or cube.shape[1:3] != (radar.n_tx, radar.n_rx) or cube.shape[0] < 1:
+        raise InputError(
+            f"power_map: spectra have shape {cube.shape}; radar '{radar.name}' needs "
+            f"(cycle, tx, rx, range) = (>= 1, {radar.n_tx}, {radar.n_rx}, any)"
+        )
+    if channel is not None and not 0 <= channel < radar.n_channels:
+        raise InputError(f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
+    n_cycles, _, _, n_range = cube.shape
+    kind = _complex_kind(cube)
+    real = np.float32 if kind == np.complex64 else np.float64
+    weights = _weights(doppler_window, n_cycles, "doppler_window").astype(real)[:, None]
+
+    def channel_power(tx: int, rx: int) -> NDArray[np.floating]:
+        # One channel at a time fits the cache of a core; real and imaginary squares stay interleaved till the end.
+        weighted = np.multiply(cube[:, tx, rx], weights, dtype=kind)
+        parts = scipy.fft.fft(weighted, axis=0, overwrite_x=True).view(real)
+        return np.square(parts, out=parts)
+
+    def tx_power(tx: int) -> NDArray[np.floating]:
+        total = channel_power(tx, 0)
+        for rx in range(1, radar.n_rx):
+            total += channel_power(tx, rx)
+        return total
+
+    # The order of the sum is fixed, so the map does not depend on the number of threads.
+    squares = sum(_in_threads(tx_power, range(radar.n_tx))) if channel is None else channel_power(*divmod(channel, radar.n_rx))
+    power = np.asarray(squares).reshape(n_cycles, n_range, 2).sum(axis=2)
+    return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
+
+
+def _checked_if(x: ArrayLike, radar: Radar) -> NDArray[np.generic]:
+    samples = np.asarray(x)
+    if samples.ndim != 3 or samples.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
+        raise InputError(
+            f"IF samples have shape {samples.shape}; radar '{radar.name}' needs "
+            f"(chirp, rx, sample) = (any, {radar.n_rx}, {radar.samples_per_chirp})"
+        )
+    if samples.dtype.kind not in "fc":
+        raise InputError(f"IF samples are of type {samples.dtype}; they must be complex numbers")
+    return samples
+
+
+def _complex_kind(values: NDArray[np.generic]) -> type[np.complex64] | type[np.complex128]:
+    return np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128
+
+
+def _weights(window: ArrayLike | None, n: int, name: str) -> NDArray[np.float64]:
+    """The window divided by its sum."""
+    if window is None:
+        return _hann_weights(n)
+    weights = np.asarray(window)
+    if weights.shape != (n,) or weights.dtype.kind not in "fiu" or not np.isfinite(weights).all():
+        raise InputError(f"{name} has shape {weights.shape}, type {weights.dtype}; it must be {n} finite real numbers")
+    total = float(weights.sum())
+    if total == 0:
+        raise InputError(f"{name} sums to 0; a window needs weight")
+    return weights.astype(np.float64) / total
+
+
+@lru_cache(maxsize=16)
+def _hann_weights(n: int) -> NDArray[np.float64]:
+    weights = hann(n) / hann(n).sum()
+    weights.flags.writeable = False
+    return weights
+
+
+def _workers() -> int:
+    return os.cpu_count() or 1
+
+
+def _in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
+    """Results in the order of the items; NumPy and the FFT release the interpreter lock, so threads do pay."""
+    if len(items) < 2:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(min(_workers(), len(items))) as pool:
+        return list(pool.map(work, items))

@@ -1,0 +1,160 @@
+"""RDT clouds: the streamed surface is the surface of the whole volume, closed and in the right place; fair sampling."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import chisquare
+
+from rtradar.clouds import RdtCloud, rdt_isosurface, sample_centres
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+RADAR = Radar.preset("paper-12ghz")
+
+
+def random_volume(seed: int, shape: tuple[int, int, int], filling: float) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    # Windows begin at cycle boundaries, so their spacing is not exactly even.
+    return rng.random(shape) < filling, 0.05 + np.cumsum(0.025 + rng.uniform(-4e-4, 4e-4, shape[0]))
+
+
+def stream(volume: np.ndarray, times: np.ndarray, n_points: int, seed: int = 0) -> RdtCloud:
+    cloud = RdtCloud(RADAR, n_points=n_points, seed=seed)
+    for mask, time in zip(volume, times, strict=True):
+        cloud.push(mask, time)
+    return cloud
+
+
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    shape=st.tuples(st.integers(1, 7), st.integers(1, 12), st.integers(1, 13)),
+    filling=st.sampled_from([0.02, 0.3, 0.5, 0.9, 1.0]),
+)
+@settings(max_examples=60, deadline=None)
+def test_slabs_make_the_whole_surface(seed: int, shape: tuple[int, int, int], filling: float) -> None:
+    volume, times = random_volume(seed, shape, filling)
+    vertices, faces = rdt_isosurface(volume, times, RADAR)
+    # As many points as triangles: every centre exactly once, in an order that the seed decides.
+    result = stream(volume, times, max(1, len(faces)), seed=3).finish()
+    assert result.n_triangles == len(faces)
+    assert result.n_voxels == volume.sum()
+    np.testing.assert_array_equal(result.points, sample_centres(vertices, faces, max(1, len(faces)), seed=3))
+    centres = vertices[faces].mean(axis=1)
+    np.testing.assert_array_equal(np.sort(result.points.view("f8,f8,f8").ravel()), np.sort(centres.view("f8,f8,f8").ravel()))
+
+
+@given(seed=st.integers(0, 2**32 - 1), n_points=st.integers(1, 400))
+@settings(max_examples=30, deadline=None)
+def test_streamed_sample_is_the_sample_of_the_whole(seed: int, n_points: int) -> None:
+    volume, times = random_volume(seed, (9, 8, 9), 0.1)
+    result = stream(volume, times, n_points, seed=7).finish()
+    np.testing.assert_array_equal(result.points, sample_centres(*rdt_isosurface(volume, times, RADAR), n_points, seed=7))
+
+
+@given(seed=st.integers(0, 2**32 - 1), filling=st.sampled_from([0.05, 0.5, 1.0]))
+@settings(max_examples=30, deadline=None)
+def test_surface_is_closed(seed: int, filling: float) -> None:
+    volume, times = random_volume(seed, (4, 5, 6), filling)
+    _, faces = rdt_isosurface(volume, times, RADAR)
+    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
+    # Each edge of a closed oriented surface is passed as often one way as the other.
+    ways = np.unique(edges, axis=0, return_counts=True)
+    back = np.unique(edges[:, ::-1], axis=0, return_counts=True)
+    np.testing.assert_array_equal(ways[0], back[0])
+    np.testing.assert_array_equal(ways[1], back[1])
+
+
+def test_one_detection_is_an_octahedron_in_its_place() -> None:
+    n_velocity = 133
+    volume = np.zeros((3, 256, n_velocity), bool)
+    volume[1, 120, 70] = True
+    times = np.array([0.05, 0.0751, 0.1])
+    vertices, faces = rdt_isosurface(volume, times, RADAR)
+    assert len(vertices) == 6
+    assert len(faces) == 8
+    middle = np.array([0.0751, RADAR.range_m[120], RADAR.velocity_mps(n_velocity)[70]])
+    half = np.array([0.0125, RADAR.range_bin_m / 2, RADAR.velocity_bin_mps / 2])
+    offsets = (vertices - middle) / half
+    expected = np.concatenate([np.eye(3), -np.eye(3)])
+    order = np.lexsort(np.round(offsets).T)
+    # Times lie 0.05 % off even spacing, and the half bin in time follows the neighbours.
+    np.testing.assert_allclose(offsets[order], expected[np.lexsort(expected.T)], atol=0.005)
+    assert stream(volume, times, 10).finish().n_triangles == 8
+
+
+def test_detections_at_the_ends_are_closed_half_a_hop_outside() -> None:
+    vertices, _ = rdt_isosurface(np.ones((1, 1, 1), bool), [1.0], RADAR)
+    np.testing.assert_allclose(vertices.min(axis=0)[:2], [1.0 - 0.0125, -RADAR.range_bin_m / 2])
+    np.testing.assert_allclose(vertices.max(axis=0)[:2], [1.0 + 0.0125, RADAR.range_bin_m / 2])
+
+
+def test_too_few_triangles_are_drawn_with_replacement() -> None:
+    volume = np.zeros((1, 9, 9), bool)
+    volume[0, 4, 4] = True
+    result = stream(volume, np.array([1.0]), 3000).finish()
+    assert result.points.shape == (3000, 3)
+    assert result.n_triangles == 8
+    counts = np.unique(result.points, axis=0, return_counts=True)[1]
+    assert len(counts) == 8
+    assert chisquare(counts).pvalue > 1e-4  # the seed is fixed
+
+
+def test_sampling_is_uniform() -> None:
+    # 200 triangles along a line, 60 kept, drawn by 400 seeds: each is expected 120 times, early or late alike.
+    vertices = np.repeat(np.arange(200.0), 3)[:, None] * np.ones(3)
+    faces = np.arange(600).reshape(-1, 3)
+    draws = np.concatenate([sample_centres(vertices, faces, 60, seed)[:, 0] for seed in range(400)])
+    counts = np.bincount(draws.round().astype(int), minlength=200)
+    assert counts.sum() == 60 * 400
+    # Without replacement the counts spread less than chi-square's law by the factor 1 - 60 / 200.
+    spread = np.sum((counts - 120) ** 2 / 120) / (1 - 60 / 200)
+    assert 143 < spread < 267  # 199 degrees of freedom: 99.8 % lie within 143 and 267; the seeds are fixed
+    # The order is random too: the first points are drawn from the whole line.
+    first = np.array([sample_centres(vertices, faces, 60, seed)[0, 0] for seed in range(400)])
+    assert chisquare(np.histogram(first, 10, (0, 200))[0]).pvalue > 1e-4
+
+
+def test_same_seed_same_cloud_other_seed_other_cloud() -> None:
+    volume, times = random_volume(1, (6, 20, 20), 0.2)
+    a, b, c = (stream(volume, times, 100, seed).finish().points for seed in (5, 5, 6))
+    np.testing.assert_array_equal(a, b)
+    assert not np.array_equal(a, c)
+
+
+def test_nothing_detected_is_an_empty_cloud() -> None:
+    volume = np.zeros((3, 8, 8), bool)
+    result = stream(volume, np.arange(3.0), 3000).finish()
+    assert result.points.shape == (0, 3)
+    assert (result.n_triangles, result.n_voxels) == (0, 0)
+    vertices, faces = rdt_isosurface(volume, np.arange(3.0), RADAR)
+    assert vertices.shape == faces.shape == (0, 3)
+    assert RdtCloud(RADAR).finish().points.shape == (0, 3)
+
+
+def test_mask_may_be_reused_by_the_caller() -> None:
+    volume, times = random_volume(2, (5, 9, 9), 0.3)
+    cloud, mask = RdtCloud(RADAR, n_points=50), np.empty((9, 9), bool)
+    for slice_, time in zip(volume, times, strict=True):
+        mask[:] = slice_
+        cloud.push(mask, time)
+    np.testing.assert_array_equal(cloud.finish().points, stream(volume, times, 50).finish().points)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: RdtCloud(RADAR, n_points=0), "n_points"),
+        (lambda: RdtCloud(RADAR, seed=-1), "seed"),
+        (lambda: RdtCloud(RADAR).push(np.ones((4, 4)), 0.0), "bool"),
+        (lambda: RdtCloud(RADAR).push(np.ones((4, 4), bool), np.nan), "finite"),
+        (lambda: stream(np.ones((2, 4, 4), bool), np.array([1.0, 1.0]), 5), "later"),
+        (lambda: [RdtCloud.push(c, np.ones((4, n), bool), n) for c in [RdtCloud(RADAR)] for n in (4, 5)], "before it"),
+        (lambda: rdt_isosurface(np.ones((4, 4), bool), [0.0], RADAR), "time, range, velocity"),
+        (lambda: rdt_isosurface(np.ones((2, 4, 4), bool), [0.0], RADAR), "ascending"),
+        (lambda: sample_centres(np.ones((3, 3)), [[0, 1, 2]], n_points=-1), "n_points"),
+    ],
+)
+def test_bad_input_is_refused(call, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        call()
