@@ -1,0 +1,189 @@
+"""`Body`: one ellipsoid a bone, posed at any time by the motion of the skeleton."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.body.ellipsoids import Ellipsoids
+from rtradar.errors import InputError
+from rtradar.motion.joints import NODES, to_nodes
+from rtradar.motion.motion import Motion
+
+_SIDED: Mapping[str, tuple[str, float]] = {
+    "hip": ("hip", 0.07),
+    "knee": ("thigh", 0.07),
+    "ankle": ("shank", 0.06),
+    "toe": ("foot", 0.04),
+    "shoulder": ("clavicle", 0.05),
+    "elbow": ("upper arm", 0.05),
+    "wrist": ("forearm", 0.04),
+    "hand": ("hand", 0.04),
+}
+_MIDDLE: Mapping[str, tuple[str, float]] = {
+    "lowerback": ("lower torso", 0.10),
+    "upperback": ("middle torso", 0.10),
+    "thorax": ("upper torso", 0.10),
+    "neck": ("neck", 0.04),
+    "head": ("head", 0.06),
+}
+
+
+def _part(node: str) -> tuple[str, float]:
+    """Name and thickness [m] of the part that ends in a node."""
+    if node in _MIDDLE:
+        return _MIDDLE[node]
+    side, joint = node.split("_")
+    name, radius = _SIDED[joint]
+    return f"{'left' if side == 'l' else 'right'} {name}", radius
+
+
+PART_NAMES: tuple[str, ...] = tuple(_part(node)[0] for node in NODES[1:])
+"""The 21 parts, in the order of the nodes that they end in."""
+
+PART_RADII_M: tuple[float, ...] = tuple(_part(node)[1] for node in NODES[1:])
+"""Semi-axes a = b of each part of a body of girth 1."""
+
+
+class Poses(NamedTuple):
+    """Ellipsoids at several times: world = centre + frame @ local.
+
+    Attributes
+    ----------
+    centres : (time, part, 3) float64
+        World [m].
+    frames : (time, part, 3, 3) float64
+        Proper rotations; the columns are the directions of the semi-axes, the third along the bone.
+    semi_axes : (part, 3) float64
+        a, b, c [m].
+    """
+
+    centres: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    semi_axes: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """21 ellipsoids on the bones of a moving skeleton.
+
+    Parameters
+    ----------
+    motion : Motion
+        On the 22 nodes of `rtradar.motion.joints.NODES`; `from_motion` takes any other.
+    semi_axes : (part, 3) float64
+        a, b across the bone and c along it [m].
+
+    Raises
+    ------
+    InputError
+        Where the motion is not on the nodes, or a semi-axis is not positive.
+    """
+
+    motion: Motion
+    semi_axes: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        if self.motion.joints != NODES:
+            raise InputError("Body: the motion is not on the 22 nodes; use Body.from_motion")
+        axes = np.ascontiguousarray(self.semi_axes, dtype=np.float64)
+        if axes.shape != (len(PART_NAMES), 3) or not (np.isfinite(axes) & (axes > 0)).all():
+            raise InputError(f"Body: semi_axes must be ({len(PART_NAMES)}, 3), positive and finite")
+        object.__setattr__(self, "semi_axes", axes)
+
+    @classmethod
+    def from_motion(cls, motion: Motion, girth: float = 1.0, scale: float = 1.0) -> Body:
+        """Put ellipsoids on a skeleton: c is half the bone, a = b are `PART_RADII_M`.
+
+        Parameters
+        ----------
+        motion : Motion
+            Of any skeleton that `rtradar.motion.joints.to_nodes` understands.
+        girth : float
+            Multiplies the thickness of every part, on top of the motion's own.
+        scale : float
+            Multiplies the whole subject, its path and its thickness.
+
+        Raises
+        ------
+        InputError
+            Where the skeleton is not understood, or a factor is not positive.
+        """
+        for name, value in (("girth", girth), ("scale", scale)):
+            if not (math.isfinite(value) and value > 0):
+                raise InputError(f"Body.from_motion: {name} = {value}; it must be positive")
+        nodes = to_nodes(motion)
+        if scale != 1.0:
+            nodes = nodes.scaled(scale)
+        radii = np.array(PART_RADII_M) * nodes.girth * girth
+        lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
+        return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1))
+
+    @property
+    def part_names(self) -> tuple[str, ...]:
+        """Names of the 21 parts."""
+        return PART_NAMES
+
+    @property
+    def duration_s(self) -> float:
+        """End of the motion [s]; it begins at 0."""
+        return self.motion.duration_s
+
+    def at(self, times: ArrayLike) -> Poses:
+        """Ellipsoids at any times (time,) [s] inside [0, duration_s].
+
+        The frames are fixed in the material of the bones: they turn with them and never flip.
+
+        Raises
+        ------
+        InputError
+            Where a time lies outside.
+        """
+        positions, quaternions = self.motion.at(times)
+        parents = np.array(self.motion.parents[1:])
+        centres = (positions[:, 1:] + positions[:, parents]) / 2
+        frames = _matrices(quaternions[:, 1:]) @ self._rest_frames
+        return Poses(centres, frames, self.semi_axes)
+
+    def ellipsoids(self, time: float) -> Ellipsoids:
+        """The pose at one time [s]."""
+        poses = self.at([time])
+        return Ellipsoids(poses.centres[0], poses.frames[0], poses.semi_axes)
+
+    @cached_property
+    def _rest_frames(self) -> NDArray[np.float64]:
+        """Frames (part, 3, 3) of the ellipsoids in the axes of their bones."""
+        along = self.motion.offsets[1:] / (2 * self.semi_axes[:, 2:])
+        along = along / np.linalg.norm(along, axis=1, keepdims=True)
+        # Any direction across will do, for a = b, but it must be the same at all times: the axis most across the bone.
+        across = np.cross(np.eye(3)[np.argmin(np.abs(along), axis=1)], along)
+        across /= np.linalg.norm(across, axis=1, keepdims=True)
+        return np.stack([across, np.cross(along, across), along], axis=2)
+
+
+def _matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), scalar last."""
+    x, y, z, w = (quaternions[..., k] for k in range(4))
+    matrices = np.empty((*quaternions.shape[:-1], 3, 3))
+    matrices[..., 0, 0], matrices[..., 0, 1], matrices[..., 0, 2] = (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - z * w),
+        2 * (x * z + y * w),
+    )
+    matrices[..., 1, 0], matrices[..., 1, 1], matrices[..., 1, 2] = (
+        2 * (x * y + z * w),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - x * w),
+    )
+    matrices[..., 2, 0], matrices[..., 2, 1], matrices[..., 2, 2] = (
+        2 * (x * z - y * w),
+        2 * (y * z + x * w),
+        1 - 2 * (x * x + y * y),
+    )
+    return matrices

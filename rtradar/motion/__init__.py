@@ -1,0 +1,8 @@
+"""Motion capture and synthetic actors: what a person does, at any time."""
+
+from rtradar.motion.load import load_motion
+from rtradar.motion.motion import Motion
+from rtradar.motion.placement import place
+from rtradar.motion.synthetic import ACTIVITIES, synthetic_motion
+
+__all__ = ["ACTIVITIES", "Motion", "load_motion", "place", "synthetic_motion"]

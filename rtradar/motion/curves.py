@@ -1,0 +1,50 @@
+"""Smooth functions of time (C2) that synthetic actors move by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def smooth(u: Array) -> Array:
+    """Minimum-jerk step from 0 (u <= 0) to 1 (u >= 1), at rest at both ends (Flash and Hogan 1985)."""
+    u = np.clip(u, 0.0, 1.0)
+    return u**3 * (10 - 15 * u + 6 * u**2)
+
+
+def bump(u: Array) -> Array:
+    """From 0 (u <= 0) over 1 (u = 1/2) to 0 (u >= 1), first and second derivative 0 at the ends."""
+    u = np.clip(u, 0.0, 1.0)
+    return 64 * (u * (1 - u)) ** 3
+
+
+def keyed(t: Array, times: Sequence[float], values: ArrayLike) -> Array:
+    """Minimum-jerk moves from value to value (key, ...), at rest at every key; constant outside. Returns (time, ...)."""
+    keys = np.asarray(values, dtype=np.float64)
+    trailing = (-1, *(1,) * (keys.ndim - 1))
+    result = np.broadcast_to(keys[0], (len(t), *keys.shape[1:])).copy()
+    for begin, end, first, last in zip(times[:-1], times[1:], keys[:-1], keys[1:], strict=True):
+        result += (last - first) * smooth((t - begin) / (end - begin)).reshape(trailing)
+    return result
+
+
+def hermite(t: Array, interval: tuple[float, float], begin: Sequence[ArrayLike], end: Sequence[ArrayLike]) -> Array:
+    """Quintic that has these positions, velocities and accelerations (each scalar or (3,)) at both ends of an interval."""
+    span = interval[1] - interval[0]
+    (p0, v0, a0), (p1, v1, a1) = ([np.asarray(value, dtype=np.float64) for value in state] for state in (begin, end))
+    u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
+    p, v, a = p1 - p0 - (v0 + a0 * span / 2) * span, (v1 - v0 - a0 * span) * span, (a1 - a0) * span**2
+    cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2
+    return p0 + v0 * span * u + a0 * span**2 / 2 * u**2 + u**3 * (cubic + u * (quartic + u * quintic))
+
+
+def state(function: object, t: float) -> tuple[Array, Array, Array]:
+    """Value, velocity and acceleration of ``function(times)`` at a time, by differences."""
+    assert callable(function)
+    h = 1e-4  # truncation h^2/12 of the fourth derivative and rounding 1e-16/h^2 both stay below 1e-5 m/s^2
+    before, here, after = function(np.array([t - h, t, t + h]))
+    return here, (after - before) / (2 * h), (after - 2 * here + before) / h**2

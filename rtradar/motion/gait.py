@@ -1,0 +1,169 @@
+"""A synthetic walk: footprints first, then feet that roll over them, then the body that follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from rtradar.motion.curves import bump, hermite, keyed, state
+from rtradar.motion.figure import ANKLE, HEEL_X, ROOT, SIDES, Array, Pose, roll_about_toe, swing_arm, turn
+from rtradar.motion.traits import Traits
+
+HALF_TRACK_M = 1.5
+"""Long walks turn round at this distance from the middle."""
+
+STRAIGHT_M = 4.2
+"""Walks up to this length just go straight."""
+
+STANCE = 0.58
+"""Part of the cycle that a foot stands: so 8 % of it on both, twice (Winter has 60 %)."""
+
+MIDSTANCE = 0.25
+"""Part of the cycle from landing until the body is over the foot."""
+
+_TURN_STEPS = 4
+
+
+@dataclass(frozen=True)
+class Step:
+    """One footprint: side, landing time, place of the body's middle over it (2,) [m], heading [rad], advance / step length."""
+
+    side: str
+    time: float
+    middle: Array
+    heading: float
+    vigour: float
+
+
+def footprints(traits: Traits, duration_s: float) -> list[Step]:
+    """Steps that cover [0, duration_s] and more than a cycle on both sides; straight, or there and back with turns in four steps."""
+    half_cycle = traits.cycle_s / 2
+    step_m = traits.step_m
+    straight = step_m / half_cycle * duration_s <= STRAIGHT_M
+    x = -step_m / half_cycle * duration_s / 2 if straight else -HALF_TRACK_M
+    before = 4
+    x -= (before + 1 + traits.phase) * step_m
+    time = -(before + traits.phase) * half_cycle - MIDSTANCE * traits.cycle_s
+    side, heading, turn_sign = traits.side, 0.0, 1.0
+    plan: list[tuple[float, float]] = []  # advance and turn of the steps that are decided already
+    steps: list[Step] = []
+    while time < duration_s + 1.6 * traits.cycle_s:
+        direction = round(math.cos(heading))
+        if not plan and not straight and direction * x + 1.5 * step_m > HALF_TRACK_M:
+            rest = max(HALF_TRACK_M - direction * x, 0.0)
+            plan = [(rest, 0.0)] if rest < 0.6 * step_m else [(rest / 2, 0.0)] * 2
+            plan += [(0.0, turn_sign * math.pi / _TURN_STEPS)] * _TURN_STEPS + [(step_m / 2, 0.0)]
+            turn_sign = -turn_sign
+        advance, turning = plan.pop(0) if plan else (step_m, 0.0)
+        heading += turning
+        x += advance * math.cos(heading)
+        steps.append(Step(side, time, np.array([x, 0.0]), heading, advance / step_m))
+        side, time = _other(side), time + half_cycle
+    return steps
+
+
+def _other(side: str) -> str:
+    return "r" if side == "l" else "l"
+
+
+def _rolled(pitch: Array, height_m: float) -> Array:
+    """Ankle over the middle of its footprint (n, 3), heading +x: rolling about the toe, heel up; about the heel, toes up."""
+    toes_up = np.minimum(pitch, 0.0)
+    about_heel = height_m * np.stack(
+        [HEEL_X * (1 - np.cos(toes_up)) + ANKLE * np.sin(toes_up), np.zeros_like(pitch), HEEL_X * np.sin(toes_up)
+         - ANKLE * (1 - np.cos(toes_up))],
+        axis=1,
+    )
+    return np.array([0.0, 0.0, ANKLE * height_m]) + about_heel + roll_about_toe(np.maximum(pitch, 0.0), height_m)
+
+
+def _foot(t: Array, own: list[Step], traits: Traits) -> tuple[Array, Array, Array]:
+    """Ankle (n, 3), pitch (n,; toes down is positive) and yaw (n,) of one foot that steps on its own footprints."""
+    cycle, height = traits.cycle_s, traits.height_m
+    sign = SIDES[own[0].side]
+    keys: list[tuple[float, float]] = []
+    for k, step in enumerate(own):
+        following = own[k + 1].vigour if k + 1 < len(own) else step.vigour
+        keys += [
+            (step.time, -math.radians(18) * step.vigour),
+            (step.time + 0.10 * cycle, 0.0),
+            (step.time + (STANCE - 0.20) * cycle, 0.0),
+            (step.time + (STANCE + 0.09) * cycle, math.radians(62) * max(following, 0.25)),
+        ]
+
+    def pitch(at: Array) -> Array:
+        return keyed(at, [key[0] for key in keys], [key[1] for key in keys])
+
+    yaw = keyed(
+        t,
+        [time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:],
+        [heading for step, after in zip(own, [*own[1:], own[-1]], strict=True) for heading in (step.heading, step.heading)][1:],
+    )
+    ankle = np.zeros((len(t), 3))
+    for step, after in zip(own[:-1], own[1:], strict=True):
+        lift = step.time + STANCE * cycle
+
+        def standing(at: Array, step: Step = step) -> Array:
+            across = sign * traits.track_m * np.array([-math.sin(step.heading), math.cos(step.heading), 0.0])
+            return np.array([*step.middle, 0.0]) + across + turn("z", step.heading).apply(_rolled(pitch(at), height))
+
+        def landing(at: Array, after: Step = after) -> Array:
+            return standing(at, after)
+
+        stands = (t >= step.time) & (t < lift)
+        ankle[stands] = standing(t[stands])
+        swings = (t >= lift) & (t < after.time)
+        path = hermite(t[swings], (lift, after.time), state(standing, lift), state(landing, after.time))
+        clearance = traits.clearance_m * bump((t[swings] - lift) / (after.time - lift))
+        ankle[swings] = path + clearance[:, None] * np.array([0.0, 0.0, 1.0])
+    return ankle, pitch(t), yaw
+
+
+def walk(t: Array, duration_s: float, traits: Traits) -> Pose:
+    """Poses of a walk at times (n,), facing and starting along +x."""
+    steps = footprints(traits, duration_s)
+    cycle, height = traits.cycle_s, traits.height_m
+    over = np.array([step.time + MIDSTANCE * cycle for step in steps])
+    middles = np.array([step.middle for step in steps])
+    headings = np.array([step.heading for step in steps])
+    across = np.stack([-np.sin(headings), np.cos(headings)], axis=1)
+    sway = 0.3 * traits.track_m * np.array([SIDES[step.side] for step in steps])
+    path = CubicSpline(over, middles + sway[:, None] * across)(t)
+    heading = CubicSpline(over, headings)(t)
+    vigour = keyed(t, list(over), [step.vigour for step in steps])
+
+    first_left = next(step.time for step in steps if step.side == "l")
+    phase = 2 * np.pi * (t - first_left) / cycle  # 0 where the left foot lands
+    bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
+    root = np.concatenate([path, (height * (ROOT - 0.013 - vigour * (0.012 - 0.011 * bob)))[:, None]], axis=1)
+    pelvis_yaw = -math.radians(5) * vigour * np.cos(phase)
+    thorax_yaw = math.radians(6) * vigour * np.cos(phase)
+    pelvis = turn("z", heading + pelvis_yaw) * turn("x", math.radians(3) * vigour * np.sin(phase)) * turn("y", math.radians(3))
+    thorax = turn("z", heading + thorax_yaw) * turn("y", math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase))
+    ankles, feet, arms = {}, {}, {}
+    for side, sign in SIDES.items():
+        ankle, pitch, yaw = _foot(t, [step for step in steps if step.side == side], traits)
+        ankles[side], feet[side] = ankle, turn("z", yaw) * turn("y", pitch)
+        # Each arm swings with the other leg.
+        beat = -sign * np.cos(phase - math.radians(15))
+        arms[side] = swing_arm(
+            thorax,
+            side,
+            forward=math.radians(3) + traits.arm_swing_rad * traits.uneven[side] * vigour * beat,
+            outward=np.full(len(t), math.radians(9)),
+            elbow=math.radians(22) + math.radians(12) * vigour * (1 + beat) / 2,
+        )
+    return Pose(
+        root=root,
+        pelvis=pelvis,
+        thorax=thorax,
+        head=turn("z", heading) * turn("y", np.full(len(t), math.radians(4))),
+        ankles=ankles,
+        feet=feet,
+        left=turn("z", heading).apply([0.0, 1.0, 0.0]),
+        arms=arms,
+        shrug=np.zeros(len(t)),
+    )

@@ -1,0 +1,221 @@
+"""`Motion`: a rigid skeleton moving through time, and its resampling to any instant."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
+
+from rtradar.errors import InputError
+
+_TIME_SLACK_S = 1e-9
+"""Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
+
+
+def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotate vectors by unit quaternions; leading axes broadcast.
+
+    Parameters
+    ----------
+    quaternions : (..., 4) float64
+        Scalar last: x, y, z, w.
+    vectors : (..., 3) float64
+
+    Returns
+    -------
+    (..., 3) float64
+    """
+    x, y, z, w = (quaternions[..., k] for k in range(4))
+    a, b, c = (vectors[..., k] for k in range(3))
+    # Rodrigues' form v + w t + u x t with t = 2 u x v; numpy.cross is several times slower on short last axes.
+    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+    return np.stack([a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx], axis=-1)
+
+
+def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Choose the sign of each quaternion (frame, ..., 4) so that it lies in the half-space of the frame before it."""
+    if len(quaternions) < 2:
+        return quaternions
+    same_side = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) >= 0
+    signs = np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
+    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Motion:
+    """A recording of a rigid skeleton, in world axes.
+
+    A joint is the end of one bone. ``rotations[:, j]`` is the world orientation of the bone that ENDS in joint j, so
+    ``position_j = position_parent + R_j @ offsets_j``: an ASF bone's own rotation, a BVH parent joint's global one.
+    That holds between frames too, so bones never change length.
+
+    Parameters
+    ----------
+    name : str
+        Shown in reports.
+    joints : tuple of str
+        Unique names, parents before children, the root first.
+    parents : tuple of int
+        Index of each joint's parent; -1 for the root.
+    offsets : (joint, 3) float64
+        Bone vectors in the bone's own axes [m]; the root's is ignored.
+    root_positions : (frame, 3) float64
+        World [m].
+    rotations : (frame, joint, 4) float64
+        Unit quaternions, scalar last, world. The root's is that of the pelvis.
+    rate_hz : float
+        Frames per second.
+    first_frame_s : float
+        Time of the first frame; zero or less. Frames before time zero only serve interpolation.
+    length_s : float, optional
+        Duration where it ends before the last frame does.
+    girth : float
+        Thickness of the subject relative to the nominal body.
+
+    Raises
+    ------
+    InputError
+        Where shapes do not fit each other, a value is not finite, or the tree is not one.
+    """
+
+    name: str
+    joints: tuple[str, ...]
+    parents: tuple[int, ...]
+    offsets: NDArray[np.float64]
+    root_positions: NDArray[np.float64]
+    rotations: NDArray[np.float64]
+    rate_hz: float
+    first_frame_s: float = 0.0
+    length_s: float | None = None
+    girth: float = 1.0
+
+    def __post_init__(self) -> None:
+        for field in ("offsets", "root_positions", "rotations"):
+            array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
+            if not np.isfinite(array).all():
+                raise InputError(f"Motion {self.name}: {field} holds NaN or infinity; every value must be finite")
+            object.__setattr__(self, field, array)
+        count, frames = len(self.joints), len(self.root_positions)
+        for field, shape in (("offsets", (count, 3)), ("root_positions", (frames, 3)), ("rotations", (frames, count, 4))):
+            if getattr(self, field).shape != shape or not frames or not count:
+                raise InputError(f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must be {shape}")
+        if len(set(self.joints)) != count:
+            raise InputError(f"Motion {self.name}: joint names repeat; every joint needs its own name")
+        if len(self.parents) != count or self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents) if j):
+            raise InputError(f"Motion {self.name}: parents must name one root first (-1), and stand before their children")
+        if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
+            raise InputError(f"Motion {self.name}: rate_hz = {self.rate_hz}; it must be positive")
+        norms = np.linalg.norm(self.rotations, axis=-1)
+        if np.abs(norms - 1).max() > 1e-6:
+            raise InputError(
+                f"Motion {self.name}: rotations are not unit quaternions (norm {norms.min():.3g} to {norms.max():.3g})"
+            )
+        last = self.first_frame_s + (frames - 1) / self.rate_hz
+        if self.first_frame_s > 0 or (self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S):
+            raise InputError(
+                f"Motion {self.name}: frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to {self.length_s} s"
+            )
+
+    # -- what there is ---------------------------------------------------------------------------------------------
+
+    @property
+    def duration_s(self) -> float:
+        """End of the recording [s]; it begins at 0."""
+        if self.length_s is not None:
+            return self.length_s
+        return self.first_frame_s + (len(self.root_positions) - 1) / self.rate_hz
+
+    @property
+    def frame_times(self) -> NDArray[np.float64]:
+        """Time of each frame (frame,) [s]; those outside [0, duration_s] only serve interpolation."""
+        return self.first_frame_s + np.arange(len(self.root_positions)) / self.rate_hz
+
+    @cached_property
+    def positions(self) -> NDArray[np.float64]:
+        """Joints at the frames, (frame, joint, 3) [m], world."""
+        return self._forward(self.root_positions, self.rotations)
+
+    # -- at any time -----------------------------------------------------------------------------------------------
+
+    def at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Pose at any time, bones exactly rigid.
+
+        Rotations go through a C2 cubic spline of the sign-continuous quaternion components, normalised; the root goes
+        through PCHIP. ``validation/interpolation.py`` measures the choice. With every second frame left out, cubic,
+        makima and ``RotationSpline`` meet the left-out frames of 120 Hz recordings alike (kicks: 0.41 mm rms, PCHIP 0.46,
+        slerp 0.64), where noise decides; at 30 Hz the cubic is the nearest (2.7 mm, makima 3.1, PCHIP 3.7,
+        slerp 5.5). On smooth motion it leaves false Doppler lines of a swinging limb at -71 dB of a 77 GHz echo, where
+        makima and PCHIP leave -17 dB and slerp, whose angular velocity jumps at every frame, 0 dB. A spike of one frame
+        rings on with 13 % of its height and falls by 3.7 from frame to frame.
+
+        Parameters
+        ----------
+        times : (time,) float64
+            Seconds from the beginning of the recording.
+
+        Returns
+        -------
+        positions : (time, joint, 3) float64
+            World [m].
+        quaternions : (time, joint, 4) float64
+            World, scalar last.
+
+        Raises
+        ------
+        InputError
+            Where a time lies outside [0, duration_s].
+        """
+        instants = np.atleast_1d(np.asarray(times, dtype=np.float64))
+        if instants.ndim != 1:
+            raise InputError(f"Motion.at: times have shape {instants.shape}; they must be one-dimensional")
+        ok = (instants >= -_TIME_SLACK_S) & (instants <= self.duration_s + _TIME_SLACK_S)
+        if not ok.all():
+            wrong = instants[~ok][0]
+            raise InputError(f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to {self.duration_s:.6g} s")
+        instants = np.clip(instants, 0.0, self.duration_s)
+        if len(self.root_positions) == 1:
+            quaternions = np.repeat(self.rotations, len(instants), axis=0)
+            return self._forward(np.repeat(self.root_positions, len(instants), axis=0), quaternions), quaternions
+        root_spline, rotation_spline = self._splines
+        quaternions = rotation_spline(instants)
+        quaternions /= np.sqrt(np.einsum("tjk,tjk->tj", quaternions, quaternions))[..., None]
+        return self._forward(root_spline(instants), quaternions), quaternions
+
+    @cached_property
+    def _splines(self) -> tuple[PPoly, PPoly]:
+        times = self.frame_times
+        return PchipInterpolator(times, self.root_positions), CubicSpline(times, sign_continuous(self.rotations))
+
+    def _forward(self, roots: NDArray[np.float64], quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+        positions = rotate(quaternions, self.offsets)
+        positions[:, 0] = roots
+        for joint, parent in enumerate(self.parents[1:], start=1):
+            positions[:, joint] += positions[:, parent]
+        return positions
+
+    # -- the same motion elsewhere ---------------------------------------------------------------------------------
+
+    def scaled(self, factor: float) -> Motion:
+        """The same motion by a subject ``factor`` times as tall and as thick, about the world's origin on the floor."""
+        if not (math.isfinite(factor) and factor > 0):
+            raise InputError(f"Motion.scaled: factor = {factor}; it must be positive")
+        return dataclasses.replace(
+            self, offsets=self.offsets * factor, root_positions=self.root_positions * factor, girth=self.girth * factor
+        )
+
+    def turned(self, yaw_rad: float) -> Motion:
+        """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above."""
+        half = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
+        x, y, z, w = (self.rotations[..., k] for k in range(4))
+        s, c = half[2], half[3]
+        turned = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+        return dataclasses.replace(self, root_positions=rotate(half, self.root_positions), rotations=turned)
+
+    def shifted(self, by_m: ArrayLike) -> Motion:
+        """The same motion moved by ``by_m`` (3,) [m]."""
+        return dataclasses.replace(self, root_positions=self.root_positions + np.asarray(by_m, dtype=np.float64))

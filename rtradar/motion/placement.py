@@ -1,0 +1,149 @@
+"""Where the recording stands before the radar: interval, place on the floor, one yaw."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.motion.joints import NODES, to_nodes
+from rtradar.motion.motion import Motion
+
+MARGIN_FRAMES = 16
+"""Frames kept before and after the interval, where there are any.
+
+What lies further away moves a cubic spline by less than 3.7^-16, 1e-9: the ends are as good as the middle."""
+
+WALK_DISTANCE_M = 1.1
+"""A walk gets at least this far from where it began; a kick steps less. Short cuts of straight walks stay below, and then
+face by their hips, which look the same way ..."""
+
+WALK_STRAIGHTNESS = 0.5
+"""... and its way there is at most twice as long as the straight line."""
+
+WALK_ALONG_HEADING = 0.5
+"""... and in the median the hips look along or against it, within 60 degrees: a fighter who steps sideways does not walk."""
+
+
+def place(
+    motion: Motion,
+    start_s: float = 0.0,
+    duration_s: float | None = None,
+    heading_deg: float = 0.0,
+    *,
+    walking: bool | None = None,
+) -> Motion:
+    """Cut an interval out of a recording and put it before the radar.
+
+    The interval's mean horizontal root position goes to the origin; heights stay as recorded. One yaw turns the whole:
+    a walk moves along -x, toward the radar; everything else faces -x by the median heading of its hips.
+
+    Parameters
+    ----------
+    motion : Motion
+        Of a skeleton that `to_nodes` understands.
+    start_s, duration_s : float
+        The interval; to the end where no duration is given. ``start_s`` becomes time zero.
+    heading_deg : float
+        Added to the yaw, anticlockwise seen from above.
+    walking : bool, optional
+        Whether it walks, decided by `walk_direction` where not given.
+
+    Returns
+    -------
+    Motion
+        With up to `MARGIN_FRAMES` frames beyond the interval on each side, for interpolation only.
+
+    Raises
+    ------
+    InputError
+        Where the interval is not inside the recording.
+    """
+    _check(motion, start_s, duration_s, heading_deg)
+    length = motion.duration_s - start_s if duration_s is None else min(duration_s, motion.duration_s - start_s)
+    cut = _cut(motion, start_s, length)
+    nodes = to_nodes(cut)
+    inside = (cut.frame_times >= -1e-9) & (cut.frame_times <= length + 1e-9)
+    if not inside.any():  # an interval between two frames
+        inside[:] = True
+    roots = nodes.root_positions[inside]
+    headings = hip_headings(nodes)[inside]
+    facing = median_heading(headings)
+    direction = walk_direction(roots, headings) if walking is not False else None
+    if walking and direction is None:
+        direction = _farthest(roots)
+    along = facing if direction is None else direction
+    yaw = math.pi - math.atan2(along[1], along[0]) + math.radians(heading_deg)
+    middle = roots.mean(axis=0)
+    return cut.shifted([-middle[0], -middle[1], 0.0]).turned(yaw)
+
+
+def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg: float) -> None:
+    there = f"{motion.name} has {motion.duration_s:.6g} s"
+    if not 0 <= start_s <= motion.duration_s:
+        raise InputError(f"start {start_s:g} s is not inside the recording: {there}")
+    if duration_s is not None:
+        if not (math.isfinite(duration_s) and duration_s > 0):
+            raise InputError(f"duration {duration_s:g} s; it must be positive ({there})")
+        if start_s + duration_s > motion.duration_s + 1e-6:
+            raise InputError(
+                f"start {start_s:g} s and duration {duration_s:g} s end past the recording: {there}, "
+                f"at most {motion.duration_s - start_s:.6g} s from there"
+            )
+    if not math.isfinite(heading_deg):
+        raise InputError(f"heading {heading_deg} degrees; it must be finite")
+
+
+def _cut(motion: Motion, start_s: float, length_s: float) -> Motion:
+    frames = len(motion.root_positions)
+    begin = (start_s - motion.first_frame_s) * motion.rate_hz
+    end = begin + length_s * motion.rate_hz
+    first = max(0, math.floor(begin + 1e-6) - MARGIN_FRAMES)
+    last = min(frames - 1, math.ceil(end - 1e-6) + MARGIN_FRAMES)
+    # A rounding error must not put the first frame after time zero.
+    lead = min(0.0, motion.first_frame_s + first / motion.rate_hz - start_s)
+    return dataclasses.replace(
+        motion,
+        root_positions=motion.root_positions[first : last + 1],
+        rotations=motion.rotations[first : last + 1],
+        first_frame_s=lead,
+        length_s=length_s,
+    )
+
+
+def hip_headings(nodes: Motion) -> NDArray[np.float64]:
+    """Horizontal unit vectors (frame, 2) that the hips face: from right to left hip, turned clockwise by 90 degrees."""
+    left = nodes.positions[:, NODES.index("l_hip"), :2] - nodes.positions[:, NODES.index("r_hip"), :2]
+    return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
+
+
+def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Direction (2,) of the median of headings (frame, 2), component by component."""
+    middle = np.median(headings, axis=0)
+    # Where the headings cancel out their median says nothing, and the first frame decides.
+    return np.asarray(middle if float(np.linalg.norm(middle)) > 1e-6 else headings[0])
+
+
+def walk_direction(roots: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64] | None:
+    """Direction (2,) of a walk, or None where it is none.
+
+    It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a way not longer than
+    1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point, along the ``headings`` (frame, 2) of the hips.
+    The direction is that of the farthest point, so a walk there and back counts, and goes there first.
+    """
+    farthest = _farthest(roots)
+    distance = float(np.linalg.norm(farthest))
+    reached = int(np.argmax(np.linalg.norm(roots[:, :2] - roots[0, :2], axis=1)))
+    way = float(np.linalg.norm(np.diff(roots[: reached + 1, :2], axis=0), axis=1).sum())
+    if distance < max(WALK_DISTANCE_M, WALK_STRAIGHTNESS * way):
+        return None
+    along = float(np.median(np.abs(headings @ farthest))) / distance
+    return farthest if along >= WALK_ALONG_HEADING else None
+
+
+def _farthest(roots: NDArray[np.float64]) -> NDArray[np.float64]:
+    away = roots[:, :2] - roots[0, :2]
+    return np.asarray(away[int(np.argmax(np.linalg.norm(away, axis=1)))])

@@ -1,0 +1,110 @@
+"""Synthetic actors: a person of any size walks, kicks, punches or does jumping jacks."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from rtradar.errors import InputError
+from rtradar.motion.figure import Array, Pose, build_motion, lowering
+from rtradar.motion.gait import walk
+from rtradar.motion.jacks import jumping_jack
+from rtradar.motion.motion import Motion
+from rtradar.motion.strikes import kick, punch
+from rtradar.motion.traits import Traits, draw_traits
+
+ACTIVITIES: Mapping[str, Callable[[Array, float, Traits], Pose]] = {
+    "walk": walk,
+    "kick": kick,
+    "punch": punch,
+    "jumping_jack": jumping_jack,
+}
+"""What the actors can do."""
+
+_RANGES = {
+    "duration_s": (0.0, 3600.0),
+    "height_m": (0.8, 2.5),
+    "build": (0.4, 2.5),
+    "tempo": (0.4, 2.0),
+    "amplitude": (0.3, 1.25),
+    "rate_hz": (30.0, 10_000.0),
+}
+
+
+def synthetic_motion(
+    activity: str,
+    seed: int = 0,
+    *,
+    duration_s: float = 3.0,
+    height_m: float = 1.75,
+    build: float = 1.0,
+    tempo: float = 1.0,
+    side: str = "left",
+    amplitude: float = 1.0,
+    rate_hz: float = 120.0,
+) -> Motion:
+    """A synthetic actor that faces the radar (-x), on the floor z = 0.
+
+    Joints move along minimum-jerk and harmonic curves (C2), feet stand still while they carry and never sink below the
+    floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one turns round within 1.5 m of the middle.
+    The others repeat with short rests.
+
+    Parameters
+    ----------
+    activity : {"walk", "kick", "punch", "jumping_jack"}
+    seed : int
+        The subject: phase, and a few percent of tempo, amplitude and unevenness of the sides.
+    duration_s : float
+    height_m : float
+        Standing height; segment lengths by Drillis and Contini (see `rtradar.motion.figure`).
+    build : float
+        Thickness relative to a normal person of that height.
+    tempo : float
+        Speed of the movement; 1 is a walk of about 1.25 m/s.
+    side : {"left", "right"}
+        The leg or hand that strikes; the foot that steps first.
+    amplitude : float
+        Step length, kick height, reach, width of the jumps.
+    rate_hz : float
+        Frames per second of the result.
+
+    Raises
+    ------
+    InputError
+        Where an activity is unknown or a value out of range.
+    """
+    if activity not in ACTIVITIES:
+        raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
+    if side not in ("left", "right"):
+        raise InputError(f"side {side!r}; allowed are left and right")
+    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
+        raise InputError(f"seed {seed!r}; it must be a whole number, zero or more")
+    given = {
+        "duration_s": duration_s,
+        "height_m": height_m,
+        "build": build,
+        "tempo": tempo,
+        "amplitude": amplitude,
+        "rate_hz": rate_hz,
+    }
+    for name, value in given.items():
+        low, high = _RANGES[name]
+        if not (math.isfinite(value) and low <= value <= high) or value == 0:
+            raise InputError(f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}")
+    rng = np.random.default_rng([int(seed), list(ACTIVITIES).index(activity)])
+    traits = draw_traits(rng, height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
+    t = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
+    pose = ACTIVITIES[activity](t, duration_s, traits)
+    root = pose.root - [0.0, 0.0, lowering(pose, height_m)]
+    motion = build_motion(
+        dataclasses.replace(pose, root=root),
+        name=f"synthetic:{activity}",
+        height_m=height_m,
+        girth=build * height_m / 1.75,
+        rate_hz=rate_hz,
+        length_s=duration_s,
+    )
+    return motion.turned(math.pi)

@@ -1,0 +1,77 @@
+"""What tells one synthetic subject from another."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, kw_only=True)
+class Traits:
+    """A subject's way of moving.
+
+    Parameters
+    ----------
+    height_m : float
+    side : {"l", "r"}
+        The leg or hand that acts, or the foot that steps first.
+    tempo, amplitude : float
+        Relative to the nominal actor, the subject's own few percent included.
+    phase : float
+        Where in a step the walk begins, 0 to 1; how far into the first rest the others do.
+    uneven : mapping of side to float
+        Strength of each side, near 1.
+    """
+
+    height_m: float
+    side: str
+    tempo: float
+    amplitude: float
+    phase: float
+    uneven: Mapping[str, float]
+
+    @property
+    def other(self) -> str:
+        """The side that does not act."""
+        return "r" if self.side == "l" else "l"
+
+    @property
+    def cycle_s(self) -> float:
+        """Two steps of a walk [s]: 1.1 s at 1.75 m height, and pendulums go with the root of their length."""
+        return 1.1 * math.sqrt(self.height_m / 1.75) / self.tempo
+
+    @property
+    def step_m(self) -> float:
+        """One step of a walk [m]: 0.39 of the height."""
+        return 0.39 * self.height_m * self.amplitude
+
+    @property
+    def track_m(self) -> float:
+        """Distance of the footprints from the middle line [m]."""
+        return 0.038 * self.height_m
+
+    @property
+    def clearance_m(self) -> float:
+        """How much a swinging foot is lifted [m]."""
+        return 0.035 * self.height_m
+
+    @property
+    def arm_swing_rad(self) -> float:
+        """Half the arc of a walking arm [rad]."""
+        return math.radians(20) * self.amplitude
+
+
+def draw_traits(rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float) -> Traits:
+    """A subject: 3 % of spread (normal, cut at two sigma) on tempo, amplitude and each side, any phase."""
+    spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
+    return Traits(
+        height_m=height_m,
+        side=side,
+        tempo=tempo * float(spread[0]),
+        amplitude=amplitude * float(spread[1]),
+        phase=float(rng.uniform()),
+        uneven={"l": float(spread[2]), "r": float(spread[3])},
+    )

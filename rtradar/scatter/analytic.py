@@ -1,0 +1,108 @@
+"""The rung `analytic`: the closed-form cross-section of each ellipsoid at its specular range; nothing hides anything."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+from rtradar.rcs import ellipsoid
+from rtradar.scatter.poses import chirp_poses, one_echo_a_part
+
+
+def far_field_echo(
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    semi_axes: NDArray[np.float64],
+    *,
+    spreading: bool = True,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Echo of each ellipsoid by its far-field cross-section along the bisector of Tx and Rx as its centre sees them.
+
+    Parameters
+    ----------
+    tx, rx : (chirp, 3), (chirp, rx, 3) float64
+        [m].
+    centres, frames, semi_axes : (chirp, part, 3), (chirp, part, 3, 3), (part, 3) float64
+        Poses [m].
+    spreading : bool
+        Whether the amplitude is divided by R1 R2, normalised to 1 m.
+
+    Returns
+    -------
+    length : (chirp, rx, part) float64
+        Tx..Rx path over the surface point whose normal is that bisector [m].
+    amplitude : (chirp, rx, part) float64
+        Square root of the cross-section, over R1 R2 with ``spreading`` [m].
+    """
+    to_tx = (tx[:, None] - centres)[:, None]
+    to_rx = rx[:, :, None] - centres[:, None]
+    bisector = to_tx / np.linalg.norm(to_tx, axis=-1, keepdims=True) + to_rx / np.linalg.norm(to_rx, axis=-1, keepdims=True)
+    normal = np.einsum("cpji,crpj->crpi", frames, bisector)
+    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+    reach = normal * semi_axes
+    surface = reach * semi_axes / np.linalg.norm(reach, axis=-1, keepdims=True)
+    surface = np.einsum("cpij,crpj->crpi", frames, surface)
+    range_tx, range_rx = np.linalg.norm(to_tx - surface, axis=-1), np.linalg.norm(to_rx - surface, axis=-1)
+    amplitude = np.sqrt(_cross_section(semi_axes, normal))
+    return range_tx + range_rx, amplitude / (range_tx * range_rx) if spreading else amplitude
+
+
+def plane_wave_echo(
+    radar: Radar,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    semi_axes: NDArray[np.float64],
+    *,
+    spreading: bool = True,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Echo of each ellipsoid as the paper has it: range of the centre, plane waves over the array (eqs 8 to 11).
+
+    Parameters and returns are those of `far_field_echo`. The cross-section is the right one, not the paper code's.
+    """
+    place = np.asarray(radar.position_m)
+    sight = centres - place
+    distance = np.linalg.norm(sight, axis=-1)
+    sight = sight / distance[..., None]
+    lead = np.einsum("ci,cpi->cp", tx - place, sight)[:, None] + np.einsum("cri,cpi->crp", rx - place, sight)
+    amplitude = np.sqrt(_cross_section(semi_axes, np.einsum("cpji,cpj->cpi", frames, -sight)))
+    if spreading:
+        amplitude = amplitude / distance**2
+    return 2 * distance[:, None] - lead, np.broadcast_to(amplitude[:, None], lead.shape)
+
+
+def _cross_section(semi_axes: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    theta, phi = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
+    return ellipsoid(semi_axes[:, 0], semi_axes[:, 1], semi_axes[:, 2], theta, phi)
+
+
+class Analytic:
+    """`analytic`, and with ``paper`` the plane-wave model of the paper.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    paper : bool
+        Range of the centre and plane waves over the array instead of the specular range to each antenna.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    """
+
+    def __init__(self, radar: Radar, body: Body, *, paper: bool = False, spreading: bool = True) -> None:
+        self._radar, self._body, self._paper, self._spreading = radar, body, paper, spreading
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        at = chirp_poses(self._radar, self._body, chirps)
+        if self._paper:
+            length, amplitude = plane_wave_echo(self._radar, *at[1:], spreading=self._spreading)
+        else:
+            length, amplitude = far_field_echo(*at[1:], spreading=self._spreading)
+        return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)

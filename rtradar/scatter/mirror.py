@@ -1,0 +1,198 @@
+"""Bistatic near-field geometric optics of an ellipsoid: where Tx sees Rx mirrored, how far, and how strongly.
+
+Everything is float64. In the ellipsoid's own axes the mirror point makes the path |T - p| + |R - p| over the surface
+stationary (least, for it faces both). Newton's method on the tangent plane finds it, for the matrix it needs,
+
+    H = sum over T, R of (I - s s^T) / R + (s_T + s_R).n S,     S the shape operator,
+
+is the one whose determinant gives the return by stationary phase:
+
+    |F| = 2 sqrt(pi) cos(i) / sqrt(det H),    divided by R1 R2 for the spreading of both legs.
+
+The matrix holds the curvature of both wavefronts, so that the near field is exact to this order of optics. Source:
+Born and Wolf, *Principles of Optics*, appendix III (stationary phase of double integrals).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from numba import njit, prange
+from numpy.typing import NDArray
+
+_MAX_STEPS = 60
+# A last Newton step below this share of the smallest semi-axis leaves 1e-7 in amplitude and, squared, nothing in length.
+_STEP_TOLERANCE = 1e-7
+
+
+@njit(cache=True, error_model="numpy")
+def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
+    """Mirror point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
+
+    ``start`` is a first guess on the surface, or NaN for none; one that faces away is not used. ``out``: length, amplitude, and the point's x, y, z.
+    """
+    inv_a, inv_b, inv_c = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
+    x, y, z = start[0], start[1], start[2]
+    lit = x * inv_a * (tx[0] + rx[0] - 2 * x) + y * inv_b * (tx[1] + rx[1] - 2 * y) + z * inv_c * (tx[2] + rx[2] - 2 * z)
+    if not lit > 0:  # NaN too
+        # From cold: the point whose normal bisects the two directions from the centre.
+        norm_t = math.sqrt(tx[0] ** 2 + tx[1] ** 2 + tx[2] ** 2)
+        norm_r = math.sqrt(rx[0] ** 2 + rx[1] ** 2 + rx[2] ** 2)
+        x = axes[0] ** 2 * (tx[0] / norm_t + rx[0] / norm_r)
+        y = axes[1] ** 2 * (tx[1] / norm_t + rx[1] / norm_r)
+        z = axes[2] ** 2 * (tx[2] / norm_t + rx[2] / norm_r)
+    scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
+    x, y, z = x * scale, y * scale, z * scale
+    old_x, old_y, old_z, best = x, y, z, math.inf
+    tolerance = _STEP_TOLERANCE * min(axes[0], min(axes[1], axes[2]))
+    for _ in range(_MAX_STEPS):
+        t0, t1, t2 = tx[0] - x, tx[1] - y, tx[2] - z
+        r0, r1, r2 = rx[0] - x, rx[1] - y, rx[2] - z
+        range_t = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        range_r = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+        length = range_t + range_r
+        if length > best * (1 + 4e-16):
+            # The step went past the minimum (a needle's tip seen from near): half of it does not.
+            x, y, z = 0.5 * (x + old_x), 0.5 * (y + old_y), 0.5 * (z + old_z)
+            scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
+            x, y, z = x * scale, y * scale, z * scale
+            continue
+        best = length
+        t0, t1, t2 = t0 / range_t, t1 / range_t, t2 / range_t
+        r0, r1, r2 = r0 / range_r, r1 / range_r, r2 / range_r
+        n0, n1, n2 = x * inv_a, y * inv_b, z * inv_c
+        gradient = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+        n0, n1, n2 = n0 / gradient, n1 / gradient, n2 / gradient
+        q0, q1, q2 = t0 + r0, t1 + r1, t2 + r2
+        # Orthonormal tangents e, f that never degenerate (Duff et al., 2017).
+        sign = math.copysign(1.0, n2)
+        u = -1 / (sign + n2)
+        v = n0 * n1 * u
+        e0, e1, e2 = 1 + sign * n0 * n0 * u, sign * v, -sign * n0
+        f0, f1, f2 = v, sign + n1 * n1 * u, -n1
+        facing = q0 * n0 + q1 * n1 + q2 * n2
+        bend = facing / gradient
+        te, tf = t0 * e0 + t1 * e1 + t2 * e2, t0 * f0 + t1 * f1 + t2 * f2
+        re, rf = r0 * e0 + r1 * e1 + r2 * e2, r0 * f0 + r1 * f1 + r2 * f2
+        h_ee = (1 - te * te) / range_t + (1 - re * re) / range_r + bend * (e0 * e0 * inv_a + e1 * e1 * inv_b + e2 * e2 * inv_c)
+        h_ff = (1 - tf * tf) / range_t + (1 - rf * rf) / range_r + bend * (f0 * f0 * inv_a + f1 * f1 * inv_b + f2 * f2 * inv_c)
+        h_ef = -te * tf / range_t - re * rf / range_r + bend * (e0 * f0 * inv_a + e1 * f1 * inv_b + e2 * f2 * inv_c)
+        determinant = h_ee * h_ff - h_ef * h_ef
+        slope_e, slope_f = te + re, tf + rf
+        step_e = (h_ff * slope_e - h_ef * slope_f) / determinant
+        step_f = (h_ee * slope_f - h_ef * slope_e) / determinant
+        if step_e * step_e + step_f * step_f < tolerance * tolerance:
+            break
+        old_x, old_y, old_z = x, y, z
+        x += step_e * e0 + step_f * f0
+        y += step_e * e1 + step_f * f1
+        z += step_e * e2 + step_f * f2
+        scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
+        x, y, z = x * scale, y * scale, z * scale
+    out[0] = length - 0.5 * (slope_e * step_e + slope_f * step_f)
+    # Co-polar reflection by a conductor, E_r = 2 (n.E) n - E_i, with each polarisation drawn across its own line of sight.
+    if horizontal:
+        p0, p1, p2 = up[1] * t2 - up[2] * t1, up[2] * t0 - up[0] * t2, up[0] * t1 - up[1] * t0
+        s0, s1, s2 = up[1] * r2 - up[2] * r1, up[2] * r0 - up[0] * r2, up[0] * r1 - up[1] * r0
+    else:
+        along_t = up[0] * t0 + up[1] * t1 + up[2] * t2
+        along_r = up[0] * r0 + up[1] * r1 + up[2] * r2
+        p0, p1, p2 = up[0] - along_t * t0, up[1] - along_t * t1, up[2] - along_t * t2
+        s0, s1, s2 = up[0] - along_r * r0, up[1] - along_r * r1, up[2] - along_r * r2
+    size = math.sqrt((p0 * p0 + p1 * p1 + p2 * p2) * (s0 * s0 + s1 * s1 + s2 * s2))
+    polarization = 1.0
+    if size > 1e-12:
+        polarization = p0 * s0 + p1 * s1 + p2 * s2
+        polarization -= 2 * (p0 * n0 + p1 * n1 + p2 * n2) * (s0 * n0 + s1 * n1 + s2 * n2)
+        polarization /= size
+    out[1] = math.sqrt(math.pi) * facing / math.sqrt(determinant) * polarization
+    if spreading:
+        out[1] /= range_t * range_r
+    out[2], out[3], out[4] = x, y, z
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point):  # type: ignore[no-untyped-def]
+    chirps, receivers = rx.shape[:2]
+    parts = centres.shape[1]
+    for chirp in prange(chirps):
+        out = np.empty(5)
+        local_t, local_r, up = np.empty(3), np.empty(3), np.empty(3)
+        guess = np.empty(3)
+        for part in range(parts):
+            frame, centre = frames[chirp, part], centres[chirp, part]
+            for i in range(3):
+                local_t[i] = 0.0
+                for j in range(3):
+                    local_t[i] += frame[j, i] * (tx[chirp, j] - centre[j])
+                up[i] = frame[2, i]
+                guess[i] = start[chirp, part, i]
+            for receiver in range(receivers):
+                for i in range(3):
+                    local_r[i] = 0.0
+                    for j in range(3):
+                        local_r[i] += frame[j, i] * (rx[chirp, receiver, j] - centre[j])
+                _solve(local_t, local_r, semi_axes[part], up, horizontal, spreading, guess, out)
+                length[chirp, receiver, part] = out[0]
+                amplitude[chirp, receiver, part] = out[1]
+                # Neighbouring receivers have neighbouring mirror points.
+                guess[0], guess[1], guess[2] = out[2], out[3], out[4]
+                if point.shape[0] > 0:
+                    for j in range(3):
+                        point[chirp, receiver, part, j] = (
+                            centre[j] + frame[j, 0] * out[2] + frame[j, 1] * out[3] + frame[j, 2] * out[4]
+                        )
+
+
+def mirror(
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    centres: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    semi_axes: NDArray[np.float64],
+    *,
+    start: NDArray[np.float64] | None = None,
+    polarization: Literal["v", "h"] = "v",
+    spreading: bool = True,
+    points: bool = False,
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Path length, specular amplitude and mirror point of every ellipsoid, as if each stood alone.
+
+    Parameters
+    ----------
+    tx : (chirp, 3) float64
+        [m].
+    rx : (chirp, rx, 3) float64
+        [m].
+    centres, frames : (chirp, part, 3), (chirp, part, 3, 3) float64
+        Poses; columns of a frame are the directions of the semi-axes.
+    semi_axes : (part, 3) float64
+        [m].
+    start : (chirp, part, 3) float64, optional
+        Where to begin the search, in the ellipsoid's axes; NaN where nothing is known.
+    polarization : {"v", "h"}
+        Co-polar, v along world z.
+    spreading : bool
+        Whether the amplitude is divided by R1 R2, normalised to 1 m.
+    points : bool
+        Whether mirror points are wanted; they are many.
+
+    Returns
+    -------
+    length : (chirp, rx, part) float64
+        |T - p| + |R - p| [m].
+    amplitude : (chirp, rx, part) float64
+        Scattering length, over R1 R2 with ``spreading`` [m].
+    point : (chirp, rx, part, 3) float64
+        World [m]; empty unless ``points``.
+    """
+    tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
+    shape = (*rx.shape[:2], centres.shape[1])
+    length, amplitude = np.empty(shape), np.empty(shape)
+    point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
+    if start is None:
+        start = np.broadcast_to(np.nan, (*centres.shape,))
+    _mirror(tx, rx, centres, frames, semi_axes, start, polarization == "h", spreading, length, amplitude, point)
+    return length, amplitude, point

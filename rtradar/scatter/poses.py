@@ -1,0 +1,68 @@
+"""Where body and antennas are when a chirp is on its way: the common ground of all rungs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+
+_ANCHORS_S = 10e-3
+
+
+def anchor_step(radar: Radar) -> int:
+    """Chirps between anchors, the instants 10 ms apart at which scenes are traced and power is measured.
+
+    A limb at 5 m/s goes 5 cm between them.
+    """
+    return max(1, round(_ANCHORS_S / radar.chirp_duration_s))
+
+
+class Rung(Protocol):
+    """A rung of the fidelity ladder: a body seen by a radar, ready to answer for any chirps of the capture."""
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending."""
+        ...
+
+
+class ChirpPoses(NamedTuple):
+    """Body and antennas chirp by chirp, float64, world [m].
+
+    ``tx_index (chirp,)``, ``tx (chirp, 3)``, ``rx (chirp, rx, 3)``, ``centres (chirp, part, 3)``,
+    ``frames (chirp, part, 3, 3)``, ``semi_axes (part, 3)``.
+    """
+
+    tx_index: NDArray[np.int64]
+    tx: NDArray[np.float64]
+    rx: NDArray[np.float64]
+    centres: NDArray[np.float64]
+    frames: NDArray[np.float64]
+    semi_axes: NDArray[np.float64]
+
+
+def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPoses:
+    """Poses at the centres of these chirps; past the end of the recording the body rests in its last pose."""
+    times = np.minimum((np.asarray(chirps) + 0.5) * radar.chirp_duration_s, body.duration_s)
+    poses = body.at(times)
+    tx_index = radar.tx_of_chirp(chirps)
+    return ChirpPoses(tx_index, radar.tx[tx_index], radar.rx[radar.rx_of_tx[tx_index]], *poses)
+
+
+def one_echo_a_part(
+    tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.float64], frequency_hz: float
+) -> Echoes:
+    """`Echoes` of single reflections, one a part, that do not change over the sweep."""
+    parts = length.shape[2]
+    return Echoes(
+        length=length,
+        amplitude=amplitude.astype(np.complex128)[None],
+        frequency=np.array([frequency_hz]),
+        tx=tx,
+        part=np.arange(parts),
+        bounces=np.ones(parts, dtype=np.int64),
+    )

@@ -1,0 +1,40 @@
+"""The rung `specular`: bistatic near-field geometric optics per chirp, with traced occlusion of the mirror point."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+from rtradar.scatter.mirror import mirror
+from rtradar.scatter.occlusion import MirrorVisibility
+from rtradar.scatter.poses import chirp_poses, one_echo_a_part
+from rtradar.trace.backend import select, use
+from rtradar.trace.body_tracer import BodyTracer
+
+
+class Specular:
+    """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    variant : {"auto", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    """
+
+    def __init__(self, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True) -> None:
+        self._radar, self._body, self._spreading = radar, body, spreading
+        self.visibility = MirrorVisibility(radar, body, BodyTracer(use(select(variant)), body.semi_axes))
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        at = chirp_poses(self._radar, self._body, chirps)
+        weight, start = self.visibility.at(chirps)
+        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
+        return one_echo_a_part(at.tx_index, length, amplitude * weight, self._radar.centre_frequency_hz)

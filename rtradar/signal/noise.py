@@ -1,0 +1,60 @@
+"""Receiver noise: white, complex, Gaussian, of a power that follows from the asked signal-to-noise ratio."""
+
+from __future__ import annotations
+
+import math
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.radar import Radar
+
+
+@dataclass(frozen=True)
+class Noise:
+    """White complex Gaussian noise that does not depend on how the capture is cut into blocks.
+
+    Parameters
+    ----------
+    power : float
+        Of one complex sample [m^2]; 0 is none.
+    seed : int
+        The same seed, the same noise.
+    """
+
+    power: float
+    seed: int = 0
+
+    @classmethod
+    def for_snr(cls, signal_power: float, snr_db: float, seed: int = 0) -> Noise:
+        """Noise whose power per sample is ``signal_power`` less ``snr_db``; infinite ``snr_db`` is none."""
+        return cls(0.0 if math.isinf(snr_db) and snr_db > 0 else signal_power / 10 ** (snr_db / 10), seed)
+
+    def add(self, samples: NDArray[np.complex64], radar: Radar, first_chirp: int) -> None:
+        """Add noise in place to a block of chirps ``(chirp, rx, sample)`` that starts at ``first_chirp``, a cycle's first.
+
+        Each TDM cycle has a stream of its own, made from the seed and its number.
+
+        Raises
+        ------
+        ValueError
+            Where the block does not start with a cycle.
+        """
+        if first_chirp % radar.n_tx:
+            raise ValueError(f"Noise.add: the block starts at chirp {first_chirp}; it must start with a TDM cycle")
+        if self.power == 0:
+            return
+        sigma = np.float32(math.sqrt(self.power / 2))
+
+        def fill(first: int) -> None:
+            part = samples[first : first + radar.n_tx]
+            stream = np.random.Generator(np.random.SFC64([self.seed, (first_chirp + first) // radar.n_tx]))
+            # A whole cycle is drawn even where the capture ends inside it, so that what stands there stays the same.
+            values = stream.standard_normal((radar.n_tx, *part.shape[1:], 2), dtype=np.float32)
+            values *= sigma
+            part += values.view(np.complex64)[: len(part), ..., 0]
+
+        with ThreadPoolExecutor() as pool:
+            list(pool.map(fill, range(0, len(samples), radar.n_tx)))
