@@ -1,0 +1,206 @@
+"""The command line: ``rtradar doctor`` and ``rtradar run``.
+
+Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
+and how to mend it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+import warnings
+from pathlib import Path
+from typing import Any, NoReturn, TextIO
+
+from rtradar.errors import BackendError, InputError
+from rtradar.radar import PRESETS
+
+_SYNTHETIC = "synthetic:"
+
+
+class _OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as everything else here does."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; the exit status is returned.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Instead of those of the process.
+    """
+    warnings.showwarning = _show_warning
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    try:
+        status: int = options.command(options)
+    except InputError as error:
+        return _fail(2, error)
+    except BackendError as error:
+        return _fail(1, error)
+    except KeyboardInterrupt:
+        return _fail(1, "stopped by the user; nothing was left half-written")
+    except BrokenPipeError:
+        return 1
+    return status
+
+
+def _fail(status: int, why: object) -> int:
+    print("rtradar: " + " ".join(str(why).split()), file=sys.stderr)
+    return status
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    print(f"rtradar: warning: {message}", file=file or sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _OneLineParser(
+        prog="rtradar", description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds."
+    )
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_OneLineParser)
+
+    doctor = commands.add_parser("doctor", help="which ray-tracing backends work on this machine, and what to install")
+    doctor.add_argument("--json", type=Path, metavar="FILE", help="write the findings there as JSON")
+    doctor.set_defaults(command=_doctor)
+
+    run = commands.add_parser("run", help="one recording in; maps, clouds, pictures and a summary out")
+    run.add_argument("motion", metavar="MOTION", help="an .amc or .bvh file, or synthetic:walk, :kick, :punch, :jumping_jack")
+    run.add_argument("--skeleton", type=Path, metavar="ASF", help="the .asf of an .amc recording")
+    run.add_argument(
+        "--radar", default="paper-12ghz", metavar="NAME|TOML", help=f"{', '.join(PRESETS)}, or a TOML file (default: paper-12ghz)"
+    )
+    run.add_argument(
+        "--scene", default="free-space", metavar="NAME|TOML", help="a scene by name, or a TOML file (default: free-space)"
+    )
+    run.add_argument("--fidelity", default="specular", help="analytic-paper, analytic or specular (default: specular)")
+    run.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="where the interval begins [s] (default: 0)")
+    run.add_argument("--duration", type=_seconds, metavar="S", help="how long it is [s] (default: to the end; synthetic: 3)")
+    run.add_argument(
+        "--heading", type=_number, default=0.0, metavar="DEG", help="turn the person, anticlockwise from above (default: 0)"
+    )
+    run.add_argument(
+        "--snr-db", type=_decibels, default=20.0, metavar="X|inf", help="echo power over noise power per sample (default: 20)"
+    )
+    run.add_argument("--pfa", type=_number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)")
+    run.add_argument("--seed", type=_whole, default=0, metavar="N", help="of synthetic motion, noise and sampling (default: 0)")
+    run.add_argument(
+        "--variant", choices=("auto", "llvm", "scalar", "cuda"), default="auto", help="Mitsuba's backend (default: auto)"
+    )
+    run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
+    run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
+    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
+    run.add_argument("--json", type=Path, metavar="FILE", help="write the summary there too")
+    run.set_defaults(command=_run)
+    return parser
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from rtradar.doctor import report
+
+    return report(options.json)
+
+
+def _run(options: argparse.Namespace) -> int:
+    # A JSON file that cannot be written is found out before the work, not after it.
+    if options.json is not None and not options.json.resolve().parent.is_dir():
+        raise InputError(f"--json {options.json}: there is no folder '{options.json.resolve().parent}'; make it first")
+    from rtradar.motion import load_motion, synthetic_motion
+    from rtradar.radar import Radar
+    from rtradar.scene import Scene
+
+    radar, scene = Radar.load(options.radar), Scene.load(options.scene)
+    if options.motion.startswith(_SYNTHETIC):
+        if options.skeleton is not None:
+            raise InputError(f"{options.motion}: a synthetic actor has its own skeleton; leave --skeleton out")
+        duration = 3.0 if options.duration is None else options.duration
+        activity = options.motion.removeprefix(_SYNTHETIC)
+        motion = synthetic_motion(activity, seed=options.seed, duration_s=options.start + duration)
+    else:
+        motion = load_motion(options.motion, skeleton=options.skeleton)
+
+    from rtradar.pipeline import run
+
+    result = run(
+        motion,
+        radar,
+        scene,
+        out=options.out,
+        fidelity=options.fidelity,
+        start_s=options.start,
+        duration_s=options.duration,
+        heading_deg=options.heading,
+        snr_db=options.snr_db,
+        pfa=options.pfa,
+        seed=options.seed,
+        variant=options.variant,
+        spreading=not options.no_spreading,
+        save_if=options.save_if,
+    )
+    if options.json is not None:
+        _write_json(options.json, result.summary)
+    said = result.summary
+    print(
+        f"{said['rdt_points']} points from {said['detections']} detections in {said['windows']} windows; "
+        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; see {options.out}"
+    )
+    return 0
+
+
+def _write_json(path: Path, content: dict[str, Any]) -> None:
+    try:
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
+
+
+def _number(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError
+    return value
+
+
+def _seconds(text: str) -> float:
+    value = _number(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def _decibels(text: str) -> float:
+    value = float(text)
+    if math.isnan(value) or value == -math.inf:
+        raise ValueError
+    return value
+
+
+def _whole(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+for _kind, _name in (
+    (_number, "finite number"),
+    (_seconds, "number of seconds, not negative"),
+    (_decibels, "number of decibels, or inf"),
+    (_whole, "whole number, not negative"),
+):
+    _kind.__name__ = _name  # argparse says "invalid <name> value"

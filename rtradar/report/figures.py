@@ -1,0 +1,118 @@
+"""Pictures of maps and clouds, with axes and units, as PNG files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from rtradar.radar import Radar
+
+_DYNAMIC_RANGE_DB = 60.0
+
+
+def _figure(width: float, height: float) -> Figure:
+    figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def _decibels(power: NDArray[np.floating]) -> tuple[NDArray[np.float64], float, float]:
+    """Power in dB, and the limits of its colours: the peak, and the noise floor or 60 dB less."""
+    values = 10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny))
+    top = float(values.max())
+    return values, max(top - _DYNAMIC_RANGE_DB, float(np.median(values)) - 3), top
+
+
+def _bins(centres: NDArray[np.float64]) -> tuple[float, float]:
+    """Outer edges of evenly spaced bins."""
+    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
+    return float(centres[0] - half), float(centres[-1] + half)
+
+
+def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[np.float64], radar: Radar, title: str) -> None:
+    """Range-time picture.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    power : (slow_time, range)
+        [m^2].
+    slow_time : (slow_time,)
+        [s].
+    radar : Radar
+    title : str
+    """
+    figure = _figure(8, 4.5)
+    axes = figure.subplots()
+    values, low, high = _decibels(power)
+    image = axes.imshow(
+        values.T,
+        origin="lower",
+        aspect="auto",
+        cmap="viridis",
+        vmin=low,
+        vmax=high,
+        extent=(*_bins(slow_time), *_bins(radar.range_m)),
+    )
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
+    figure.colorbar(image, label="Power [dB re 1 m²]")
+    figure.savefig(path)
+
+
+def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np.bool_], radar: Radar, title: str) -> None:
+    """Range-Doppler map beside itself with its detections.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    power : (range, velocity)
+        [m^2].
+    mask : (range, velocity) bool
+        Detections.
+    radar : Radar
+    title : str
+    """
+    figure = _figure(11, 4.5)
+    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
+    values, low, high = _decibels(power)
+    velocity, distance = radar.velocity_mps(power.shape[1]), radar.range_m
+    extent = (*_bins(velocity), *_bins(distance))
+    image = left.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+    right.imshow(values, origin="lower", aspect="auto", cmap="Greys", vmin=low, vmax=high, extent=extent)
+    rows, columns = np.nonzero(mask)
+    right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections")
+    right.legend(loc="upper right")
+    for axes, name in ((left, "Power, all channels"), (right, "OS-CFAR")):
+        axes.set(xlabel="Velocity [m/s], positive receding", title=name)
+    left.set_ylabel("Range [m]")
+    figure.colorbar(image, ax=[left, right], label="Power [dB re 1 m²]")
+    figure.suptitle(title)
+    figure.savefig(path)
+
+
+def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
+    """Range-Doppler-time cloud, coloured by velocity.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    points : (point, 3) float64
+        Time [s], range [m], velocity [m/s].
+    title : str
+    """
+    figure = _figure(8, 6.5)
+    axes = figure.add_subplot(projection="3d")
+    time, distance, velocity = points.T
+    largest = float(np.abs(velocity).max(initial=1e-9))
+    dots = axes.scatter(time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest)
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"{title}: {len(points)} points")
+    axes.set_box_aspect((1.6, 1, 1))
+    figure.colorbar(dots, label="Velocity [m/s], positive receding", shrink=0.6, pad=0.1)
+    figure.savefig(path)
