@@ -318,9 +318,9 @@ class Radar:
     @cached_property
     def range_m(self) -> NDArray[np.float64]:
         """Range of each range bin (range,) [m], half the Tx..Rx path."""
-        return np.arange(self.samples_per_chirp) * self.range_bin_m
+        return np.arange(self.samples_per_chirp, dtype=np.float64) * self.range_bin_m
 
     def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
         """Velocity of each Doppler bin (velocity,) [m/s], ascending, zero at index ``n_cycles // 2``."""
-        frequency = np.fft.fftshift(np.fft.fftfreq(n_cycles, self.cycle_duration_s))
-        return np.asarray(frequency * (self.wavelength_m / 2), dtype=np.float64)
+        bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
+        return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))

@@ -13,8 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.ellipsoids import Ellipsoids
 from rtradar.errors import InputError
-from rtradar.motion.joints import NODES, to_nodes
+from rtradar.motion.joints import to_nodes
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import NODES
 
 _SIDED: Mapping[str, tuple[str, float]] = {
     "hip": ("hip", 0.07),
@@ -76,7 +77,7 @@ class Body:
     Parameters
     ----------
     motion : Motion
-        On the 22 nodes of `rtradar.motion.joints.NODES`; `from_motion` takes any other.
+        On the 22 nodes of `rtradar.motion.names.NODES`; `from_motion` takes any other.
     semi_axes : (part, 3) float64
         a, b across the bone and c along it [m].
 

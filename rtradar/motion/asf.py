@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.axes import quaternions_to_world, to_world
-from rtradar.motion.joints import ASF_JOINTS
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import ASF_JOINTS
 from rtradar.motion.textfile import fail, numbers, read_lines
 
 _INCH_M = 0.0254

@@ -229,6 +229,7 @@ def _unit(joints: list[_Joint], kept: list[int], offsets: NDArray[np.float64], p
     fitting = [unit for unit in UNITS_M.values() if _REACH_M[0] <= longest * unit <= _REACH_M[1]]
     if len(fitting) != 1:
         raise InputError(
-            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of {', '.join(UNITS_M)}; give unit_m (metres a unit)"
+            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of {', '.join(UNITS_M)}; "
+            f"give unit_m (metres a unit)"
         )
     return fitting[0]

@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.motion.joints import NODE_PARENT, NODES
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import NODE_PARENT, NODES
 
 Array = NDArray[np.float64]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -18,10 +19,10 @@ HALF_TRACK_M = 1.5
 STRAIGHT_M = 4.2
 """Walks up to this length just go straight."""
 
-STANCE = 0.58
-"""Part of the cycle that a foot stands: so 8 % of it on both, twice (Winter has 60 %)."""
+STANCE = 0.57
+"""Part of the cycle that a foot stands: so 7 % of it on both, twice (Winter has 60 %)."""
 
-MIDSTANCE = 0.25
+MIDSTANCE = 0.22
 """Part of the cycle from landing until the body is over the foot."""
 
 _TURN_STEPS = 4
@@ -39,7 +40,7 @@ class Step:
 
 
 def footprints(traits: Traits, duration_s: float) -> list[Step]:
-    """Steps that cover [0, duration_s] and more than a cycle on both sides; straight, or there and back with turns in four steps."""
+    """Steps that cover [0, duration_s] and more than a cycle on both sides; straight, or there and back."""
     half_cycle = traits.cycle_s / 2
     step_m = traits.step_m
     straight = step_m / half_cycle * duration_s <= STRAIGHT_M
@@ -73,8 +74,11 @@ def _rolled(pitch: Array, height_m: float) -> Array:
     """Ankle over the middle of its footprint (n, 3), heading +x: rolling about the toe, heel up; about the heel, toes up."""
     toes_up = np.minimum(pitch, 0.0)
     about_heel = height_m * np.stack(
-        [HEEL_X * (1 - np.cos(toes_up)) + ANKLE * np.sin(toes_up), np.zeros_like(pitch), HEEL_X * np.sin(toes_up)
-         - ANKLE * (1 - np.cos(toes_up))],
+        [
+            HEEL_X * (1 - np.cos(toes_up)) + ANKLE * np.sin(toes_up),
+            np.zeros_like(pitch),
+            HEEL_X * np.sin(toes_up) - ANKLE * (1 - np.cos(toes_up)),
+        ],
         axis=1,
     )
     return np.array([0.0, 0.0, ANKLE * height_m]) + about_heel + roll_about_toe(np.maximum(pitch, 0.0), height_m)
@@ -86,12 +90,13 @@ def _foot(t: Array, own: list[Step], traits: Traits) -> tuple[Array, Array, Arra
     sign = SIDES[own[0].side]
     keys: list[tuple[float, float]] = []
     for k, step in enumerate(own):
-        following = own[k + 1].vigour if k + 1 < len(own) else step.vigour
+        # Short steps roll less.
+        following = traits.amplitude * (own[k + 1].vigour if k + 1 < len(own) else step.vigour)
         keys += [
-            (step.time, -math.radians(18) * step.vigour),
+            (step.time, -math.radians(18) * traits.amplitude * step.vigour),
             (step.time + 0.10 * cycle, 0.0),
             (step.time + (STANCE - 0.20) * cycle, 0.0),
-            (step.time + (STANCE + 0.09) * cycle, math.radians(62) * max(following, 0.25)),
+            (step.time + (STANCE + 0.09) * cycle, math.radians(60) * min(max(following, 0.25), 1.1)),
         ]
 
     def pitch(at: Array) -> Array:
@@ -100,10 +105,10 @@ def _foot(t: Array, own: list[Step], traits: Traits) -> tuple[Array, Array, Arra
     yaw = keyed(
         t,
         [time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:],
-        [heading for step, after in zip(own, [*own[1:], own[-1]], strict=True) for heading in (step.heading, step.heading)][1:],
+        [step.heading for step in own for _ in (0, 1)][:-1],
     )
     ankle = np.zeros((len(t), 3))
-    for step, after in zip(own[:-1], own[1:], strict=True):
+    for step, after in itertools.pairwise(own):
         lift = step.time + STANCE * cycle
 
         def standing(at: Array, step: Step = step) -> Array:
@@ -138,7 +143,7 @@ def walk(t: Array, duration_s: float, traits: Traits) -> Pose:
     first_left = next(step.time for step in steps if step.side == "l")
     phase = 2 * np.pi * (t - first_left) / cycle  # 0 where the left foot lands
     bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
-    root = np.concatenate([path, (height * (ROOT - 0.013 - vigour * (0.012 - 0.011 * bob)))[:, None]], axis=1)
+    root = np.concatenate([path, (height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob)))[:, None]], axis=1)
     pelvis_yaw = -math.radians(5) * vigour * np.cos(phase)
     thorax_yaw = math.radians(6) * vigour * np.cos(phase)
     pelvis = turn("z", heading + pelvis_yaw) * turn("x", math.radians(3) * vigour * np.sin(phase)) * turn("y", math.radians(3))

@@ -16,8 +16,8 @@ HOP_S = 0.53
 """From take-off to take-off: a jack, two hops, takes about as long as those of CMU 13 and 14 (1.1 s)."""
 
 FLIGHT_S = 0.22
-ROLL_S = 0.09
-"""The heels lift this long before take-off, and come down in this time after landing."""
+ROLL = 0.29
+"""The heels lift and come down in this part of a contact, before take-off and after landing."""
 
 SET = 5
 """Jacks between rests."""
@@ -88,39 +88,42 @@ def jumping_jack(t: Array, duration_s: float, traits: Traits) -> Pose:
     # The feet move sideways while they are well off the floor.
     apart = between((0.0, 1.0), -0.12 * FLIGHT_S, -0.12 * FLIGHT_S)
     # Heels lift before take-off and come down after landing, so that the legs need not be straight there.
+    contact = hop_s - (hops[0].end - hops[0].begin) if hops else hop_s - FLIGHT_S
+    roll_s = ROLL * contact
     lift, roll = np.zeros(len(t)), np.zeros(len(t))
     for hop in hops:
         lift += bump((t - hop.begin) / (hop.end - hop.begin))
-        roll += bump((t - hop.begin + ROLL_S) / (hop.end - hop.begin + 2 * ROLL_S))
-    ankle = np.array([0.0, 0.0, ANKLE * height]) + roll_about_toe(math.radians(34) * roll, height)
-    ankle[:, 2] += 0.010 * height * lift
+        roll += bump((t - hop.begin + roll_s) / (hop.end - hop.begin + 2 * roll_s))
+    pitch = math.radians(34) * roll
+    rolled = roll_about_toe(pitch, height)
+    rolled[:, 2] += height * (ANKLE + 0.010 * lift)
 
-    span = hops[0].end - hops[0].begin if hops else FLIGHT_S
-    heel = roll_about_toe(math.radians(34) * bump(np.array([ROLL_S / (span + 2 * ROLL_S)])), height)[0]
+    span = hop_s - contact
+    heel = roll_about_toe(math.radians(34) * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
     leg = 0.97 * (THIGH + SHANK) * height
     low, high = (
         ANKLE * height + heel[2] + (ROOT - HIP) * height + math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
         for track in (wide, close)
     )
     z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))
-    raised = between((math.radians(12), math.radians(145) * amplitude**0.5), 0.30 * hop_s, 0.27 * hop_s)
+    raised = between((math.radians(12), math.radians(134) * amplitude**0.5), 0.51 * contact, 0.48 * contact)
     moving = np.sin(np.pi * (raised - raised.min()) / max(float(np.ptp(raised)), 1e-9)) ** 2
     root = np.stack([0.03 * height * roll, np.zeros(len(t)), z], axis=1)
-    pitch = math.radians(34) * roll
-    lean = math.radians(3) + np.radians(6) * np.clip((height * ROOT - z) / (0.1 * height), -0.5, 1.0) * 0.5
+    lean = math.radians(3) + math.radians(3) * (height * ROOT - z) / (0.1 * height)
     pelvis = turn("y", np.full(len(t), math.radians(3)))
     thorax = turn("y", lean)
     ankles, feet, arms = {}, {}, {}
     for side, sign in SIDES.items():
-        y = sign * (close + (wide - close) * apart)
-        ankles[side] = np.stack([ankle[:, 0], y, ankle[:, 2]], axis=1)
-        feet[side] = turn("z", sign * math.radians(12) * apart) * turn("y", pitch)
+        outward = turn("z", sign * math.radians(12) * apart)
+        across = sign * (close + (wide - close) * apart)
+        ankles[side] = outward.apply(rolled) + across[:, None] * np.array([0.0, 1.0, 0.0])
+        feet[side] = outward * turn("y", pitch)
         arms[side] = swing_arm(
             thorax,
             side,
             forward=np.full(len(t), math.radians(4)),
             outward=traits.uneven[side] * raised,
-            elbow=np.radians(14 + 34 * moving),
+            elbow=np.radians(14 + 44 * moving),
             wrist=0.05,
         )
     return Pose(

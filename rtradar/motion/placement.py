@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.motion.joints import NODES, to_nodes
+from rtradar.motion.joints import to_nodes
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import NODES
 
 MARGIN_FRAMES = 16
 """Frames kept before and after the interval, where there are any.

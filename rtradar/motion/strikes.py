@@ -37,7 +37,8 @@ def _degrees(clock: Array, times: list[float], values: list[float]) -> Array:
     return np.radians(keyed(clock, times, values))
 
 
-KICK_PERIOD_S = 1.45
+KICK_PERIOD_S = 1.5
+"""One kick and a short rest."""
 
 
 def kick(t: Array, duration_s: float, traits: Traits) -> Pose:
@@ -48,12 +49,13 @@ def kick(t: Array, duration_s: float, traits: Traits) -> Pose:
     del duration_s  # kicks go on for as long as there are times
     height, kicker, other = traits.height_m, traits.side, traits.other
     clock = repeated(t, traits, KICK_PERIOD_S, 0.25)
-    rise = traits.amplitude * traits.uneven[kicker]
-    thigh = _degrees(clock, [0.10, 0.50, 0.68, 0.86, 1.16], [0.0, 88 * rise, 104 * rise, 74 * rise, 0.0])
-    knee = _degrees(clock, [0.10, 0.38, 0.46, 0.69, 0.90, 1.16], [8.0, 95.0, 95.0, 16.0, 88.0, 8.0])
-    air = keyed(clock, [0.14, 0.36, 0.92, 1.16], [0.0, 1.0, 1.0, 0.0])
-    strike = keyed(clock, [0.30, 0.68, 0.72, 1.14], [0.0, 1.0, 1.0, 0.0])
-    shift = keyed(clock, [0.0, 0.28, 0.95, 1.30], [0.0, 1.0, 1.0, 0.0])
+    # A low kick needs nearly as high a knee, or the foot would scrape the floor.
+    rise = 0.45 + 0.55 * traits.amplitude * traits.uneven[kicker]
+    thigh = _degrees(clock, [0.12, 0.50, 0.75, 1.00, 1.30], [0.0, 94 * rise, 112 * rise, 76 * rise, 0.0])
+    knee = _degrees(clock, [0.06, 0.36, 0.42, 0.76, 1.06, 1.30], [8.0, 96.0, 96.0, 16.0, 88.0, 8.0])
+    air = keyed(clock, [0.14, 0.36, 1.04, 1.30], [0.0, 1.0, 1.0, 0.0])
+    strike = keyed(clock, [0.30, 0.75, 0.80, 1.26], [0.0, 1.0, 1.0, 0.0])
+    shift = keyed(clock, [0.0, 0.28, 1.08, 1.45], [0.0, 1.0, 1.0, 0.0])
 
     track = 1.15 * HIP_Y * height
     idle = np.sin(2 * np.pi * (0.28 * t + traits.phase))
@@ -79,12 +81,14 @@ def kick(t: Array, duration_s: float, traits: Traits) -> Pose:
         return np.stack([np.sin(angle), np.zeros_like(angle), -np.cos(angle)], axis=1)
 
     flying = hip + height * (THIGH * hanging(thigh) + SHANK * hanging(shank))
-    point = _degrees(clock, [0.12, 0.40, 0.68, 0.88, 1.14], [0.0, 20.0, 40.0, 15.0, 0.0])
+    point = _degrees(clock, [0.12, 0.40, 0.75, 1.02, 1.28], [0.0, 20.0, 40.0, 15.0, 0.0])
     pitch = air * (point - shank)
     # While it is partly on the floor the foot rolls about its toe, so that the toe does not sink.
     rolled = ground[kicker] + roll_about_toe(np.maximum(pitch, 0.0), height)
+    # Up before forward, and forward before down.
+    clear = 0.16 * height * (air * (1 - air))[:, None] * np.array([0.0, 0.0, 1.0])
     ankles = {
-        kicker: rolled + air[:, None] * (flying - rolled),
+        kicker: rolled + air[:, None] * (flying - rolled) + clear,
         other: np.tile(ground[other], (len(t), 1)),
     }
     feet = {kicker: turn("y", pitch), other: turn("y", np.zeros(len(t)))}
@@ -112,6 +116,7 @@ def kick(t: Array, duration_s: float, traits: Traits) -> Pose:
 
 
 PUNCH_PERIOD_S = 1.05
+"""One punch and a short rest."""
 
 
 def punch(t: Array, duration_s: float, traits: Traits) -> Pose:
@@ -122,7 +127,7 @@ def punch(t: Array, duration_s: float, traits: Traits) -> Pose:
     # The hips lead, the hand follows and arrives last; then it comes back more slowly.
     hips = keyed(clock, [0.06, 0.30, 0.38, 0.80], [0.0, 1.0, 1.0, 0.0])
     chest = keyed(clock, [0.10, 0.33, 0.38, 0.80], [0.0, 1.0, 1.0, 0.0])
-    reach = keyed(clock, [0.16, 0.35, 0.39, 0.74], [0.0, 1.0, 1.0, 0.0])
+    reach = keyed(clock, [0.17, 0.345, 0.39, 0.74], [0.0, 1.0, 1.0, 0.0])
     strength = traits.amplitude * traits.uneven[hand]
 
     back = SIDES[hand]  # yaw that takes the striking shoulder back

@@ -63,7 +63,7 @@ def synthetic_motion(
     build : float
         Thickness relative to a normal person of that height.
     tempo : float
-        Speed of the movement; 1 is a walk of about 1.25 m/s.
+        Speed of the movement; 1 is a walk of about 1.2 m/s.
     side : {"left", "right"}
         The leg or hand that strikes; the foot that steps first.
     amplitude : float

@@ -45,8 +45,8 @@ class Traits:
 
     @property
     def step_m(self) -> float:
-        """One step of a walk [m]: 0.39 of the height."""
-        return 0.39 * self.height_m * self.amplitude
+        """One step of a walk [m]: 0.375 of the height."""
+        return 0.375 * self.height_m * self.amplitude
 
     @property
     def track_m(self) -> float:
@@ -56,7 +56,7 @@ class Traits:
     @property
     def clearance_m(self) -> float:
         """How much a swinging foot is lifted [m]."""
-        return 0.035 * self.height_m
+        return 0.042 * self.height_m
 
     @property
     def arm_swing_rad(self) -> float:

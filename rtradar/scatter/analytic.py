@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from rtradar.body import Body
@@ -39,17 +42,47 @@ def far_field_echo(
     amplitude : (chirp, rx, part) float64
         Square root of the cross-section, over R1 R2 with ``spreading`` [m].
     """
-    to_tx = (tx[:, None] - centres)[:, None]
-    to_rx = rx[:, :, None] - centres[:, None]
-    bisector = to_tx / np.linalg.norm(to_tx, axis=-1, keepdims=True) + to_rx / np.linalg.norm(to_rx, axis=-1, keepdims=True)
-    normal = np.einsum("cpji,crpj->crpi", frames, bisector)
-    normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
-    reach = normal * semi_axes
-    surface = reach * semi_axes / np.linalg.norm(reach, axis=-1, keepdims=True)
-    surface = np.einsum("cpij,crpj->crpi", frames, surface)
-    range_tx, range_rx = np.linalg.norm(to_tx - surface, axis=-1), np.linalg.norm(to_rx - surface, axis=-1)
-    amplitude = np.sqrt(_cross_section(semi_axes, normal))
-    return range_tx + range_rx, amplitude / (range_tx * range_rx) if spreading else amplitude
+    arrays = (np.ascontiguousarray(array, dtype=np.float64) for array in (tx, rx, centres, frames, semi_axes))
+    shape = (*rx.shape[:2], centres.shape[1])
+    length, amplitude = np.empty(shape), np.empty(shape)
+    _far_field(*arrays, spreading, length, amplitude)
+    return length, amplitude
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):  # type: ignore[no-untyped-def]
+    chirps, receivers, parts = length.shape
+    for chirp in prange(chirps):
+        sight, normal, surface = np.empty(3), np.empty(3), np.empty(3)
+        for part in range(parts):
+            centre, frame, axes = centres[chirp, part], frames[chirp, part], semi_axes[part]
+            to_tx = tx[chirp] - centre
+            to_tx /= math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
+            for receiver in range(receivers):
+                for i in range(3):
+                    sight[i] = rx[chirp, receiver, i] - centre[i]
+                norm = math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
+                # |A n| for the unit normal n is the support function h; the surface point with that normal is A^2 n / h.
+                squared, support = 0.0, 0.0
+                for i in range(3):
+                    normal[i] = 0.0
+                    for j in range(3):
+                        normal[i] += frame[j, i] * (to_tx[j] + sight[j] / norm)
+                    squared += normal[i] ** 2
+                    support += (axes[i] * normal[i]) ** 2
+                support = math.sqrt(support / squared)
+                for i in range(3):
+                    normal[i] *= axes[i] ** 2 / (support * math.sqrt(squared))
+                range_tx, range_rx = 0.0, 0.0
+                for i in range(3):
+                    surface[i] = centre[i] + frame[i, 0] * normal[0] + frame[i, 1] * normal[1] + frame[i, 2] * normal[2]
+                    range_tx += (tx[chirp, i] - surface[i]) ** 2
+                    range_rx += (rx[chirp, receiver, i] - surface[i]) ** 2
+                range_tx, range_rx = math.sqrt(range_tx), math.sqrt(range_rx)
+                length[chirp, receiver, part] = range_tx + range_rx
+                # Square root of the cross-section, pi (abc)^2 / h^4: that of `rtradar.rcs.ellipsoid` without its angles.
+                root = math.sqrt(math.pi) * axes[0] * axes[1] * axes[2] / support**2
+                amplitude[chirp, receiver, part] = root / (range_tx * range_rx) if spreading else root
 
 
 def plane_wave_echo(

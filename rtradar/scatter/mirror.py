@@ -31,18 +31,29 @@ _STEP_TOLERANCE = 1e-7
 def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
     """Mirror point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
 
-    ``start`` is a first guess on the surface, or NaN for none; one that faces away is not used. ``out``: length, amplitude, and the point's x, y, z.
+    ``start`` is a first guess on the surface, or NaN for none; one that faces away is not used. ``out``: length, amplitude,
+    and the point's x, y, z.
     """
     inv_a, inv_b, inv_c = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
     x, y, z = start[0], start[1], start[2]
-    lit = x * inv_a * (tx[0] + rx[0] - 2 * x) + y * inv_b * (tx[1] + rx[1] - 2 * y) + z * inv_c * (tx[2] + rx[2] - 2 * z)
+    lit = min(
+        x * inv_a * (tx[0] - x) + y * inv_b * (tx[1] - y) + z * inv_c * (tx[2] - z),
+        x * inv_a * (rx[0] - x) + y * inv_b * (rx[1] - y) + z * inv_c * (rx[2] - z),
+    )
     if not lit > 0:  # NaN too
-        # From cold: the point whose normal bisects the two directions from the centre.
-        norm_t = math.sqrt(tx[0] ** 2 + tx[1] ** 2 + tx[2] ** 2)
-        norm_r = math.sqrt(rx[0] ** 2 + rx[1] ** 2 + rx[2] ** 2)
-        x = axes[0] ** 2 * (tx[0] / norm_t + rx[0] / norm_r)
-        y = axes[1] ** 2 * (tx[1] / norm_t + rx[1] / norm_r)
-        z = axes[2] ** 2 * (tx[2] / norm_t + rx[2] / norm_r)
+        # From cold: stretched to the unit sphere, the point below where the line from Tx to Rx comes nearest. Both see it,
+        # and so they see a mirror point; where the line goes through the body there is none.
+        t0, t1, t2 = tx[0] / axes[0], tx[1] / axes[1], tx[2] / axes[2]
+        r0, r1, r2 = rx[0] / axes[0] - t0, rx[1] / axes[1] - t1, rx[2] / axes[2] - t2
+        span = r0 * r0 + r1 * r1 + r2 * r2
+        share = min(1.0, max(0.0, -(t0 * r0 + t1 * r1 + t2 * r2) / span)) if span > 0 else 0.0
+        x, y, z = t0 + share * r0, t1 + share * r1, t2 + share * r2
+        if x * x + y * y + z * z <= 1:
+            out[0] = math.sqrt((rx[0] - tx[0]) ** 2 + (rx[1] - tx[1]) ** 2 + (rx[2] - tx[2]) ** 2)
+            out[1] = 0.0
+            out[2], out[3], out[4] = x * axes[0], y * axes[1], z * axes[2]
+            return
+        x, y, z = x * axes[0], y * axes[1], z * axes[2]
     scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
     x, y, z = x * scale, y * scale, z * scale
     old_x, old_y, old_z, best = x, y, z, math.inf
@@ -53,8 +64,10 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
         range_t = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
         range_r = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
         length = range_t + range_r
-        if length > best * (1 + 4e-16):
-            # The step went past the minimum (a needle's tip seen from near): half of it does not.
+        q0, q1, q2 = t0 / range_t + r0 / range_r, t1 / range_t + r1 / range_r, t2 / range_t + r2 / range_r
+        if length > best * (1 + 4e-16) or not q0 * x * inv_a + q1 * y * inv_b + q2 * z * inv_c > 0:
+            # The step went past the minimum (a needle's tip seen from near) or round to the dark side, where a flat body
+            # seen from near has a minimum too: half of it does not.
             x, y, z = 0.5 * (x + old_x), 0.5 * (y + old_y), 0.5 * (z + old_z)
             scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
             x, y, z = x * scale, y * scale, z * scale
@@ -65,7 +78,6 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
         n0, n1, n2 = x * inv_a, y * inv_b, z * inv_c
         gradient = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
         n0, n1, n2 = n0 / gradient, n1 / gradient, n2 / gradient
-        q0, q1, q2 = t0 + r0, t1 + r1, t2 + r2
         # Orthonormal tangents e, f that never degenerate (Duff et al., 2017).
         sign = math.copysign(1.0, n2)
         u = -1 / (sign + n2)
@@ -113,7 +125,6 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
     out[2], out[3], out[4] = x, y, z
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
 def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point):  # type: ignore[no-untyped-def]
     chirps, receivers = rx.shape[:2]
     parts = centres.shape[1]
@@ -144,6 +155,12 @@ def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, le
                         point[chirp, receiver, part, j] = (
                             centre[j] + frame[j, 0] * out[2] + frame[j, 1] * out[3] + frame[j, 2] * out[4]
                         )
+
+
+_mirror_parallel = njit(cache=True, error_model="numpy", parallel=True)(_mirror)
+_mirror_serial = njit(cache=True, error_model="numpy")(_mirror)
+_PARALLEL_CHIRPS = 64
+"""Below this many chirps waking threads costs more than the work, all the more while Mitsuba's own are awake."""
 
 
 def mirror(
@@ -194,5 +211,6 @@ def mirror(
     point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
     if start is None:
         start = np.broadcast_to(np.nan, (*centres.shape,))
-    _mirror(tx, rx, centres, frames, semi_axes, start, polarization == "h", spreading, length, amplitude, point)
+    kernel = _mirror_parallel if len(tx) >= _PARALLEL_CHIRPS else _mirror_serial
+    kernel(tx, rx, centres, frames, semi_axes, start, polarization == "h", spreading, length, amplitude, point)
     return length, amplitude, point

@@ -50,14 +50,16 @@ def scattering_length(
     InputError
         Where shapes do not fit, an antenna is inside the target, or the rung or a dial is unknown.
     """
-    tx_array, rx_array = np.broadcast_arrays(
-        np.atleast_2d(np.asarray(tx, dtype=np.float64)), np.atleast_2d(np.asarray(rx, dtype=np.float64))
-    )
-    if tx_array.ndim != 2 or tx_array.shape[1] != 3 or not (np.isfinite(tx_array).all() and np.isfinite(rx_array).all()):
-        raise InputError(f"scattering_length: tx and rx have shape {tx_array.shape}; they must be (n, 3), finite [m]")
-    wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    if not (np.isfinite(wavenumber) & (wavenumber > 0)).all():
-        raise InputError("scattering_length: frequency must be positive and finite [Hz]")
+    tx_array, rx_array, wavenumber = _pairs(tx, rx, frequency)
+    if polarization not in ("v", "h"):
+        raise InputError(f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h")
+    known = {"analytic": (), "specular": ("variant",)}
+    if fidelity not in known:
+        raise InputError(f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(known)}")
+    for dial in dials:
+        if dial not in known[fidelity]:
+            allowed = ", ".join(known[fidelity]) or "none"
+            raise InputError(f"scattering_length: '{fidelity}' has no dial '{dial}'; it has: {allowed}")
     if not isinstance(target, Ellipsoids):
         raise InputError(
             f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it needs curvature in closed form"
@@ -71,17 +73,33 @@ def scattering_length(
         target.semi_axes,
     )
     if fidelity == "analytic":
-        if dials:
-            raise InputError(f"scattering_length: 'analytic' has no dial '{next(iter(dials))}'")
         length, amplitude = far_field_echo(tx_array, rx_array[:, None], *poses)
-    elif fidelity == "specular":
-        length, amplitude = _specular(target, tx_array, rx_array, poses, polarization, **dials)
     else:
-        raise InputError(f"scattering_length: fidelity '{fidelity}' is unknown; allowed: analytic, specular")
+        length, amplitude = _specular(target, tx_array, rx_array, poses, polarization, **dials)
     range_tx, range_rx = np.linalg.norm(tx_array, axis=1), np.linalg.norm(rx_array, axis=1)
-    wavenumber = np.broadcast_to(wavenumber, (pairs,))
     phase = np.exp(-1j * wavenumber[:, None] * (length[:, 0] - (range_tx + range_rx)[:, None]))
     return np.asarray((amplitude[:, 0] * phase).sum(axis=1) * range_tx * range_rx)
+
+
+def _pairs(
+    tx: ArrayLike, rx: ArrayLike, frequency: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Antennas (n, 3) twice and wavenumbers (n,)."""
+    try:
+        tx_array, rx_array = (np.atleast_2d(np.asarray(antenna, dtype=np.float64)) for antenna in (tx, rx))
+        wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    except (TypeError, ValueError):
+        raise InputError("scattering_length: tx, rx [m] and frequency [Hz] must be numbers") from None
+    shapes = f"tx {tx_array.shape}, rx {rx_array.shape}, frequency {wavenumber.shape}"
+    counts = {len(tx_array), len(rx_array), *wavenumber.shape} - {1}
+    if tx_array.shape[1:] != (3,) or rx_array.shape[1:] != (3,) or wavenumber.ndim > 1 or len(counts) > 1:
+        raise InputError(f"scattering_length: shapes {shapes}; they must be (n, 3), (n, 3), (n,), or one for all")
+    if not (np.isfinite(tx_array).all() and np.isfinite(rx_array).all()):
+        raise InputError("scattering_length: tx and rx must be finite [m]")
+    if not (np.isfinite(wavenumber) & (wavenumber > 0)).all():
+        raise InputError("scattering_length: frequency must be positive and finite [Hz]")
+    n = counts.pop() if counts else 1
+    return np.broadcast_to(tx_array, (n, 3)), np.broadcast_to(rx_array, (n, 3)), np.broadcast_to(wavenumber, (n,))
 
 
 def _specular(

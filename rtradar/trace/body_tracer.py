@@ -82,6 +82,9 @@ class BodyTracer:
 
     def first_hits(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Hits:
         """What rays from ``origins (ray, 3)`` through ``targets (ray, 3)`` meet first; world [m]."""
+        if len(origins) == 0:
+            # Dr.Jit takes the process down over arrays without entries.
+            return Hits(np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 3)))
         directions = targets - origins
         directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         starts = origins - self._centre

@@ -1,0 +1,112 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtradar.body import PART_NAMES, Body, Ellipsoids
+from rtradar.errors import InputError
+from rtradar.motion import ACTIVITIES, synthetic_motion
+from rtradar.motion.names import NODES
+
+RADII = {
+    "hip": 0.07,
+    "thigh": 0.07,
+    "shank": 0.06,
+    "foot": 0.04,
+    "clavicle": 0.05,
+    "upper arm": 0.05,
+    "forearm": 0.04,
+    "hand": 0.04,
+}
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.from_motion(synthetic_motion("kick"))
+
+
+def test_21_parts_of_the_given_thickness(body: Body) -> None:
+    assert len(body.part_names) == len(set(body.part_names)) == 21
+    expected = {f"{side} {name}": radius for side in ("left", "right") for name, radius in RADII.items()}
+    expected |= {"lower torso": 0.10, "middle torso": 0.10, "upper torso": 0.10, "neck": 0.04, "head": 0.06}
+    assert set(body.part_names) == set(expected)
+    for name, (a, b, _) in zip(body.part_names, body.semi_axes, strict=True):
+        assert a == b == expected[name]
+
+
+@settings(max_examples=15)
+@given(st.sampled_from(list(ACTIVITIES)), st.floats(0.0, 1.0))
+def test_ellipsoids_sit_on_their_bones(activity: str, share: float) -> None:
+    body = Body.from_motion(synthetic_motion(activity))
+    time = share * body.duration_s
+    centres, frames, axes = body.at([time])
+    joints, _ = body.motion.at([time])
+    first, last = joints[0, list(body.motion.parents[1:])], joints[0, 1:]
+    np.testing.assert_allclose(centres[0] + axes[:, 2:] * frames[0, :, :, 2], last, atol=1e-12)
+    np.testing.assert_allclose(centres[0] - axes[:, 2:] * frames[0, :, :, 2], first, atol=1e-12)
+    np.testing.assert_allclose(np.swapaxes(frames[0], 1, 2) @ frames[0], np.tile(np.eye(3), (21, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(np.linalg.det(frames[0]), 1, atol=1e-12)
+
+
+def test_frames_never_flip(body: Body) -> None:
+    frames = body.at(np.arange(0, body.duration_s, 1e-3)).frames
+    # Under 40 rad/s a frame turns by less than 0.04 rad in a millisecond; a flip would change an entry by 1 or 2.
+    assert np.abs(np.diff(frames, axis=0)).max() < 0.05
+
+
+def test_frames_belong_to_the_bone(body: Body) -> None:
+    frames = body.at([0.0, 0.4, 0.8]).frames
+    _, quaternions = body.motion.at([0.0, 0.4, 0.8])
+    from scipy.spatial.transform import Rotation
+
+    local = Rotation.from_quat(quaternions[:, 1:].reshape(-1, 4)).as_matrix().reshape(3, 21, 3, 3)
+    material = np.swapaxes(local, 2, 3) @ frames
+    np.testing.assert_allclose(material[1:], material[:1].repeat(2, axis=0), atol=1e-12)
+
+
+def test_scaling() -> None:
+    motion = synthetic_motion("walk", height_m=1.6, build=1.1)
+    plain, thick = Body.from_motion(motion), Body.from_motion(motion, girth=1.5)
+    np.testing.assert_allclose(thick.semi_axes, plain.semi_axes * [1.5, 1.5, 1.0])
+    assert plain.semi_axes[PART_NAMES.index("head"), 0] == pytest.approx(0.06 * 1.1 * 1.6 / 1.75)
+    big = Body.from_motion(motion, scale=1.2)
+    np.testing.assert_allclose(big.semi_axes, plain.semi_axes * 1.2)
+    np.testing.assert_allclose(big.at([1.0]).centres, plain.at([1.0]).centres * 1.2, atol=1e-12)
+    for arguments in ({"girth": 0.0}, {"scale": -1.0}, {"girth": float("nan")}):
+        with pytest.raises(InputError, match="positive"):
+            Body.from_motion(motion, **arguments)
+
+
+def test_one_pose(body: Body) -> None:
+    pose = body.ellipsoids(0.5)
+    assert isinstance(pose, Ellipsoids)
+    np.testing.assert_array_equal(pose.centres, body.at([0.5]).centres[0])
+    with pytest.raises(InputError, match="outside the recording"):
+        body.ellipsoids(99.0)
+
+
+def test_left_is_left(body: Body) -> None:
+    centres = body.at([0.0]).centres[0]
+    # Facing -x, toward the radar, the left side is -y.
+    for name in RADII:
+        assert centres[PART_NAMES.index(f"left {name}"), 1] < centres[PART_NAMES.index(f"right {name}"), 1]
+    heights = [
+        centres[PART_NAMES.index(name), 2] for name in ("left foot", "left shank", "left thigh", "lower torso", "neck", "head")
+    ]
+    assert heights == sorted(heights)
+
+
+def test_needs_nodes() -> None:
+    motion = synthetic_motion("punch", duration_s=0.1)
+    with pytest.raises(InputError, match="from_motion"):
+        Body(_renamed(motion), np.ones((21, 3)))
+    with pytest.raises(InputError, match="semi_axes"):
+        Body(motion, np.zeros((21, 3)))
+
+
+def _renamed(motion):  # type: ignore[no-untyped-def]
+    import dataclasses
+
+    return dataclasses.replace(motion, joints=tuple(f"x{k}" for k in range(len(NODES))))

@@ -1,0 +1,65 @@
+"""Small files to read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ASF = """# a comment
+:version 1.10
+:name two
+:units
+  mass 1.0
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name first
+    direction 0 1 0
+    length 10
+    axis 0 0 0 XYZ
+    dof rx ry rz
+  end
+  begin
+    id 2
+    name second
+    direction 1 0 0
+    length 5
+    axis 0 0 90 XYZ
+    dof rx
+  end
+:hierarchy
+  begin
+    root first
+    first second
+  end
+"""
+
+AMC = """#!OML:ASF X:\\f\u00fcr\\two.ASF
+:FULLY-SPECIFIED
+:DEGREES
+1
+root 1 2 3 0 0 0
+first 0 0 0
+second 0
+2
+root 1 2 3 0 90 0
+first 0 0 450
+second 90
+"""
+
+
+@pytest.fixture
+def asf_files(tmp_path: Path) -> tuple[Path, Path]:
+    """A skeleton of two bones and its motion of two frames: (amc, asf). Latin-1, mixed line ends."""
+    asf, amc = tmp_path / "two.asf", tmp_path / "two.amc"
+    asf.write_bytes(ASF.replace("\n", "\r\n").encode("latin-1"))
+    amc.write_bytes(AMC.replace("\n", "\r\n", 2).encode("latin-1"))
+    return amc, asf

@@ -1,0 +1,219 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from rtradar.errors import InputError
+from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
+from rtradar.motion.curves import bump, hermite, keyed, smooth
+from rtradar.motion.figure import ANKLE, HEEL_X, TOE_HEIGHT, bend
+from rtradar.motion.motion import rotate
+from rtradar.motion.names import NODES
+
+NODE = NODES.index
+
+
+def speeds(motion: Motion, node: str) -> np.ndarray:
+    return np.linalg.norm(np.gradient(motion.positions[:, NODE(node)], 1 / motion.rate_hz, axis=0), axis=1)
+
+
+subjects = st.fixed_dictionaries(
+    {
+        "activity": st.sampled_from(list(ACTIVITIES)),
+        "seed": st.integers(0, 1000),
+        "duration_s": st.floats(0.5, 9.0),
+        "height_m": st.floats(1.2, 2.1),
+        "tempo": st.floats(0.6, 1.4),
+        "side": st.sampled_from(["left", "right"]),
+        "amplitude": st.floats(0.5, 1.15),
+    }
+)
+
+
+@settings(max_examples=40)
+@given(subjects)
+def test_feet_never_sink_and_bones_never_stretch(subject: dict) -> None:
+    motion = synthetic_motion(**subject)
+    feet = motion.positions[:, [NODE(f"{side}_{end}") for side in "lr" for end in ("ankle", "toe")]]
+    # The toe node stands TOE_HEIGHT above the sole: not even a millimetre below that.
+    assert feet[..., 2].min() > TOE_HEIGHT * subject["height_m"] - 1e-3
+    # Between frames the spline may cut a corner, by less.
+    at = np.linspace(0, motion.duration_s, 997)
+    between = motion.at(at)[0]
+    assert between[:, [NODE("l_toe"), NODE("r_toe")], 2].min() > TOE_HEIGHT * subject["height_m"] - 2e-3
+    parents = np.array(motion.parents[1:])
+    lengths = np.linalg.norm(between[:, 1:] - between[:, parents], axis=2)
+    np.testing.assert_allclose(lengths, np.linalg.norm(motion.offsets[1:], axis=1)[None].repeat(len(at), 0), rtol=1e-10)
+
+
+@settings(max_examples=25)
+@given(subjects)
+def test_standing_feet_do_not_slide(subject: dict) -> None:
+    motion = synthetic_motion(**subject)
+    height = subject["height_m"]
+    toes = motion.positions[:, [NODE("l_toe"), NODE("r_toe")]]
+    feet = motion.rotations[:, [NODE("l_toe"), NODE("r_toe")]]
+    ankles = motion.positions[:, [NODE("l_ankle"), NODE("r_ankle")]]
+    heels = ankles + rotate(feet, height * np.array([HEEL_X, 0.0, -ANKLE]))
+    carried = []
+    for points, level in ((toes, TOE_HEIGHT * height), (heels, 0.0)):
+        # On the floor (to 0.01 mm, in both frames) it stands still: what still moves there is about to lift or just landed.
+        down = np.maximum(points[1:, :, 2], points[:-1, :, 2]) < level + 1e-5
+        across = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)[down] * motion.rate_hz
+        assert np.quantile(across, 0.98) < 0.02
+        assert across.max() < 0.2
+        carried.append(down.any(axis=1))
+    # At any time of a walk, a kick or a punch a toe or a heel carries.
+    if subject["activity"] != "jumping_jack":
+        assert (carried[0] | carried[1]).all()
+
+
+@settings(max_examples=25)
+@given(subjects)
+def test_motion_is_smooth(subject: dict) -> None:
+    """Halving the frame interval halves the steps of acceleration: it is continuous, so the motion is C2."""
+    jumps = []
+    for rate in (480.0, 960.0):
+        motion = synthetic_motion(**subject | {"duration_s": 1.5}, rate_hz=rate)
+        acceleration = np.diff(motion.positions, 2, axis=0) * rate**2
+        jumps.append(np.abs(np.diff(acceleration, axis=0)).max())
+    # A step would stay as large as it was: ratio 1.
+    assert jumps[1] < 0.75 * jumps[0] or jumps[1] < 0.5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_walk_looks_like_walking(seed: int) -> None:
+    motion = synthetic_motion("walk", seed)
+    root = motion.positions[:, 0]
+    speed = (root[0, 0] - root[-1, 0]) / motion.duration_s  # toward the radar, -x
+    assert 1.05 < speed < 1.4
+    np.testing.assert_allclose(root[:, 1], 0, atol=0.05)
+    assert 0.01 < np.ptp(root[:, 2]) < 0.07
+    assert 3.5 < speeds(motion, "l_toe").max() < 6.5
+    # Arms swing against legs.
+    leg = motion.positions[:, NODE("l_ankle"), 0] - root[:, 0]
+    arm = motion.positions[:, NODE("l_wrist"), 0] - root[:, 0]
+    assert np.corrcoef(leg, arm)[0, 1] < -0.6
+
+
+def test_long_walk_turns_round() -> None:
+    motion = synthetic_motion("walk", duration_s=20.0)
+    x = motion.positions[:, 0, 0]
+    assert x.min() > -1.65
+    assert x.max() < 1.65
+    assert x[0] > 1
+    turns = np.count_nonzero(np.diff(np.sign(x - x.mean())))
+    assert turns >= 4
+    left = motion.positions[:, NODE("l_hip"), 1] - motion.positions[:, NODE("r_hip"), 1]
+    going = np.gradient(x, 1 / 120)
+    brisk = np.abs(going) > 0.7
+    # Who goes to -x has the left hip at -y, and the other way round: nobody walks backwards.
+    assert (np.sign(left[brisk]) == np.sign(going[brisk])).all()
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("seed", range(3))
+def test_kick(seed: int, side: str) -> None:
+    motion = synthetic_motion("kick", seed, side=side)
+    kicker, other = ("l", "r") if side == "left" else ("r", "l")
+    assert 6.5 < speeds(motion, f"{kicker}_toe").max() < 10.5
+    assert speeds(motion, f"{other}_toe").max() < 1e-6
+    toe = motion.positions[:, NODE(f"{kicker}_toe")]
+    assert 0.9 < toe[:, 2].max() < 1.6
+    top = toe[np.argmax(toe[:, 2])]
+    assert top[0] < -0.6  # forward is -x
+    hips = motion.positions[:, NODE(f"{kicker}_hip"), 1].mean() - motion.positions[:, NODE(f"{other}_hip"), 1].mean()
+    assert (hips < 0) == (side == "left")
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("seed", range(3))
+def test_punch(seed: int, side: str) -> None:
+    motion = synthetic_motion("punch", seed, side=side)
+    hand, other = ("l", "r") if side == "left" else ("r", "l")
+    assert 4.5 < speeds(motion, f"{hand}_wrist").max() < 7.5
+    assert speeds(motion, f"{other}_wrist").max() < 3
+    reach = motion.positions[:, NODE(f"{hand}_wrist"), 0].min()
+    assert reach < -0.5
+    assert max(speeds(motion, "l_toe").max(), speeds(motion, "r_toe").max()) < 1e-6
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_jumping_jack_flies_freely(seed: int) -> None:
+    motion = synthetic_motion("jumping_jack", seed, duration_s=4.0)
+    z = motion.positions[:, 0, 2]
+    acceleration = np.diff(z, 2) * 120**2
+    toes = motion.positions[1:-1, [NODE("l_toe"), NODE("r_toe")], 2].min(axis=1)
+    flying = toes > TOE_HEIGHT * 1.75 + 2e-3
+    assert 0.15 < flying.mean() < 0.5
+    np.testing.assert_allclose(acceleration[flying], -9.81, atol=0.01)
+    width = np.abs(motion.positions[:, NODE("l_toe"), 1] - motion.positions[:, NODE("r_toe"), 1])
+    hands = motion.positions[:, NODE("l_hand"), 2]
+    assert width.max() > 0.4
+    assert width.min() < 0.3
+    assert hands.max() > 1.75
+    assert np.corrcoef(width, hands)[0, 1] > 0.7
+    assert 3.5 < speeds(motion, "l_hand").max() < 7.5
+
+
+def test_seed_is_the_subject() -> None:
+    first, again, other = (synthetic_motion("walk", seed).positions for seed in (1, 1, 2))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.01
+
+
+def test_height_and_build() -> None:
+    tall = synthetic_motion("punch", height_m=1.9, build=1.2)
+    assert tall.girth == pytest.approx(1.2 * 1.9 / 1.75)
+    legs = [np.linalg.norm(tall.offsets[NODE(node)]) for node in ("l_knee", "l_ankle")]
+    assert sum(legs) == pytest.approx(0.491 * 1.9)
+
+
+def test_frames_cover_the_duration() -> None:
+    motion = synthetic_motion("punch", duration_s=0.123)
+    assert motion.duration_s == 0.123
+    assert motion.frame_times[-1] >= 0.123
+    motion.at([0.0, 0.123])
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        {"activity": "fly"},
+        {"side": "both"},
+        {"seed": -1},
+        {"seed": 1.5},
+        {"duration_s": 0.0},
+        {"height_m": 17.5},
+        {"tempo": float("nan")},
+        {"amplitude": 3.0},
+        {"build": -1.0},
+        {"rate_hz": 1.0},
+    ],
+)
+def test_impossible_actors_are_refused(arguments: dict) -> None:
+    with pytest.raises(InputError, match=r"allowed|whole"):
+        synthetic_motion(**{"activity": "walk"} | arguments)
+
+
+def test_curves() -> None:
+    u = np.array([-1.0, 0.0, 0.5, 1.0, 2.0])
+    np.testing.assert_allclose(smooth(u), [0, 0, 0.5, 1, 1])
+    np.testing.assert_allclose(bump(u), [0, 0, 1, 0, 0])
+    np.testing.assert_allclose(keyed(u, [0.0, 1.0, 2.0], [1.0, 3.0, 2.0]), [1, 1, 2, 3, 2])
+    h = 1e-4
+    t = np.array([2 - h, 2, 2 + h, 5 - h, 5, 5 + h])
+    y = hermite(t, (2.0, 5.0), (1.0, -2.0, 3.0), (4.0, 0.5, -1.0))
+    for k, expected in ((1, (1.0, -2.0, 3.0)), (4, (4.0, 0.5, -1.0))):
+        found = (y[k], (y[k + 1] - y[k - 1]) / (2 * h), (y[k + 1] - 2 * y[k] + y[k - 1]) / h**2)
+        np.testing.assert_allclose(found, expected, atol=1e-5)  # rounding, 1e-16 / h^2
+
+
+def test_bend_reaches() -> None:
+    rng = np.random.default_rng(0)
+    reach = rng.normal(0, 1, (50, 3))
+    reach *= rng.uniform(0.3, 0.85, (50, 1)) / np.linalg.norm(reach, axis=1, keepdims=True)
+    upper, lower = bend(reach, 0.45, 0.42, rng.normal(0, 1, (50, 3)), 1.0)
+    np.testing.assert_allclose(upper.apply([0, 0, -0.45]) + lower.apply([0, 0, -0.42]), reach, atol=1e-12)

@@ -1,0 +1,100 @@
+"""Receiver noise: its power and whiteness, and that it does not know how the capture is cut."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rtradar.radar import Radar
+from rtradar.signal import Noise
+
+LOW = Radar.preset("paper-12ghz")
+SMALL = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=8, frame_duration_s=3.75e-3)
+
+
+def noise(power: float, radar: Radar, chirps: int, seed: int = 0, first: int = 0) -> NDArray[np.complex64]:
+    samples = np.zeros((chirps, radar.n_rx, radar.samples_per_chirp), np.complex64)
+    Noise(power, seed).add(samples, radar, first)
+    return samples
+
+
+@pytest.fixture(scope="module")
+def plenty() -> NDArray[np.complex64]:
+    return noise(1.0, LOW, 480, seed=1)
+
+
+def test_power(plenty: NDArray[np.complex64]) -> None:
+    # |n|^2 of power 1 has standard deviation 1: five of them for the mean, each with its own seed.
+    for power, samples in ((1.0, plenty), (2.5e-7, noise(2.5e-7, LOW, 480, seed=2))):
+        assert np.mean(np.abs(samples) ** 2) == pytest.approx(power, rel=5 / math.sqrt(samples.size))
+
+
+def test_circular_and_gaussian(plenty: NDArray[np.complex64]) -> None:
+    spread = 5 / math.sqrt(plenty.size)
+    assert abs(plenty.mean()) < spread
+    assert abs(np.mean(plenty.astype(complex) ** 2)) < spread * math.sqrt(2)  # real and imaginary alike and unrelated
+    # Fourth moment of a complex Gaussian: 2, where |n|^4 has variance 24 - 4.
+    assert np.mean(np.abs(plenty.astype(complex)) ** 4) == pytest.approx(2, abs=spread * math.sqrt(20))
+
+
+@pytest.mark.parametrize("lag", [(0, 0, 1), (0, 0, 7), (0, 1, 0), (1, 0, 0), (12, 0, 0), (1, 1, 1)])
+def test_white(plenty: NDArray[np.complex64], lag: tuple[int, int, int]) -> None:
+    # 12 chirps is one cycle: the next one's stream.
+    early = plenty[tuple(slice(None, -k or None) for k in lag)]
+    late = plenty[tuple(slice(k, None) for k in lag)]
+    assert abs(np.mean(late * early.conj())) < 5 / math.sqrt(early.size)
+
+
+@given(cuts=st.lists(st.integers(0, 10), max_size=4), end=st.integers(1, 32))
+@settings(max_examples=30)
+def test_how_a_capture_is_cut_into_blocks_does_not_matter(cuts: list[int], end: int) -> None:
+    whole = noise(1.0, SMALL, end)
+    edges = sorted({0, end, *(SMALL.n_tx * cut for cut in cuts if SMALL.n_tx * cut < end)})
+    blocks = [noise(1.0, SMALL, last - first, first=first) for first, last in pairwise(edges)]
+    np.testing.assert_array_equal(np.concatenate(blocks), whole)
+
+
+def test_a_capture_that_ends_inside_a_cycle_has_the_same_noise_up_to_there() -> None:
+    np.testing.assert_array_equal(noise(1.0, SMALL, 8), noise(1.0, SMALL, 9)[:8])
+
+
+def test_a_block_starts_with_a_cycle() -> None:
+    with pytest.raises(ValueError, match="starts at chirp 4"):
+        noise(1.0, SMALL, 3, first=4)
+
+
+def test_seed() -> None:
+    np.testing.assert_array_equal(noise(1.0, SMALL, 30, seed=5), noise(1.0, SMALL, 30, seed=5))
+    ours, other = noise(1.0, LOW, 48, seed=5), noise(1.0, LOW, 48, seed=6)
+    assert abs(np.mean(ours * other.conj())) < 5 / math.sqrt(ours.size)
+
+
+def test_power_scales_the_same_noise() -> None:
+    np.testing.assert_allclose(noise(4.0, SMALL, 30), 2 * noise(1.0, SMALL, 30), rtol=1e-6)  # float32
+
+
+def test_it_is_added_to_what_is_there() -> None:
+    samples = np.full((6, SMALL.n_rx, SMALL.samples_per_chirp), 3 - 2j, np.complex64)
+    Noise(1.0).add(samples, SMALL, 0)
+    np.testing.assert_allclose(samples - (3 - 2j), noise(1.0, SMALL, 6), atol=1e-6)  # float32
+
+
+@pytest.mark.parametrize(("snr_db", "power"), [(20, 0.03), (0, 3), (-10, 30), (3.0103, 1.5)])
+def test_power_for_an_snr(snr_db: float, power: float) -> None:
+    made = Noise.for_snr(3.0, snr_db, seed=9)
+    assert made.power == pytest.approx(power, rel=1e-6)  # 3.0103 dB is a factor of two to seven digits
+    assert made.seed == 9
+
+
+def test_infinite_snr_adds_nothing() -> None:
+    none = Noise.for_snr(3.0, math.inf)
+    assert none.power == 0
+    samples = np.full((6, SMALL.n_rx, SMALL.samples_per_chirp), 1j, np.complex64)
+    none.add(samples, SMALL, 0)
+    assert (samples == 1j).all()

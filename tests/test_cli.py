@@ -1,0 +1,226 @@
+"""The command line: what it writes, and how it says no."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+
+from rtradar.cli import main
+
+SHORT = ["--duration", "0.2", "--snr-db", "20"]
+
+SKELETON = """:version 1.10
+:name tiny
+:units
+  mass 1.0
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name leg
+    direction 0 -1 0
+    length 10
+    axis 0 0 0 XYZ
+    dof rx ry rz
+    limits (-180 180)
+           (-180 180)
+           (-180 180)
+  end
+:hierarchy
+  begin
+    root leg
+  end
+"""
+FRAMES = ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 0 0 0 0 0 0\nleg 0 0 0\n2\nroot 0 0 0 0 0 0\nleg 0 0 1\n"
+
+
+def run(*words: object) -> int:
+    return main(["run", *(str(word) for word in words)])
+
+
+@pytest.fixture(scope="module")
+def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("walk") / "new" / "out"
+    assert run("synthetic:walk", *SHORT, "--fidelity", "specular", "--save-if", "--out", out) == 0
+    return out
+
+
+def test_a_run_writes_all_its_files_and_nothing_else(walked: Path) -> None:
+    names = {file.name for file in walked.iterdir()}
+    pictures = {"range_time.png", "range_doppler.png", "cloud_rdt.png"}
+    assert names == {"maps.h5", "cloud_rdt.npz", "cloud_rdt.ply", "summary.json", "if.zarr", *pictures}
+
+
+def test_the_summary_says_what_was_done(walked: Path) -> None:
+    summary = json.loads((walked / "summary.json").read_text())
+    assert summary["fidelity"] == "specular"
+    assert summary["seed"] == 0
+    assert summary["windows"] == 5  # starts at 0, 25, ... 100 ms
+    assert summary["capture_s"] == pytest.approx(0.19950)  # 266 whole cycles of 0.75 ms
+    assert summary["rdt_points"] == 3000
+    assert summary["detections"] > 0
+    assert summary["parameters"]["radar"]["start_frequency_hz"] == 12e9
+    assert summary["real_time_factor"] == pytest.approx(summary["wall_s"] / summary["capture_s"], rel=1e-3)
+    assert {"scatter", "signal", "noise", "range", "doppler", "cfar", "cloud"} <= set(summary["stages"])
+    for key in ("warmup_s", "peak_memory_mb", "limits", "versions", "variant"):
+        assert key in summary
+
+
+def test_maps_open_in_xarray_with_their_axes(walked: Path) -> None:
+    with xarray.open_dataset(walked / "maps.h5", engine="h5netcdf") as maps:
+        assert maps.range_doppler.dims == ("time", "range", "velocity")
+        assert maps.range_doppler.shape == (5, 256, 133)
+        assert maps.detections.shape == (5, 256, 133)
+        assert maps.range_time.dims == ("slow_time", "range")
+        assert maps.time.values[0] == pytest.approx(133 * 0.75e-3 / 2)
+        assert maps.velocity.attrs["units"] == "m/s"
+        assert float(maps.range[1]) == pytest.approx(0.0374741, abs=1e-6)  # c / 2B
+        brightest = maps.range_doppler.isel(time=0).argmax(...)
+        assert 3.0 < float(maps.range[brightest["range"]]) < 7.0  # the walk is about 4 m from the radar
+
+
+def test_the_cloud_lies_where_the_person_is(walked: Path) -> None:
+    points = np.load(walked / "cloud_rdt.npz")["points"]
+    assert points.shape == (3000, 3)
+    assert (points[:, 0] > 0).all()
+    assert (points[:, 0] < 0.2).all()
+    time, distance, velocity = np.median(points, axis=0)
+    assert time == pytest.approx(0.1, abs=0.05)
+    assert distance == pytest.approx(4.1, abs=0.5)  # the radar is 4.1 m from the origin
+    assert -4 < velocity < -0.5  # toward the radar, the swinging leg fastest
+
+
+def test_if_samples_are_kept_whole(walked: Path) -> None:
+    import zarr
+
+    samples = zarr.open_array(walked / "if.zarr", mode="r")
+    assert samples.shape == (266 * 12, 8, 256)
+    assert (np.abs(samples[-1]) > 0).all()  # noise is everywhere
+
+
+def test_the_same_seed_gives_the_same_files_and_replaces_them(walked: Path, tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("keep")
+    for _ in range(2):
+        assert run("synthetic:walk", *SHORT, "--fidelity", "specular", "--out", tmp_path) == 0
+    assert (tmp_path / "mine.txt").read_text() == "keep"
+    with h5py.File(walked / "maps.h5") as first, h5py.File(tmp_path / "maps.h5") as second:
+        assert np.array_equal(first["range_doppler"][:], second["range_doppler"][:])
+    assert np.array_equal(np.load(walked / "cloud_rdt.npz")["points"], np.load(tmp_path / "cloud_rdt.npz")["points"])
+    assert not list(tmp_path.glob(".rtradar-*"))
+
+
+def test_json_goes_where_it_is_asked_for(tmp_path: Path) -> None:
+    assert run("synthetic:punch", *SHORT, "--fidelity", "analytic", "--out", tmp_path / "out", "--json", tmp_path / "s.json") == 0
+    assert json.loads((tmp_path / "s.json").read_text())["fidelity"] == "analytic"
+
+
+def _amc(folder: Path, frames: str = FRAMES) -> list[str]:
+    (folder / "tiny.asf").write_text(SKELETON)
+    (folder / "tiny.amc").write_text(frames)
+    return [str(folder / "tiny.amc"), "--skeleton", str(folder / "tiny.asf")]
+
+
+def _radar(folder: Path, text: str) -> list[str]:
+    (folder / "mine.toml").write_text(text)
+    return ["synthetic:walk", "--radar", str(folder / "mine.toml")]
+
+
+BAD: dict[str, tuple[Callable[[Path], list[str]], str]] = {
+    "no skeleton": (lambda folder: _amc(folder)[:1], "skeleton"),
+    "skeleton not there": (lambda folder: [*_amc(folder)[:2], str(folder / "other.asf")], "other.asf"),
+    "motion not there": (lambda folder: [str(folder / "none.bvh")], "none.bvh"),
+    "bone not in the skeleton": (lambda folder: _amc(folder, FRAMES.replace("leg", "tail")), "tail"),
+    "truncated": (lambda folder: _amc(folder, FRAMES[:-12]), "tiny.amc"),
+    "NaN": (lambda folder: _amc(folder, FRAMES.replace("leg 0 0 1", "leg 0 nan 1")), "nan"),
+    "wrong frame number": (lambda folder: _amc(folder, FRAMES.replace("\n2\n", "\n7\n")), "7"),
+    "parts missing": (lambda folder: _amc(folder), "tiny"),
+    "unknown kind": (lambda folder: [str(folder / "walk.fbx")], "fbx"),
+    "unknown actor": (lambda folder: ["synthetic:fly"], "fly"),
+    "unknown radar": (lambda folder: ["synthetic:walk", "--radar", "paper-13ghz"], "paper-12ghz"),
+    "negative bandwidth": (lambda folder: _radar(folder, "bandwidth_hz = -4e9"), "bandwidth_hz"),
+    "unknown radar key": (lambda folder: _radar(folder, "bandwith_hz = 4e9"), "bandwith_hz"),
+    "radar is no TOML": (lambda folder: _radar(folder, "bandwidth_hz : 4e9"), "mine.toml"),
+    "unknown scene": (lambda folder: ["synthetic:walk", "--scene", "moon"], "free-space"),
+    "unknown fidelity": (lambda folder: ["synthetic:walk", "--fidelity", "perfect"], "specular"),
+    "pfa of zero": (lambda folder: ["synthetic:walk", "--pfa", "0"], "pfa"),
+    "SNR is not a number": (lambda folder: ["synthetic:walk", "--snr-db", "nan"], "--snr-db"),
+    "negative start": (lambda folder: ["synthetic:walk", "--start", "-1"], "--start"),
+    "too short for a frame": (lambda folder: ["synthetic:walk", "--duration", "0.05"], "frame"),
+    "radar inside the person": (lambda folder: _radar(folder, "position_m = [0.0, 0.0, 1.0]"), "0.3 m"),
+    "person beyond the range": (lambda folder: _radar(folder, "position_m = [-40.0, 0.0, 1.0]"), "range"),
+    "no such option": (lambda folder: ["synthetic:walk", "--fidelty", "analytic"], "fidelty"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_input_gets_one_clear_line_and_leaves_nothing(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words, named = BAD[case]
+    out = tmp_path / "deep" / "out"
+    fidelity = [] if "--fidelity" in words(tmp_path) else ["--fidelity", "analytic"]
+    assert run(*words(tmp_path), *fidelity, "--out", out) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert named in said.err
+    assert "Traceback" not in said.err
+    assert not (tmp_path / "deep").exists()
+
+
+@pytest.mark.parametrize("content", [b"\x00\xff\xfe" * 200, b"", b":FULLY-SPECIFIED\n"])
+def test_files_that_are_no_motion(content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = _amc(tmp_path)
+    (tmp_path / "tiny.amc").write_bytes(content)
+    assert run(*words, "--out", tmp_path / "out") == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
+
+
+def test_real_recording_past_its_end(mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = [mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", "--skeleton", mocap / "hdm05/HDM_bd.asf"]
+    assert run(*words, "--duration", "99", "--out", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "99" in said
+    assert "1.33" in said  # what is there: 160 intervals at 120 Hz
+    assert not (tmp_path / "out").exists()
+
+
+def test_real_skeleton_with_a_bone_of_no_length(mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    skeleton = (mocap / "hdm05/HDM_bd.asf").read_bytes().decode("latin-1")
+    bone = re.search(r"name ltibia.*?length\s+([0-9.]+)", skeleton, re.DOTALL)
+    assert bone is not None
+    (tmp_path / "flat.asf").write_text(skeleton[: bone.start(1)] + "0.0" + skeleton[bone.end(1) :], encoding="latin-1")
+    motion = mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc"
+    assert run(motion, "--skeleton", tmp_path / "flat.asf", "--out", tmp_path / "out") == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "ltibia" in said
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_output_folder_must_be_one(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "file").write_text("mine")
+    assert run("synthetic:walk", *SHORT, "--fidelity", "analytic", "--out", tmp_path / "file") == 2
+    assert "--out" in capsys.readouterr().err
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_import_is_quick_and_light() -> None:
+    heavy = "numba mitsuba drjit scipy matplotlib h5py skimage trimesh torch".split()
+    code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"

@@ -1,0 +1,160 @@
+"""The fast IF against the plain sum of its formula: largest relative error and, in the same run, how much faster it is.
+
+Plain: x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, an exponential for every echo
+and sample. It is timed with its turns in float64, and compared with them in long double, one chirp in sixteen. 21 echoes
+anywhere in the band: constant amplitudes, and the parabola through three frequencies. Relative to the root mean square
+of the IF. Speed is reported, not judged: it is the machine's.
+
+    python validation/if_sum.py [--json FILE]
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+from rtradar.signal import synthesize
+
+Complex = NDArray[np.complex128]
+
+PARTS = 21
+TOLERANCE = 1e-5
+COMPARED = slice(None, None, 16)
+REPEATS = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """One figure against its reference."""
+
+    claim: str
+    quantity: str
+    unit: str
+    reference: float
+    ours: float
+    error: float
+    tolerance: float
+    passed: bool
+
+
+@dataclass(frozen=True)
+class Speed:
+    """Seconds of one block of chirps."""
+
+    case: str
+    chirps: int
+    plain_s: float
+    fast_s: float
+
+
+def block(radar: Radar, chirps: int, nodes: int, rng: np.random.Generator) -> Echoes:
+    """Echoes that stand still, so that nothing but the sum is looked at, anywhere in the band."""
+    shape = (chirps, radar.n_rx, PARTS)
+    way = rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m
+    return Echoes(
+        length=np.broadcast_to(way, shape),
+        amplitude=rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape)),
+        frequency=radar.start_frequency_hz + (np.arange(nodes) + 0.5) / nodes * radar.bandwidth_hz,
+        tx=radar.tx_of_chirp(np.arange(chirps)),
+        part=np.arange(PARTS),
+        bounces=np.ones(PARTS, dtype=np.int64),
+    )
+
+
+def plain_sum(echoes: Echoes, radar: Radar, kind: type[np.floating]) -> Complex:
+    """IF samples (chirp, rx, sample), the turns of the phase in this precision; chirp by chirp, which spares memory."""
+    t = np.arange(radar.samples_per_chirp, dtype=kind) * kind(radar.chirp_duration_s) / radar.samples_per_chirp
+    slope = kind(radar.bandwidth_hz) / kind(radar.chirp_duration_s)
+    f = radar.start_frequency_hz + slope * t
+    weights = np.ones((len(echoes.frequency), len(t)))  # Lagrange's polynomials through the nodes
+    for j, node in enumerate(echoes.frequency):
+        for other in np.delete(echoes.frequency, j):
+            weights[j] *= ((f - other) / (node - other)).astype(np.float64)
+    x = np.empty((*echoes.length.shape[:2], len(t)), dtype=np.complex128)
+    for chirp, length in enumerate(echoes.length):
+        tau = (length.astype(kind) / SPEED_OF_LIGHT_MPS)[..., None]
+        turns = radar.start_frequency_hz * tau + slope * tau * t - slope * tau**2 / 2
+        phasor = np.exp(2j * np.pi * (turns - np.floor(turns)).astype(np.float64))
+        amplitude = np.einsum("jre,jn->ren", echoes.amplitude[:, chirp], weights)
+        x[chirp] = (amplitude * phasor).sum(axis=1)
+    return x
+
+
+def every_sixteenth(echoes: Echoes) -> Echoes:
+    return Echoes(
+        length=echoes.length[COMPARED],
+        amplitude=echoes.amplitude[:, COMPARED],
+        frequency=echoes.frequency,
+        tx=echoes.tx[COMPARED],
+        part=echoes.part,
+        bounces=echoes.bounces,
+    )
+
+
+def measure(preset: str, nodes: int, rng: np.random.Generator) -> tuple[Row, Speed]:
+    radar = Radar.preset(preset)
+    chirps = Radar.preset("paper-12ghz").chirps_per_frame
+    echoes = block(radar, chirps, nodes, rng)
+    times = radar.chirp_times(chirps)
+
+    fast = synthesize(echoes, radar, times)  # compiled before it is timed
+    fast_s = min(timed(lambda: synthesize(echoes, radar, times)) for _ in range(REPEATS))
+    plain_s = timed(lambda: plain_sum(echoes, radar, np.float64))
+
+    reference = plain_sum(every_sixteenth(echoes), radar, np.longdouble)
+    error = float(np.abs(fast[COMPARED] - reference).max() / np.sqrt(np.mean(np.abs(reference) ** 2)))
+    case = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}"
+    return (
+        Row("fast IF is the plain sum", f"{case}: largest relative error", "1", 0.0, error, error, TOLERANCE, error < TOLERANCE),
+        Speed(case, chirps, plain_s, fast_s),
+    )
+
+
+def timed(work: Callable[[], object]) -> float:
+    start = time.perf_counter()
+    work()
+    return time.perf_counter() - start
+
+
+def measurements(seed: int = 0) -> Iterator[tuple[Row, Speed]]:
+    rng = np.random.default_rng(seed)
+    for preset in ("paper-12ghz", "paper-77ghz"):
+        for nodes in (1, 3):
+            yield measure(preset, nodes, rng)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description="The fast IF against the plain sum: error and speed.")
+    parser.add_argument("--json", type=Path, help="write the rows there as well")
+    options = parser.parse_args()
+
+    rows: list[Row] = []
+    speeds: list[Speed] = []
+    for row, speed in measurements():
+        rows.append(row)
+        speeds.append(speed)
+        print(
+            f"{row.quantity:46s} {row.error:8.1e} (tolerance {row.tolerance:.0e}) {'passed' if row.passed else 'FAILED'}; "
+            f"{speed.chirps} chirps, {PARTS} echoes: plain {speed.plain_s:.2f} s, fast {speed.fast_s:.3f} s, "
+            f"{speed.plain_s / speed.fast_s:.0f} times faster",
+            flush=True,
+        )
+    if options.json:
+        content = {"rows": [asdict(row) for row in rows], "speeds": [asdict(speed) for speed in speeds]}
+        options.json.write_text(json.dumps(content, indent=1) + "\n")
+    return 0 if all(row.passed for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
