@@ -221,6 +221,6 @@ def test_the_output_folder_must_be_one(tmp_path: Path, capsys: pytest.CaptureFix
 
 
 def test_import_is_quick_and_light() -> None:
-    heavy = "numba mitsuba drjit scipy matplotlib h5py skimage trimesh torch".split()
+    heavy = ["numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh", "torch"]
     code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"

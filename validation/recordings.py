@@ -1,6 +1,6 @@
 """Real recordings through the whole chain: both rungs, both radars; a table of what came out.
 
-    RTRADAR_MOCAP=folder python validation/recordings.py --out out/recordings [--radar paper-12ghz] [--only cmu]
+RTRADAR_MOCAP=folder python validation/recordings.py --out out/recordings [--radar paper-12ghz] [--only cmu]
 """
 
 from __future__ import annotations
@@ -35,7 +35,9 @@ def main() -> None:
     folder = os.environ.get("RTRADAR_MOCAP")
     if not folder:
         raise SystemExit("set RTRADAR_MOCAP to the folder of real recordings")
-    print(f"{'recording':34} {'activity':14} {'radar':12} {'rung':9} {'points':>6} {'detections':>10} {'wall s':>7} {'capture s':>9} {'MB':>6}")
+    print(
+        f"{'recording':34} {'activity':14} {'radar':12} {'rung':9} {'points':>6} {'detections':>10} {'wall s':>7} {'capture s':>9} {'MB':>6}"
+    )
     for file, skeleton, activity, start_s, duration_s in RECORDINGS:
         if options.only not in file:
             continue
