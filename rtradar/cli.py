@@ -157,7 +157,8 @@ def _run(options: argparse.Namespace) -> int:
     said = result.summary
     print(
         f"{said['rdt_points']} points from {said['detections']} detections in {said['windows']} windows; "
-        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; see {options.out}"
+        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; "
+        f"see {options.out}"
     )
     return 0
 

@@ -130,8 +130,8 @@ def run(
     windows = radar.window_starts(n_chirps)
     if len(windows) == 0:
         raise InputError(
-            f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame of {radar.frame_duration_s} s of radar "
-            f"'{radar.name}'; choose a longer one (--start, --duration)"
+            f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame of {radar.frame_duration_s} s "
+            f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
         )
     warm = time.perf_counter()
     rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading)

@@ -131,9 +131,10 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         distance = float(np.linalg.norm(radar.position_m))
         return Survey(distance**-4 if spreading else 1.0, False, dict.fromkeys(body.part_names, 0.0), ())
     messages = {
-        "small_curvature": f"echo power from places whose wavenumber times radius of curvature is below {MINIMUM_KA:g}, where optics is "
-        f"off by decibels: {', '.join(name for name in body.part_names if name in small_parts)}",
-        "velocity_ambiguous": f"echo power from parts faster than the unambiguous {radar.max_velocity_mps:.2f} m/s: it shows at another velocity",
+        "small_curvature": f"echo power from places whose wavenumber times radius of curvature is below "
+        f"{MINIMUM_KA:g}, where optics is off by decibels: {', '.join(name for name in body.part_names if name in small_parts)}",
+        "velocity_ambiguous": f"echo power from parts faster than the unambiguous {radar.max_velocity_mps:.2f} m/s: "
+        "it shows at another velocity",
         "beyond_range": f"echo power from beyond {radar.max_range_m:.2f} m, removed by the ideal IF low-pass",
     }
     limits = tuple(Limit(name, value / power, messages[name]) for name, value in concerned.items() if value > 0)

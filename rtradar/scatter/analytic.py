@@ -42,10 +42,10 @@ def far_field_echo(
     amplitude : (chirp, rx, part) float64
         Square root of the cross-section, over R1 R2 with ``spreading`` [m].
     """
-    arrays = (np.ascontiguousarray(array, dtype=np.float64) for array in (tx, rx, centres, frames, semi_axes))
+    tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
     shape = (*rx.shape[:2], centres.shape[1])
     length, amplitude = np.empty(shape), np.empty(shape)
-    _far_field(*arrays, spreading, length, amplitude)
+    _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
     return length, amplitude
 
 
