@@ -154,7 +154,8 @@ def _refuse_too_near(radar: Radar, body: Body, times: NDArray[np.float64]) -> No
         distance = _distance(frames[time, part].T @ (antennas[antenna] - centres[time, part]), semi_axes[part])
         if distance < MINIMUM_ANTENNA_DISTANCE_M:
             raise InputError(
-                f"at {times[time]:.2f} s the {body.part_names[part]} is {max(distance, 0):.2f} m from an antenna of radar '{radar.name}'; "
+                f"at {times[time]:.2f} s the {body.part_names[part]} is {max(distance, 0):.2f} m from an "
+                f"antenna of radar '{radar.name}'; "
                 f"at least {MINIMUM_ANTENNA_DISTANCE_M} m is allowed: move the radar (position_m) or choose another interval"
             )
 
