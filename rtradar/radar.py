@@ -22,6 +22,36 @@ PRESETS: dict[str, dict[str, Any]] = {
 }
 """The paper's Table 1, and its 77 GHz sister with chirps five times shorter; what is not named is the default."""
 
+_POSITIVE = (
+    "start_frequency_hz",
+    "bandwidth_hz",
+    "chirp_duration_s",
+    "frame_duration_s",
+    "frame_hop_s",
+    "tx_spacing_wavelengths",
+    "rx_spacing_wavelengths",
+)
+_COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
+# Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
+_LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
+_MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
+
+
+def _shown(value: object) -> str:
+    """A value as a message shows it: short, and in one line."""
+    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a number of more than 20 digits"
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _is_number(value: Any) -> bool:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return False
+    return bool(-_LARGEST < value < _LARGEST)
+
+
+def _is_count(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
 
 @dataclass(frozen=True, kw_only=True)
 class Radar:
@@ -77,37 +107,38 @@ class Radar:
     polarization: Literal["v", "h"] = "v"
 
     def __post_init__(self) -> None:
-        for field in (
-            "start_frequency_hz",
-            "bandwidth_hz",
-            "chirp_duration_s",
-            "frame_duration_s",
-            "frame_hop_s",
-            "tx_spacing_wavelengths",
-            "rx_spacing_wavelengths",
-        ):
+        if not (isinstance(self.name, str) and self.name.isprintable()):
+            raise InputError(f"radar: name = {_shown(self.name)}; it must be one line of text")
+        for field in _POSITIVE:
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not (math.isfinite(value) and value > 0):
-                raise InputError(f"radar '{self.name}': {field} = {value!r}; it must be a positive, finite number")
-        for field, least in (("samples_per_chirp", 1), ("tx_y", 0), ("tx_z", 0), ("rx_y", 0), ("rx_z", 0)):
+            if not (_is_number(value) and _LEAST < value < _LARGEST):
+                raise InputError(f"radar '{self.name}': {field} = {_shown(value)}; it must be a positive, finite number")
+            object.__setattr__(self, field, float(value))
+        for field, least in _COUNTS.items():
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise InputError(f"radar '{self.name}': {field} = {value!r}; it must be a whole number, at least {least}")
+            if not (_is_count(value) and least <= value <= _MOST):
+                raise InputError(
+                    f"radar '{self.name}': {field} = {_shown(value)}; it must be a whole number from {least} to {_MOST}"
+                )
+            object.__setattr__(self, field, int(value))
         for field, allowed in (("channels", ("pairs", "all")), ("polarization", ("v", "h"))):
             if getattr(self, field) not in allowed:
-                raise InputError(f"radar '{self.name}': {field} = {getattr(self, field)!r}; allowed: {', '.join(allowed)}")
-        try:
-            position = tuple(float(value) for value in self.position_m)
-        except (TypeError, ValueError):
-            position = ()
-        if len(position) != 3 or not all(math.isfinite(value) for value in position):
-            raise InputError(f"radar '{self.name}': position_m = {self.position_m!r}; it must be three finite numbers [m]")
-        object.__setattr__(self, "position_m", position)
+                raise InputError(f"radar '{self.name}': {field} = {_shown(getattr(self, field))}; allowed: {', '.join(allowed)}")
+        position = self.position_m
+        if not isinstance(position, list | tuple | np.ndarray) or len(position) != 3 or not all(map(_is_number, position)):
+            raise InputError(f"radar '{self.name}': position_m = {_shown(position)}; it must be three finite numbers [m]")
+        object.__setattr__(self, "position_m", tuple(float(value) for value in position))
         self._check_array()
         if self.cycles_per_frame < 1:
             raise InputError(
                 f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole TDM cycle of "
                 f"{self.cycle_duration_s:.3g} s; lengthen the frame or shorten the chirp"
+            )
+        samples = self.chirps_per_frame * self.n_rx * self.samples_per_chirp
+        if samples > _MOST_SAMPLES_PER_FRAME:
+            raise InputError(
+                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds {samples:.2g} samples, more than "
+                f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps"
             )
 
     def _check_array(self) -> None:
@@ -238,7 +269,8 @@ class Radar:
         last = n_chirps // self.n_tx - self.cycles_per_frame
         if last < 0:
             return np.zeros(0, dtype=np.int64)
-        hop = self.frame_hop_s / self.cycle_duration_s
+        # A hop below one cycle reaches every cycle, as one of a cycle does.
+        hop = max(1.0, self.frame_hop_s / self.cycle_duration_s)
         starts = np.rint(np.arange(math.floor((last + 0.5) / hop) + 1) * hop).astype(np.int64)
         return np.unique(starts[starts <= last])
 
@@ -309,7 +341,7 @@ class Radar:
         elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
         if elements < 2:
             return 180.0
-        return math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths))
+        return min(180.0, math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths)))
 
     @property
     def _virtual_spacing_wavelengths(self) -> float:

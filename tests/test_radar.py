@@ -405,8 +405,45 @@ def test_a_count_is_a_whole_number(tmp_path: Path, field: str, value: str) -> No
     assert "whole number" in message
 
 
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"tx_y": 10**400}, "tx_y = a number of more than 20 digits"),
+        ({"bandwidth_hz": 10**400}, "bandwidth_hz = a number of more than 20 digits"),
+        ({"samples_per_chirp": 10**15}, "samples_per_chirp = 1000000000000000"),
+        ({"bandwidth_hz": 1e300}, "bandwidth_hz = 1e+300"),
+        ({"chirp_duration_s": 1e-300}, "chirp_duration_s = 1e-300"),
+        ({"name": 5}, "name = 5"),
+        ({"name": "two\nlines"}, "one line of text"),
+        ({"position_m": "123"}, "three finite numbers"),
+        ({"position_m": ["1", "2", "3"]}, "three finite numbers"),
+        ({"position_m": [True, 0, 0]}, "three finite numbers"),
+        ({"position_m": [10**400, 0, 0]}, "three finite numbers"),
+        ({"channels": "x" * 1000}, "..."),
+        ({"frame_duration_s": 1e9}, "more than 2.1e+09"),
+        ({"chirp_duration_s": 1e-14}, "shorten the frame"),
+    ],
+)
+def test_values_far_outside_are_refused_in_one_short_line(values: dict[str, Any], says: str) -> None:
+    message = refusal(Radar, **values)
+    assert says in message
+    assert len(message) < 300
+
+
+def test_numpy_scalars_do_as_well() -> None:
+    radar = Radar(bandwidth_hz=np.float32(2e9), tx_y=np.int64(3), position_m=np.array([-4, 1, 1]))  # type: ignore[arg-type]
+    assert (type(radar.bandwidth_hz), type(radar.tx_y)) == (float, int)
+    assert radar.position_m == (-4.0, 1.0, 1.0)
+    assert all(type(value) is float for value in radar.position_m)
+
+
+def test_a_hop_far_below_a_cycle_takes_every_cycle() -> None:
+    radar = Radar(tx_y=1, tx_z=0, frame_hop_s=1e-14, frame_duration_s=0.001)
+    assert radar.window_starts(20).tolist() == list(range(20 - radar.cycles_per_frame + 1))
+
+
 def test_a_chirp_has_a_sample() -> None:
-    assert "samples_per_chirp = 0; it must be a whole number, at least 1" in refusal(Radar, samples_per_chirp=0)
+    assert "samples_per_chirp = 0; it must be a whole number from 1 to 65536" in refusal(Radar, samples_per_chirp=0)
 
 
 @pytest.mark.parametrize(
