@@ -51,10 +51,9 @@ class Noise:
         def fill(first: int) -> None:
             part = samples[first : first + radar.n_tx]
             stream = np.random.Generator(np.random.SFC64([self.seed, (first_chirp + first) // radar.n_tx]))
-            # A whole cycle is drawn even where the capture ends inside it, so that what stands there stays the same.
-            values = stream.standard_normal((radar.n_tx, *part.shape[1:], 2), dtype=np.float32)
+            values = stream.standard_normal((*part.shape, 2), dtype=np.float32)
             values *= sigma
-            part += values.view(np.complex64)[: len(part), ..., 0]
+            part += values.view(np.complex64)[..., 0]
 
         with ThreadPoolExecutor() as pool:
             list(pool.map(fill, range(0, len(samples), radar.n_tx)))

@@ -154,8 +154,10 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     if len(same) < 2:
         return
     same = same[[0, len(same) // 2, -1]] if len(same) > 2 else same
-    rate = np.diff(echoes.length[same], axis=0) / np.diff(times[same])[:, None, None]
-    bins = float(np.nanmax(np.abs(rate), initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
+    heard = (echoes.amplitude[:, same] != 0).any(axis=0) & in_band(echoes, radar)[same]
+    length = np.where(heard, echoes.length[same], np.nan)
+    rate = np.diff(length, axis=0) / np.diff(times[same])[:, None, None]
+    bins = float(np.nan_to_num(np.abs(rate)).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(
             f"an echo moves {bins:.2f} range bins inside one chirp, more than {MAX_BINS_IN_CHIRP}: it is taken to stand "

@@ -327,6 +327,14 @@ def test_warns_of_an_echo_that_moves_a_tenth_of_a_bin_in_a_chirp(radar: Radar, s
         synthesize(*moving(radar, sign * velocity, 36))
 
 
+def test_an_echo_that_is_not_heard_says_nothing_of_motion() -> None:
+    echoes, radar, times = moving(LOW, 1000.0, 36)
+    hidden = dataclasses.replace(echoes, amplitude=np.zeros_like(echoes.amplitude))
+    assert not synthesize(hidden, radar, times).any()  # warnings are errors in tests
+    beyond = dataclasses.replace(echoes, length=echoes.length + 2 * radar.max_range_m)
+    assert not synthesize(beyond, radar, times).any()
+
+
 def test_less_than_a_cycle_says_nothing_of_motion() -> None:
     assert synthesize(*moving(LOW, 1000.0, 12)).any()
 
