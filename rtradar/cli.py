@@ -11,6 +11,7 @@ import json
 import math
 import sys
 import warnings
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
@@ -48,6 +49,8 @@ def main(arguments: list[str] | None = None) -> int:
         return _fail(1, error)
     except KeyboardInterrupt:
         return _fail(1, "stopped by the user; nothing was left half-written")
+    except MemoryError as error:
+        return _fail(1, f"out of memory ({str(error) or 'no more to be had'}); nothing was left half-written")
     except BrokenPipeError:
         return 1
     return status
@@ -73,6 +76,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = _OneLineParser(
         prog="rtradar", description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds."
     )
+    parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=_OneLineParser)
 
     doctor = commands.add_parser("doctor", help="which ray-tracing backends work on this machine, and what to install")

@@ -87,3 +87,9 @@ def test_no_nodes_are_refused_though_amplitude_fits() -> None:
 def test_the_message_says_what_is_allowed() -> None:
     with pytest.raises(ValueError, match=r"Echoes\.tx has shape \(4,\); with this length it must be \(5,\)"):
         Echoes(**fields(tx=np.zeros(4)))
+
+
+def test_a_node_that_is_named_twice_is_refused() -> None:
+    nodes = {"frequency": np.array([14e9, 14e9]), "amplitude": np.ones((2, CHIRPS, RX, ECHOES))}
+    with pytest.raises(ValueError, match=r"Echoes\.frequency names a node twice"):
+        Echoes(**fields(**nodes))

@@ -41,8 +41,10 @@ class Ellipsoids:
             ("frames", frame_array, (*parts, 3, 3)),
             ("semi_axes", axis_array, (*parts, 3)),
         ):
-            if array.shape != shape or not parts:
-                raise InputError(f"Ellipsoids.{name} has shape {array.shape}; it must be {('part', *shape[1:])}, alike in part")
+            if array.shape != shape or not parts or parts[0] == 0:
+                raise InputError(
+                    f"Ellipsoids.{name} has shape {array.shape}; it must be {('part', *shape[1:])}, alike and at least 1 in part"
+                )
             if not np.isfinite(array).all():
                 raise InputError(f"Ellipsoids.{name} holds NaN or infinity; every value must be finite")
             object.__setattr__(self, name, array)

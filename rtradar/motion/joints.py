@@ -100,7 +100,12 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
         if best is None or len(missing) < best[0]:
             wanted = " or ".join(convention.joints[missing[0]])
             best = (len(missing), f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name} skeleton")
-    assert best is not None
+    if best is None or best[0] > len(NODES) / 2:
+        known = "; ".join(convention.name for convention in CONVENTIONS)
+        raise InputError(
+            f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no kind of skeleton that is "
+            f"known: {known}; rename them after one of these"
+        )
     raise InputError(f"{motion.name}: {best[1]}; {len(NODES)} nodes are needed, rename or add the joint")
 
 

@@ -36,6 +36,7 @@ from rtradar.signal import Noise, synthesize
 CLOUD_POINTS = 3000
 """Points in the RDT cloud (paper, section 3.2.4)."""
 
+_MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 _RANGE_TIME_STEP_S = 5e-3
 _PICTURE_ROWS = 1500
 _VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh")
@@ -167,7 +168,7 @@ def run(
             "seed": seed,
             "versions": {"python": platform.python_version(), **_versions()},
             "fidelity": fidelity,
-            "variant": getattr(rung, "variant", None),
+            "variant": rung.variant,
             "stages": {name: round(seconds, 4) for name, seconds in stages.seconds.items()},
             "wall_s": round(wall_s, 4),
             "warmup_s": round(warmup_s, 4),
@@ -184,8 +185,9 @@ def run(
             "noise_power_m2": noise.power,
             "limits": _limits(surveyed, [str(warning.message) for warning in caught]),
         }
-        (folder / "summary.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
-    return Result(cloud.points, summary, Path(out))
+        text = json.dumps(summary, indent=2, allow_nan=False)
+        (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
+    return Result(cloud.points, json.loads(text), Path(out))
 
 
 class _Chain:
@@ -288,8 +290,8 @@ class _Chain:
 
 
 def _check(snr_db: float, pfa: float, seed: int) -> None:
-    if math.isnan(snr_db) or snr_db == -math.inf:
-        raise InputError(f"snr_db = {snr_db}; it must be a number of decibels, or inf for no noise (--snr-db)")
+    if not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
+        raise InputError(f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)")
     if not 0 < pfa < 1:
         raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
     if seed < 0:

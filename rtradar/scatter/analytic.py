@@ -14,6 +14,8 @@ from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.poses import chirp_poses, one_echo_a_part
 
+_NO_BISECTOR = 1e-24  # square of the sum of two opposite unit vectors, as rounding leaves it
+
 
 def far_field_echo(
     tx: NDArray[np.float64],
@@ -40,7 +42,7 @@ def far_field_echo(
     length : (chirp, rx, part) float64
         Tx..Rx path over the surface point whose normal is that bisector [m].
     amplitude : (chirp, rx, part) float64
-        Square root of the cross-section, over R1 R2 with ``spreading`` [m].
+        Square root of the cross-section, over R1 R2 with ``spreading`` [m]; 0 where Tx and Rx are exactly opposite.
     """
     tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
     shape = (*rx.shape[:2], centres.shape[1])
@@ -57,7 +59,8 @@ def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
         for part in range(parts):
             centre, frame, axes = centres[chirp, part], frames[chirp, part], semi_axes[part]
             to_tx = tx[chirp] - centre
-            to_tx /= math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
+            norm_tx = math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
+            to_tx /= norm_tx
             for receiver in range(receivers):
                 for i in range(3):
                     sight[i] = rx[chirp, receiver, i] - centre[i]
@@ -70,6 +73,11 @@ def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
                         normal[i] += frame[j, i] * (to_tx[j] + sight[j] / norm)
                     squared += normal[i] ** 2
                     support += (axes[i] * normal[i]) ** 2
+                if squared < _NO_BISECTOR:
+                    # Straight through: no reflection.
+                    length[chirp, receiver, part] = norm_tx + norm
+                    amplitude[chirp, receiver, part] = 0.0
+                    continue
                 support = math.sqrt(support / squared)
                 for i in range(3):
                     normal[i] *= axes[i] ** 2 / (support * math.sqrt(squared))
@@ -130,6 +138,7 @@ class Analytic:
 
     def __init__(self, radar: Radar, body: Body, *, paper: bool = False, spreading: bool = True) -> None:
         self._radar, self._body, self._paper, self._spreading = radar, body, paper, spreading
+        self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

@@ -23,7 +23,12 @@ def anchor_step(radar: Radar) -> int:
 
 
 class Rung(Protocol):
-    """A rung of the fidelity ladder: a body seen by a radar, ready to answer for any chirps of the capture."""
+    """A rung of the fidelity ladder: a body seen by a radar, ready to answer for any chirps of the capture.
+
+    ``variant`` is the backend that traces, in the words of the command line; None where nothing is traced.
+    """
+
+    variant: str | None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending."""

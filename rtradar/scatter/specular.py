@@ -30,7 +30,9 @@ class Specular:
 
     def __init__(self, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True) -> None:
         self._radar, self._body, self._spreading = radar, body, spreading
-        self.visibility = MirrorVisibility(radar, body, BodyTracer(use(select(variant)), body.semi_axes))
+        backend = select(variant)
+        self.variant: str | None = backend.kind
+        self.visibility = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

@@ -112,6 +112,20 @@ def test_missing_joint_is_named() -> None:
         to_nodes(renamed)
 
 
+def test_a_skeleton_of_no_known_kind_is_told_the_kinds() -> None:
+    motion = Motion(
+        name="robot",
+        joints=("base", "arm"),
+        parents=(-1, 0),
+        offsets=np.array([[0.0, 0, 0], [0, 0, 1]]),
+        root_positions=np.zeros((2, 3)),
+        rotations=np.tile([0.0, 0, 0, 1], (2, 2, 1)),
+        rate_hz=100.0,
+    )
+    with pytest.raises(InputError, match=r"robot: its joints \(base, arm, ...\) are named as in no kind .*ASF \(HDM05, CMU\); "):
+        to_nodes(motion)
+
+
 def test_part_without_length_is_refused() -> None:
     motion = bvh_like(("Spine",))
     offsets = motion.offsets.copy()

@@ -133,6 +133,14 @@ def test_at_four_metres_it_is_the_shortest_path_but_for_a_millimetre(seed: int) 
     assert -1e-9 < length[0] - shortest < 1e-3
 
 
+def test_straight_through_there_is_no_reflection() -> None:
+    body = toy(parts=1)
+    centre = body.centres[0]
+    length, amplitude = one(centre + np.array([3.0, 0, 0]), centre - np.array([5.0, 0, 0]), body)
+    assert length.tolist() == pytest.approx([8.0])
+    assert amplitude.tolist() == [0.0]
+
+
 # -- cross-section ---------------------------------------------------------------------------------------------------
 
 

@@ -1,0 +1,116 @@
+"""The whole chain from Python: noise where it is asked for, and the same answer however the work is cut."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import zarr
+
+import rtradar as rt
+from rtradar.errors import InputError, ValidityWarning
+
+RADAR = rt.Radar(
+    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+)
+MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
+
+
+def run(out: Path, **options: Any) -> tuple[rt.Result, np.ndarray[Any, Any]]:
+    """A run of 0.3 s and its IF samples."""
+    result = rt.run(MOTION, RADAR, out=out, **({"fidelity": "analytic", "duration_s": 0.3, "save_if": True} | options))
+    return result, np.asarray(zarr.open_array(out / "if.zarr", mode="r")[:])
+
+
+def test_noise_has_the_power_that_is_asked_for(tmp_path: Path) -> None:
+    quiet, echo = run(tmp_path / "quiet", snr_db=math.inf)
+    noisy, samples = run(tmp_path / "noisy", snr_db=10.0)
+    assert quiet.summary["noise_power_m2"] == 0
+    assert noisy.summary["echo_power_m2"] == quiet.summary["echo_power_m2"]
+    assert noisy.summary["noise_power_m2"] == pytest.approx(noisy.summary["echo_power_m2"] / 10)
+    noise = samples - echo
+    # |n|^2 of a complex Gaussian has the standard deviation of its mean: five of them, and float32's rounding.
+    found = float(np.mean(np.abs(noise) ** 2))
+    assert found == pytest.approx(noisy.summary["noise_power_m2"], rel=5 / math.sqrt(noise.size) + 1e-5)
+    # The IF's power is the sum of the echoes' but for interference between 21 parts, twice here.
+    assert 1 / 4 < np.mean(np.abs(echo) ** 2) / quiet.summary["echo_power_m2"] < 4
+
+
+def test_only_the_noise_depends_on_the_seed(tmp_path: Path) -> None:
+    _, first = run(tmp_path / "a", seed=1)
+    _, again = run(tmp_path / "b", seed=1)
+    _, other = run(tmp_path / "c", seed=2)
+    np.testing.assert_array_equal(first, again)
+    assert not np.isclose(first, other).any(axis=None)
+
+
+def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:
+    # The interval's place depends on its length (its mean stands at the origin), so the body stands still here.
+    still = rt.Motion(
+        name="still",
+        joints=MOTION.joints,
+        parents=MOTION.parents,
+        offsets=MOTION.offsets,
+        root_positions=np.repeat(MOTION.root_positions[:1], 101, axis=0),
+        rotations=np.repeat(MOTION.rotations[:1], 101, axis=0),
+        rate_hz=100.0,
+    )
+    maps = []
+    for duration in (0.2, 0.3):
+        rt.run(still, RADAR, out=tmp_path / "out", fidelity="specular", duration_s=duration, snr_db=math.inf)
+        with h5py.File(tmp_path / "out" / "maps.h5") as file:
+            maps.append(file["range_doppler"][:])
+    assert len(maps[1]) > len(maps[0]) > 3
+    np.testing.assert_array_equal(maps[1][: len(maps[0])], maps[0])
+
+
+def test_without_spreading_the_echo_is_the_cross_section(tmp_path: Path) -> None:
+    with_loss, _ = run(tmp_path / "a")
+    without, _ = run(tmp_path / "b", spreading=False)
+    ratio = without.summary["echo_power_m2"] / with_loss.summary["echo_power_m2"]
+    assert 4.0**4 < ratio < 4.3**4  # the radar is 4.1 m from the upright person, whose near side counts most
+
+
+def test_a_person_who_turns_is_another_echo(tmp_path: Path) -> None:
+    facing, _ = run(tmp_path / "a")
+    aside, _ = run(tmp_path / "b", heading_deg=90.0)
+    assert facing.summary["part_power_m2"]["left foot"] != pytest.approx(aside.summary["part_power_m2"]["left foot"], rel=0.1)
+
+
+def test_noise_alone_leaves_an_empty_cloud_and_says_so(tmp_path: Path) -> None:
+    with pytest.warns(ValidityWarning, match="nothing was detected"):
+        result, _ = run(tmp_path / "out", snr_db=-90.0, pfa=1e-12)
+    assert result.points.shape == (0, 3)
+    assert result.summary["rdt_points"] == 0
+    assert (tmp_path / "out" / "cloud_rdt.png").exists()
+
+
+def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
+    result, _ = run(tmp_path / "out", snr_db=math.inf)
+    assert json.loads((tmp_path / "out" / "summary.json").read_text()) == result.summary
+    assert result.summary["variant"] is None  # nothing is traced in the closed form
+    assert sum(result.summary["stages"].values()) < result.summary["wall_s"]
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        ({"snr_db": math.nan}, "snr_db = nan"),
+        ({"snr_db": 1e4}, "snr_db"),
+        ({"pfa": 1.0}, "pfa = 1"),
+        ({"seed": -1}, "seed = -1"),
+        ({"fidelity": "perfect"}, "allowed: analytic-paper, analytic, specular"),
+        ({"duration_s": 0.01}, "no whole frame"),
+        ({"start_s": 5.0}, "5"),
+        ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, llvm, scalar, cuda"),
+    ],
+)
+def test_bad_values_are_refused_and_leave_nothing(tmp_path: Path, options: dict[str, Any], says: str) -> None:
+    with pytest.raises(InputError, match=says):
+        run(tmp_path / "out", **options)
+    assert not (tmp_path / "out").exists()

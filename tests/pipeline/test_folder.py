@@ -1,0 +1,73 @@
+"""The output folder: all the files of a run, or none."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from rtradar.errors import InputError
+from rtradar.pipeline.folder import all_or_nothing
+
+
+def fill(folder: Path, text: str) -> None:
+    (folder / "maps").write_text(text)
+    (folder / "store").mkdir()
+    (folder / "store" / text).write_text(text)
+
+
+def fill_and_fail(out: Path, error: type[BaseException]) -> None:
+    with all_or_nothing(out) as folder:
+        fill(folder, "second")
+        raise error
+
+
+def contents(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*")}
+
+
+def test_files_and_folders_of_the_same_name_are_replaced_and_others_left(tmp_path: Path) -> None:
+    out = tmp_path / "deep" / "out"
+    with all_or_nothing(out) as folder:
+        fill(folder, "first")
+    (out / "mine").write_text("mine")
+    with all_or_nothing(out) as folder:
+        fill(folder, "second")
+        assert (out / "maps").read_text() == "first"  # nothing moves before the end
+    assert contents(out) == {"maps", "store", "store/second", "mine"}
+    assert (out / "maps").read_text() == "second"
+
+
+@pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, MemoryError])
+def test_after_an_error_all_is_as_before(tmp_path: Path, error: type[BaseException]) -> None:
+    out = tmp_path / "out"
+    with all_or_nothing(out) as folder:
+        fill(folder, "first")
+    with pytest.raises(error):
+        fill_and_fail(out, error)
+    assert contents(out) == {"maps", "store", "store/first"}
+
+
+def test_folders_that_were_made_go_again_and_others_stay(tmp_path: Path) -> None:
+    (tmp_path / "there").mkdir()
+    with pytest.raises(MemoryError):
+        fill_and_fail(tmp_path / "there" / "new" / "out", MemoryError)
+    assert contents(tmp_path) == {"there"}
+
+
+def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match=r"cannot write to .*file.*--out"), all_or_nothing(tmp_path / "file" / "out"):
+        pass
+    assert contents(tmp_path) == {"file"}
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
+def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
+    tmp_path.chmod(0o500)
+    try:
+        with pytest.raises(InputError, match="cannot write to"), all_or_nothing(tmp_path / "out"):
+            pass
+    finally:
+        tmp_path.chmod(0o700)
