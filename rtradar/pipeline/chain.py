@@ -25,7 +25,7 @@ from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
 from rtradar.pipeline.store import MapStore
 from rtradar.pipeline.survey import Survey, survey
-from rtradar.pipeline.timing import Stages, peak_memory_mb
+from rtradar.pipeline.timing import Stages, forget_peak_memory, peak_memory_mb
 from rtradar.process import SlidingWindows, os_cfar, power_map, range_spectrum
 from rtradar.radar import Radar
 from rtradar.report import draw_range_doppler, draw_range_time, draw_rdt_cloud
@@ -121,6 +121,7 @@ def run(
     """
     began = time.perf_counter()
     stages = Stages()
+    forget_peak_memory()
     scene = scene or Scene()
     _check(snr_db, pfa, seed)
     with stages.time("motion"):

@@ -57,12 +57,21 @@ class Survey:
         Whether there is any echo at all.
     part_power : dict
         The same by name of body part.
+    times : (time,) float64
+        Instants looked at [s] since the start of the capture.
+    power_at : (time, part) float64
+        The same power by instant and part [m^2].
+    hidden_at : (time, part) float64
+        Share of the channels that do not see the part, 0 to 1.
     limits : tuple of Limit
     """
 
     power: float
     visible: bool
     part_power: dict[str, float]
+    times: NDArray[np.float64]
+    power_at: NDArray[np.float64]
+    hidden_at: NDArray[np.float64]
     limits: tuple[Limit, ...]
 
 
@@ -95,7 +104,8 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         Where more than 5 % of the echo power is concerned, and where nobody is visible.
     """
     chirps = np.arange(0, n_chirps, anchor_step(radar))
-    totals = np.zeros(len(body.part_names))
+    n_parts = len(body.part_names)
+    power_at, hidden_at = np.zeros((len(chirps), n_parts)), np.zeros((len(chirps), n_parts))
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts: set[str] = set()
     seen_in_band = False
@@ -108,9 +118,12 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         inside = in_band(echoes, radar)
         seen_in_band |= bool(inside.any())
         concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
-        by_part = np.zeros((len(chosen), len(totals)))
+        by_part = power_at[first : first + len(chosen)]
         np.add.at(by_part.T, echoes.part, power.mean(axis=1).T)
-        totals += by_part.sum(axis=0)
+        seen = np.zeros((len(chosen), echoes.length.shape[1], n_parts), dtype=bool)
+        for echo, part in enumerate(echoes.part):
+            seen[..., part] |= power[..., echo] > 0
+        hidden_at[first : first + len(chosen)] = 1 - seen.mean(axis=1)
         small = _small_curvature(radar, body, times)
         concerned["small_curvature"] += float((by_part * small).sum())
         small_parts |= {body.part_names[part] for part in np.flatnonzero((by_part * small).sum(axis=0))}
@@ -120,7 +133,9 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
             f"the person is never within the range of radar '{radar.name}', {radar.max_range_m:.2f} m; place the radar "
             "nearer (position_m) or raise samples_per_chirp"
         )
-    power = float(totals.sum())
+    part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
+    looked_at = np.asarray((chirps + 0.5) * radar.chirp_duration_s, dtype=np.float64)
+    power = float(power_at.sum())
     if power == 0:
         # A point of 1 m^2 at the world's origin stands in for the person.
         warnings.warn(
@@ -129,7 +144,8 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
             stacklevel=2,
         )
         distance = float(np.linalg.norm(radar.position_m))
-        return Survey(distance**-4 if spreading else 1.0, False, dict.fromkeys(body.part_names, 0.0), ())
+        reference = distance**-4 if spreading else 1.0
+        return Survey(reference, False, part_power, looked_at, power_at, hidden_at, ())
     messages = {
         "small_curvature": f"echo power from places whose wavenumber times radius of curvature is below "
         f"{MINIMUM_KA:g}, where optics is off by decibels: {', '.join(name for name in body.part_names if name in small_parts)}",
@@ -141,7 +157,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     for limit in limits:
         if limit.share > _WARN_SHARE:
             warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=2)
-    return Survey(power / len(chirps), True, dict(zip(body.part_names, (totals / len(chirps)).tolist(), strict=True)), limits)
+    return Survey(power / len(chirps), True, part_power, looked_at, power_at, hidden_at, limits)
 
 
 def _refuse_too_near(radar: Radar, body: Body, times: NDArray[np.float64]) -> None:

@@ -76,6 +76,9 @@ def test_power_is_that_of_the_spheres_by_hand() -> None:
     assert found.part_power == pytest.approx({"ball": ball, "needle": other}, rel=1e-2)
     assert sum(found.part_power.values()) == pytest.approx(found.power, rel=1e-12)
     assert found.limits == ()
+    np.testing.assert_allclose(found.times, 0.5e-3 + 0.01 * np.arange(20))
+    assert found.power_at.sum() / 20 == pytest.approx(found.power, rel=1e-12)
+    assert not found.hidden_at.any()
     plain = look(balls, spreading=False)
     assert plain.power == pytest.approx(math.pi * (0.2**2 + 0.1**2), rel=1e-9)
 
@@ -135,4 +138,22 @@ def test_nobody_visible_is_measured_against_a_square_metre_at_the_origin(spreadi
     with pytest.warns(ValidityWarning, match="nobody is visible"):
         found = survey(Silence(), RADAR, body, N_CHIRPS, spreading=spreading)
     assert not found.visible
+    assert (found.hidden_at == 1).all()
     assert found.power == pytest.approx(17**-2 if spreading else 1.0)  # the radar stands sqrt(17) m from the origin
+
+
+def test_what_another_part_hides_is_counted() -> None:
+    # The needle stands 1 m behind the ball, in its shadow from every antenna.
+    @dataclass(frozen=True)
+    class Behind(Balls):
+        def at(self, times: Array) -> Poses:
+            poses = super().at(times)
+            poses.centres[:, 1] = poses.centres[:, 0] + [1.0, 0, 0]
+            return poses
+
+    body = dataclasses.replace(Behind(), semi_axes=np.array([[0.3, 0.3, 0.3], [0.1, 0.1, 0.1]]))
+    rung = build_rung("specular", RADAR, body)  # type: ignore[arg-type]
+    found = survey(rung, RADAR, body, N_CHIRPS)  # type: ignore[arg-type]
+    assert not found.hidden_at[:, 0].any()
+    assert (found.hidden_at[:, 1] == 1).all()
+    assert found.part_power["needle"] == 0
