@@ -2,15 +2,21 @@
 
 from rtradar.clouds.files import RDT_AXES, RDT_UNITS, atomic_file, save_cloud_npz, save_ply
 from rtradar.clouds.rdt import RdtCloud, RdtCloudResult, rdt_isosurface, sample_centres
+from rtradar.clouds.sampling import UniformSample
+from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_points
 
 __all__ = [
     "RDT_AXES",
     "RDT_UNITS",
     "RdtCloud",
     "RdtCloudResult",
+    "SpatialCloud",
+    "UniformSample",
     "atomic_file",
     "rdt_isosurface",
     "sample_centres",
     "save_cloud_npz",
     "save_ply",
+    "save_spatial_npz",
+    "spatial_points",
 ]

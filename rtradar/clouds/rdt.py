@@ -17,11 +17,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.measure import marching_cubes
 
+from rtradar.clouds.sampling import UniformSample
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-
-_WITH_REPLACEMENT = 1
-"""Marks the random stream that draws with replacement, apart from that of the keys."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +66,7 @@ class RdtCloud:
 
     def __init__(self, radar: Radar, n_points: int = 3000, seed: int = 0) -> None:
         self._radar = radar
-        self._sample = _SmallestKeys(n_points, seed)
+        self._sample = UniformSample(n_points, seed)
         self._last: NDArray[np.bool_] | None = None
         self._last_time = 0.0
         self._n_voxels = 0
@@ -109,7 +107,7 @@ class RdtCloud:
         if self._last is not None:
             self._slab(self._last, np.zeros_like(self._last), self._last_time, self._last_time + self._radar.frame_hop_s)
             self._last = None
-        return RdtCloudResult(self._sample.points(), self._sample.n_seen, self._n_voxels)
+        return RdtCloudResult(self._sample.filled(), self._sample.n_seen, self._n_voxels)
 
     def _slab(self, first: NDArray[np.bool_], second: NDArray[np.bool_], start_s: float, end_s: float) -> None:
         vertices, faces = _surface(np.stack([first, second]), np.array([start_s, end_s]), self._radar)
@@ -177,39 +175,9 @@ def sample_centres(vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, 
     InputError
         Where ``n_points`` or ``seed`` is out of its range.
     """
-    sample = _SmallestKeys(n_points, seed)
+    sample = UniformSample(n_points, seed)
     sample.add(_centres(np.asarray(vertices, dtype=np.float64).reshape(-1, 3), np.asarray(faces, dtype=np.int64).reshape(-1, 3)))
-    return sample.points()
-
-
-class _SmallestKeys:
-    """A uniform sample of a stream: every item gets a random key, those with the least keys stay."""
-
-    def __init__(self, n_points: int, seed: int) -> None:
-        for name, value, least in (("n_points", n_points, 1), ("seed", seed, 0)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-                raise InputError(f"RDT cloud: {name} = {value!r}; it must be a whole number, at least {least}")
-        self._n_points = int(n_points)
-        self._seed = int(seed)
-        self._random = np.random.default_rng(self._seed)
-        self._keys = np.zeros(0)
-        self._items = np.zeros((0, 3))
-        self.n_seen = 0
-
-    def add(self, items: NDArray[np.float64]) -> None:
-        keys = np.concatenate([self._keys, self._random.random(len(items))])
-        both = np.concatenate([self._items, items])
-        if len(keys) > self._n_points:
-            kept = np.argpartition(keys, self._n_points - 1)[: self._n_points]
-            keys, both = keys[kept], both[kept]
-        self._keys, self._items = keys, both
-        self.n_seen += len(items)
-
-    def points(self) -> NDArray[np.float64]:
-        ordered = self._items[np.argsort(self._keys)]
-        if not 0 < len(ordered) < self._n_points:
-            return ordered
-        return ordered[np.random.default_rng([self._seed, _WITH_REPLACEMENT]).integers(len(ordered), size=self._n_points)]
+    return sample.filled()
 
 
 def _centres(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -1,18 +1,36 @@
-"""From IF samples to range-Doppler maps and their detections."""
+"""From IF samples to range-Doppler maps, their detections, directions and spectrograms."""
 
+from rtradar.process.angle import AngleSpectra, angle, angle_spectra
+from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
+from rtradar.process.cells import cell_spectra
 from rtradar.process.cfar import ca_cfar, os_cfar
 from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum
+from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
+from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram
+from rtradar.process.steering import measures_angle
 from rtradar.process.windows import SlidingWindows
 
 __all__ = [
+    "SPECTROGRAM_CYCLES",
+    "AngleSpectra",
     "RangeDoppler",
+    "SlidingSpectrogram",
     "SlidingWindows",
+    "Spectrogram",
+    "angle",
+    "angle_grid",
+    "angle_spectra",
     "ca_cfar",
     "ca_scale",
+    "cell_spectra",
+    "measures_angle",
     "os_cfar",
     "os_scale",
     "power_map",
+    "range_azimuth",
     "range_doppler",
+    "range_elevation",
     "range_spectrum",
+    "spectrogram",
 ]

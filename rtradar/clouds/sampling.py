@@ -1,0 +1,67 @@
+"""A uniform sample of a stream that is too long to keep."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+
+_WITH_REPLACEMENT = 1
+"""Marks the random stream that draws with replacement, apart from that of the keys."""
+
+
+class UniformSample:
+    """Rows of a stream, every subset of them equally likely: each row gets a random key, those with the least keys stay.
+
+    Parameters
+    ----------
+    n_rows : int
+        Rows kept.
+    seed : int
+        Of the keys; the same stream and seed give the same sample, however the stream is cut.
+    columns : int
+        Numbers in a row.
+
+    Attributes
+    ----------
+    n_seen : int
+        Rows so far.
+
+    Raises
+    ------
+    InputError
+        Where ``n_rows`` or ``seed`` is out of its range.
+    """
+
+    def __init__(self, n_rows: int, seed: int, columns: int = 3) -> None:
+        for name, value, least in (("n_points", n_rows, 1), ("seed", seed, 0)):
+            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+                raise InputError(f"cloud: {name} = {value!r}; it must be a whole number, at least {least}")
+        self._n_rows = int(n_rows)
+        self._seed = int(seed)
+        self._random = np.random.default_rng(self._seed)
+        self._keys = np.zeros(0)
+        self._rows = np.zeros((0, columns))
+        self.n_seen = 0
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Take the next rows, (row, column) float64."""
+        keys = np.concatenate([self._keys, self._random.random(len(rows))])
+        both = np.concatenate([self._rows, rows])
+        if len(keys) > self._n_rows:
+            kept = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
+            keys, both = keys[kept], both[kept]
+        self._keys, self._rows = keys, both
+        self.n_seen += len(rows)
+
+    def rows(self) -> NDArray[np.float64]:
+        """The sample, at most ``n_rows``, in random order: any first part of it is a sample too."""
+        return np.asarray(self._rows[np.argsort(self._keys)])
+
+    def filled(self) -> NDArray[np.float64]:
+        """Exactly ``n_rows``: drawn with replacement where fewer were seen; none where none was."""
+        rows = self.rows()
+        if not 0 < len(rows) < self._n_rows:
+            return rows
+        return rows[np.random.default_rng([self._seed, _WITH_REPLACEMENT]).integers(len(rows), size=self._n_rows)]

@@ -1,0 +1,128 @@
+"""Spatial point cloud: detected cells placed in the room by their range and angles (paper, eq. 19)."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds.files import atomic_file
+from rtradar.errors import InputError
+from rtradar.process.angle import AngleSpectra
+from rtradar.process.peaks import Peaks, find_peaks
+from rtradar.radar import Radar
+
+SPATIAL_AXES = ("x", "y", "z")
+"""Names of the coordinates of a spatial cloud, world axes."""
+
+SPATIAL_UNITS = ("m", "m", "m")
+"""Their units."""
+
+
+@dataclass(frozen=True)
+class SpatialCloud:
+    """Points in the room, each with what the radar knows of it.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        World axes [m].
+    velocity : (n,) float64
+        Range rate [m/s], positive receding.
+    power : (n,) float64
+        Power of one channel, in the unit of the IF squared: an echo of amplitude 1 reads 1.
+    time : (n,) float64
+        Centre of the window [s].
+
+    Raises
+    ------
+    InputError
+        Where the shapes do not fit each other or a value is not finite.
+    """
+
+    points: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+    power: NDArray[np.float64]
+    time: NDArray[np.float64]
+
+    def __post_init__(self) -> None:
+        for field in ("points", "velocity", "power", "time"):
+            values = np.asarray(getattr(self, field), dtype=np.float64)
+            object.__setattr__(self, field, values)
+            if values.shape != ((len(self.points), 3) if field == "points" else (len(self.points),)):
+                raise InputError(f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)")
+            if not np.isfinite(values).all():
+                raise InputError(f"spatial cloud: {field} holds NaN or infinity; every value must be finite")
+
+
+def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> SpatialCloud:
+    """Points of one window: for each cell the peaks of both lines, put together.
+
+    The lines know nothing of each other: which peak of the one belongs to which of the other is not measured. They are paired by
+    the rank of their power, and where one line has fewer peaks its strongest stands in. Two echoes of equal power in a cell
+    may so exchange their elevations. A pair that is no direction at all (u^2 + w^2 > 1) is left out. A radar with one line
+    alone has all points in the plane of that line.
+
+    Parameters
+    ----------
+    spectra : AngleSpectra
+        Of the detected cells.
+    radar : Radar
+        Its axes are parallel to the world's.
+    time_s : float
+        Centre of the window [s].
+
+    Returns
+    -------
+    SpatialCloud
+        Cell by cell, the strongest pair first; the power of a point is the mean of its two peaks.
+    """
+    y, z = _peaks(spectra)
+    forward = 1 - y.sine**2 - z.sine**2
+    cell, rank = np.nonzero((y.real | z.real) & (forward >= 0))
+    direction = np.stack([np.sqrt(forward[cell, rank]), y.sine[cell, rank], z.sine[cell, rank]], axis=1)
+    return SpatialCloud(
+        np.asarray(radar.position_m) + spectra.range_m[cell, None] * direction,
+        spectra.velocity[cell],
+        (y.power[cell, rank] + z.power[cell, rank]) / 2,
+        np.full(len(cell), time_s),
+    )
+
+
+def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
+    """Write a cloud as a NumPy archive: ``points (n, 3)``, ``velocity``, ``power``, ``time (n,)``, ``axes``, ``units (3,)``.
+
+    Parameters
+    ----------
+    path : path
+        Replaced if it is there, whole or not at all.
+    cloud : SpatialCloud
+        May be empty.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written.
+    """
+    with atomic_file(path) as file:
+        np.savez_compressed(
+            file,
+            points=cloud.points,
+            velocity=cloud.velocity,
+            power=cloud.power,
+            time=cloud.time,
+            axes=np.array(SPATIAL_AXES),
+            units=np.array(SPATIAL_UNITS),
+        )
+
+
+def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:
+    """Peaks of both lines; a line that is not there has sine 0 and the power of the other."""
+    y, z = (None if power is None else find_peaks(spectra.sines, power) for power in (spectra.y, spectra.z))
+    known = y or z
+    if known is None:
+        raise InputError("spatial cloud: the spectra are of no line at all; take them from angle_spectra")
+    flat = Peaks(np.zeros_like(known.sine), known.power, known.real)
+    return y or flat, z or flat

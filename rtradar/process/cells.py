@@ -1,0 +1,88 @@
+"""Complex Doppler values of chosen range-Doppler cells, without the whole map of every channel.
+
+A window has some hundred detected cells among 30 000 to 170 000, in a few dozen range bins: only these are transformed.
+"""
+
+from __future__ import annotations
+
+import os
+
+import numpy as np
+import scipy.fft
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+from rtradar.process.spectra import hann
+from rtradar.process.steering import range_walk
+from rtradar.radar import Radar
+
+_BINS_PER_BLOCK = 8  # neighbours in memory: what one line of the cache brings is used at once
+
+
+def cell_spectra(
+    spectra: NDArray[np.complexfloating], radar: Radar, range_bins: ArrayLike, velocity_bins: ArrayLike
+) -> NDArray[np.complexfloating]:
+    """Values of chosen cells in every channel, with those of the range bins beside them.
+
+    An echo from the side reaches the ends of the array sooner and later than the middle, by more than a range bin: its
+    channels stand in the neighbours of its cell.
+
+    Parameters
+    ----------
+    spectra : (cycle, tx, rx, range) complex
+        Range spectra of one window, from `range_spectrum`.
+    radar : Radar
+        Gives the shape.
+    range_bins, velocity_bins : (cell,) int
+        Indices of the cells in the map of `power_map`: velocity ascending, zero at ``n_cycles // 2``.
+
+    Returns
+    -------
+    (cell, offset, channel) complex
+        What `range_doppler` gives at range bins ``-walk`` to ``+walk`` about each cell, walk = `range_walk` of the radar (offset
+        ``walk`` is the cell itself; past the end of the range axis it goes on at the other), in the precision of ``spectra``.
+        Periodic Hann window in slow time with coherent gain 1; channel = tx * n_rx + rx. The phase that a moving echo gains
+        between the Tx of one cycle is left in.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, the cells are no whole numbers within the map, or the radar has no line
+        that could tell an angle.
+    """
+    cube = np.asarray(spectra)
+    if cube.ndim != 4 or cube.shape[1:3] != (radar.n_tx, radar.n_rx) or cube.shape[0] < 1 or cube.dtype.kind != "c":
+        raise InputError(
+            f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar '{radar.name}' needs complex "
+            f"(cycle, tx, rx, range) = (>= 1, {radar.n_tx}, {radar.n_rx}, any)"
+        )
+    n_cycles, n_range = cube.shape[0], cube.shape[3]
+    rows = _indices(range_bins, n_range, "range_bins")
+    columns = _indices(velocity_bins, n_cycles, "velocity_bins")
+    if rows.shape != columns.shape:
+        raise InputError(f"cell_spectra: {len(rows)} range_bins and {len(columns)} velocity_bins; give one of each for a cell")
+    walk = range_walk(radar)
+    steps = (rows[:, None] + np.arange(-walk, walk + 1)) % n_range
+    # Index 0 of the map is the DFT bin of the most negative velocity.
+    turns = np.broadcast_to(((columns - n_cycles // 2) % n_cycles)[:, None], steps.shape)
+    values = np.empty((*steps.shape, radar.n_channels), dtype=cube.dtype)
+    window = hann(n_cycles) / hann(n_cycles).sum()
+    weights = window.astype(cube.real.dtype)[:, None, None]
+    slow_time = cube.reshape(n_cycles, radar.n_channels, n_range)
+    used = np.unique(steps)
+    for first in range(0, len(used), _BINS_PER_BLOCK):
+        wanted = used[first : first + _BINS_PER_BLOCK]
+        weighted = np.multiply(slow_time[:, :, wanted], weights, dtype=cube.dtype)
+        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True, workers=os.cpu_count())
+        here = (steps >= wanted[0]) & (steps <= wanted[-1])
+        values[here] = np.moveaxis(doppler, 2, 1)[turns[here], np.searchsorted(wanted, steps[here])]
+    return values
+
+
+def _indices(bins: ArrayLike, n: int, name: str) -> NDArray[np.int64]:
+    indices = np.asarray(bins)
+    if indices.ndim == 1 and indices.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    if indices.ndim != 1 or indices.dtype.kind not in "iu" or indices.min() < 0 or indices.max() >= n:
+        raise InputError(f"cell_spectra: {name} must be whole numbers (cell,) from 0 to {n - 1}")
+    return indices.astype(np.int64)

@@ -1,0 +1,65 @@
+"""The few highest maxima of angle spectra that are neither side lobes nor noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.process.angle import refine
+
+MOST_PEAKS = 3
+"""Peaks taken of one spectrum."""
+
+BELOW_HIGHEST_DB = 10.0
+"""Peaks further below the highest are left out. Of a moving echo off the boresight, whose elements read different range bins,
+side lobes of the Taylor taper reach -17 dB; where two such lobes meet, -11 dB."""
+
+ABOVE_MEDIAN_DB = 11.0
+"""So are peaks, the highest excepted, nearer to the median of their spectrum; noise alone passes it in 2 of 100 spectra."""
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Highest maxima of a number of spectra, the strongest first.
+
+    Parameters
+    ----------
+    sine, power : (cell, peak) float64
+        Refined between the points of the grid.
+    real : (cell, peak) bool
+        False where a cell has fewer peaks; sine and power are those of its strongest there. A cell with any power has one.
+    """
+
+    sine: NDArray[np.float64]
+    power: NDArray[np.float64]
+    real: NDArray[np.bool_]
+
+
+def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
+    """Up to `MOST_PEAKS` maxima of each spectrum.
+
+    Parameters
+    ----------
+    sines : (sine,) float64
+        Uniform grid.
+    power : (cell, sine) float32
+
+    Returns
+    -------
+    Peaks
+    """
+    highest = power.max(axis=1, keepdims=True)
+    floor = np.maximum(
+        highest * np.float32(10 ** (-BELOW_HIGHEST_DB / 10)),
+        np.minimum(highest, np.median(power, axis=1, keepdims=True) * np.float32(10 ** (ABOVE_MEDIAN_DB / 10))),
+    )
+    maximum = (power > 0) & (power >= floor)
+    maximum[:, 1:] &= power[:, 1:] > power[:, :-1]
+    maximum[:, :-1] &= power[:, :-1] >= power[:, 1:]
+    candidates = np.where(maximum, power, np.float32(0))
+    index = np.argsort(candidates, axis=1)[:, : -MOST_PEAKS - 1 : -1]
+    real = np.take_along_axis(candidates, index, axis=1) > 0
+    index = np.where(real, index, index[:, :1])
+    return Peaks(*refine(sines, power, index), real)

@@ -1,0 +1,190 @@
+"""The two virtual lines of the cross, and the phases by which a direction is told on them.
+
+An echo that reaches Rx j from Tx i over L_ij metres stands in its range bin with the phase 2 pi f L_ij / c, f the middle of
+the sweep. Tx and Rx of the y-line lie at (0, t, 0) and (0, q, 0) about the radar, so the way to a point P at range r is
+|P|^2 - 2 t P_y + t^2 under the root: it depends on the sine u = P_y / r alone and tells nothing of the elevation. The z-line
+tells w = P_z / r alike. Both sines are exact at any range, near field included.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+Taper = Literal["uniform", "taylor"]
+"""Weights of the elements of a line."""
+
+SIDE_LOBE_DB = 25.0
+"""Side lobes of the Taylor taper below the main lobe, in the far field."""
+
+_OVERSAMPLING = 4  # sines for each resolution cell of the longest line
+_TAYLOR_EQUAL_LOBES = 4
+
+
+@dataclass(frozen=True)
+class Line:
+    """One virtual line: the channels whose Tx and Rx both lie on it.
+
+    Parameters
+    ----------
+    axis : {1, 2}
+        World axis of the line, y or z.
+    channels : (element,) int64
+        Channel of each element, tx * n_rx + rx.
+    tx_m, rx_m : (element,) float64
+        Place of its Tx and of its Rx along the line, about the radar [m].
+    """
+
+    axis: int
+    channels: NDArray[np.int64]
+    tx_m: NDArray[np.float64]
+    rx_m: NDArray[np.float64]
+
+    def excess_m(self, sines: ArrayLike, range_m: float | None) -> NDArray[np.float64]:
+        """Path over each element less twice the range, (..., element) [m].
+
+        Parameters
+        ----------
+        sines : (...) float
+            Sine of the direction along the line.
+        range_m : float or None
+            Range of the point; None for a plane wave.
+        """
+        u = np.asarray(sines, dtype=np.float64)[..., None]
+        if range_m is None:
+            return np.asarray(-(self.tx_m + self.rx_m) * u)
+        there, back = (np.sqrt(range_m**2 - 2 * range_m * place * u + place**2) for place in (self.tx_m, self.rx_m))
+        return np.asarray(there + back - 2 * range_m)
+
+
+@lru_cache(maxsize=16)
+def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
+    """The y-line and the z-line; None where a line has fewer than two elements.
+
+    Channels of a Tx on one line and an Rx on the other, which ``channels = "all"`` has, belong to neither.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no such line at all.
+    """
+    lines = _line(radar, 1), _line(radar, 2)
+    if not measures_angle(radar):
+        raise InputError(
+            f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx (or 2 Tx and an Rx) along y or z"
+        )
+    return lines
+
+
+def measures_angle(radar: Radar) -> bool:
+    """Whether there is a line of at least two channels."""
+    return max(radar.tx_y * radar.rx_y, radar.tx_z * radar.rx_z) > 1
+
+
+def _line(radar: Radar, axis: int) -> Line | None:
+    on_line = [np.arange(n) < along_y for n, along_y in ((radar.n_tx, radar.tx_y), (len(radar.rx), radar.rx_y))]
+    tx_there, rx_there = on_line if axis == 1 else [~there for there in on_line]
+    tx, slot = np.nonzero(tx_there[:, None] & rx_there[radar.rx_of_tx])
+    if len(tx) < 2:
+        return None
+    centre = radar.position_m[axis]
+    places = radar.tx[tx, axis] - centre, radar.rx[radar.rx_of_tx[tx, slot], axis] - centre
+    return Line(axis, np.asarray(tx * radar.n_rx + slot, dtype=np.int64), *places)
+
+
+@lru_cache(maxsize=16)
+def sine_grid(radar: Radar) -> NDArray[np.float64]:
+    """Uniform grid of sines (sine,) within the unambiguous angle, fine enough for a parabola through three of them."""
+    largest = np.sin(np.radians(radar.max_angle_deg))
+    apertures = [np.ptp(line.tx_m + line.rx_m) / radar.wavelength_m for line in virtual_lines(radar) if line is not None]
+    half = int(np.ceil(_OVERSAMPLING * largest * max(apertures))) + 1
+    grid = np.linspace(-largest, largest, 2 * half + 1)
+    grid.flags.writeable = False
+    return grid
+
+
+def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
+    """Weights of the elements (element,), sum 1, by their place on the virtual line."""
+    if taper == "uniform":
+        return np.full(len(line.channels), 1 / len(line.channels))
+    from scipy.signal.windows import taylor  # here, for scipy.signal is slow to import
+
+    places = line.tx_m + line.rx_m
+    count = len(places)
+    window = taylor(count, nbar=_TAYLOR_EQUAL_LOBES, sll=SIDE_LOBE_DB)
+    # A line without gaps gets the window itself.
+    weights = np.interp(places, np.linspace(places.min(), places.max(), count), window)
+    return np.asarray(weights / weights.sum())
+
+
+@lru_cache(maxsize=16)
+def range_walk(radar: Radar) -> int:
+    """Range bins on either side of a cell in which the elements see an echo of that cell from the side."""
+    largest = float(sine_grid(radar)[-1])
+    ways = [np.abs(line.tx_m + line.rx_m).max() for line in virtual_lines(radar) if line is not None]
+    return int(np.ceil(max(ways) * largest / 2 / radar.range_bin_m))
+
+
+@dataclass(frozen=True)
+class Steering:
+    """What brings the echo of a point in a range bin into phase on all elements of a line, for every sine of `sine_grid`.
+
+    Parameters
+    ----------
+    weights : (element, sine) complex64
+        Phases taken back, times the taper.
+    runs : (run, 4) int64
+        Where each element is read: element, offset, first sine, sine after the last. The offset counts from 0 at
+        `range_walk` bins before the bin of the cell.
+    """
+
+    weights: NDArray[np.complex64]
+    runs: NDArray[np.int64]
+
+
+# 512: both lines, all 256 range bins of the paper's radars, 75 kB each.
+@lru_cache(maxsize=512)
+def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> Steering:
+    """Phases and range bins of a line for points at one range.
+
+    Parameters
+    ----------
+    radar : Radar
+    axis : {1, 2}
+        Which line.
+    range_bin : int or None
+        Range of the point, whose echo is looked for in the bin nearest to half its path over each element; None for a
+        plane wave, looked for in the bin of the cell alone (the far-field FFT).
+    taper : {"uniform", "taylor"}
+        As in `taper_weights`.
+    """
+    line = virtual_lines(radar)[axis - 1]
+    if line is None:
+        raise InputError(f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one")
+    reach = range_walk(radar)
+    excess = line.excess_m(sine_grid(radar), None if range_bin is None else radar.range_bin_m * range_bin)
+    steps = np.zeros(excess.shape) if range_bin is None else np.rint(excess / (2 * radar.range_bin_m))
+    offsets = np.clip(steps, -reach, reach).astype(np.int64)
+    # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
+    turns = excess * (radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
+    weights = np.ascontiguousarray((np.exp(-2j * np.pi * turns) * taper_weights(line, taper)).T.astype(np.complex64))
+    weights.flags.writeable = False
+    return Steering(weights, _runs(offsets.T + reach))
+
+
+def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Stretches of sines along which an element is read at the same offset, from offsets (element, sine)."""
+    n_sines = offsets.shape[1]
+    fresh = np.ones(offsets.shape, dtype=np.bool_)
+    fresh[:, 1:] = np.diff(offsets, axis=1) != 0
+    element, first = np.nonzero(fresh)
+    last = np.append(first[1:], 0)
+    return np.stack([element, offsets[element, first], first, np.where(last == 0, n_sines, last)], axis=1)
