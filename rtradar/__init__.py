@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, InputError, ValidityWarning
     from rtradar.motion import Motion, load_motion, synthetic_motion
-    from rtradar.pipeline import Result, run
+    from rtradar.pipeline import Comparison, Result, compare, run
     from rtradar.radar import Radar
     from rtradar.scatter import scattering_length
     from rtradar.scene import Scene
@@ -24,6 +24,7 @@ __version__ = "0.1.0"
 _HOME = {
     "BackendError": "errors",
     "Body": "body",
+    "Comparison": "pipeline",
     "Echoes": "echoes",
     "Ellipsoids": "body",
     "InputError": "errors",
@@ -32,6 +33,7 @@ _HOME = {
     "Result": "pipeline",
     "Scene": "scene",
     "ValidityWarning": "errors",
+    "compare": "pipeline",
     "load_motion": "motion",
     "run": "pipeline",
     "scattering_length": "scatter",
@@ -42,6 +44,7 @@ _MODULES = ("process", "rcs", "signal")
 __all__ = [
     "BackendError",
     "Body",
+    "Comparison",
     "Echoes",
     "Ellipsoids",
     "InputError",
@@ -50,6 +53,7 @@ __all__ = [
     "Result",
     "Scene",
     "ValidityWarning",
+    "compare",
     "load_motion",
     "process",
     "rcs",

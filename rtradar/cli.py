@@ -1,4 +1,4 @@
-"""The command line: ``rtradar doctor`` and ``rtradar run``.
+"""The command line: ``rtradar doctor``, ``rtradar run`` and ``rtradar compare``.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
 and how to mend it.
@@ -84,6 +84,25 @@ def _parser() -> argparse.ArgumentParser:
     doctor.set_defaults(command=_doctor)
 
     run = commands.add_parser("run", help="one recording in; maps, clouds, pictures and a summary out")
+    run.add_argument("--fidelity", default="specular", help="analytic-paper, analytic or specular (default: specular)")
+    run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
+    _add_capture(run)
+    run.set_defaults(command=_run)
+
+    compare = commands.add_parser("compare", help="one recording by several rungs, with the same noise, and what differs")
+    compare.add_argument(
+        "--fidelities",
+        default="analytic-paper,analytic,specular",
+        metavar="A,B,...",
+        help="two or more, the last is the reference (default: analytic-paper,analytic,specular)",
+    )
+    _add_capture(compare)
+    compare.set_defaults(command=_compare)
+    return parser
+
+
+def _add_capture(run: argparse.ArgumentParser) -> None:
+    """What every command that simulates a capture asks for."""
     run.add_argument("motion", metavar="MOTION", help="an .amc or .bvh file, or synthetic:walk, :kick, :punch, :jumping_jack")
     run.add_argument("--skeleton", type=Path, metavar="ASF", help="the .asf of an .amc recording")
     run.add_argument(
@@ -92,7 +111,6 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--scene", default="free-space", metavar="NAME|TOML", help="a scene by name, or a TOML file (default: free-space)"
     )
-    run.add_argument("--fidelity", default="specular", help="analytic-paper, analytic or specular (default: specular)")
     run.add_argument("--start", type=_seconds, default=0.0, metavar="S", help="where the interval begins [s] (default: 0)")
     run.add_argument("--duration", type=_seconds, metavar="S", help="how long it is [s] (default: to the end; synthetic: 3)")
     run.add_argument(
@@ -107,11 +125,8 @@ def _parser() -> argparse.ArgumentParser:
         "--variant", choices=("auto", "llvm", "scalar", "cuda"), default="auto", help="Mitsuba's backend (default: auto)"
     )
     run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
-    run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
     run.add_argument("--json", type=Path, metavar="FILE", help="write the summary there too")
-    run.set_defaults(command=_run)
-    return parser
 
 
 def _doctor(options: argparse.Namespace) -> int:
@@ -121,6 +136,35 @@ def _doctor(options: argparse.Namespace) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    capture = _capture(options)
+    from rtradar.pipeline import run
+
+    result = run(**capture, fidelity=options.fidelity, save_if=options.save_if)
+    if options.json is not None:
+        _write_json(options.json, result.summary)
+    said = result.summary
+    print(
+        f"{said['rdt_points']} points from {said['detections']} detections in {said['windows']} windows; "
+        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; "
+        f"see {options.out}"
+    )
+    return 0
+
+
+def _compare(options: argparse.Namespace) -> int:
+    capture = _capture(options)
+    from rtradar.pipeline import compare
+
+    found = compare(**capture, fidelities=[name.strip() for name in options.fidelities.split(",")])
+    if options.json is not None:
+        _write_json(options.json, found.summary)
+    print(found.table())
+    print(f"see {options.out / 'compare.html'}")
+    return 0
+
+
+def _capture(options: argparse.Namespace) -> dict[str, Any]:
+    """What `run` and `compare` take alike."""
     # A JSON file that cannot be written is found out before the work, not after it.
     if options.json is not None and not options.json.resolve().parent.is_dir():
         raise InputError(f"--json {options.json}: there is no folder '{options.json.resolve().parent}'; make it first")
@@ -138,33 +182,20 @@ def _run(options: argparse.Namespace) -> int:
     else:
         motion = load_motion(options.motion, skeleton=options.skeleton)
 
-    from rtradar.pipeline import run
-
-    result = run(
-        motion,
-        radar,
-        scene,
-        out=options.out,
-        fidelity=options.fidelity,
-        start_s=options.start,
-        duration_s=options.duration,
-        heading_deg=options.heading,
-        snr_db=options.snr_db,
-        pfa=options.pfa,
-        seed=options.seed,
-        variant=options.variant,
-        spreading=not options.no_spreading,
-        save_if=options.save_if,
-    )
-    if options.json is not None:
-        _write_json(options.json, result.summary)
-    said = result.summary
-    print(
-        f"{said['rdt_points']} points from {said['detections']} detections in {said['windows']} windows; "
-        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; "
-        f"see {options.out}"
-    )
-    return 0
+    return {
+        "motion": motion,
+        "radar": radar,
+        "scene": scene,
+        "out": options.out,
+        "start_s": options.start,
+        "duration_s": options.duration,
+        "heading_deg": options.heading,
+        "snr_db": options.snr_db,
+        "pfa": options.pfa,
+        "seed": options.seed,
+        "variant": options.variant,
+        "spreading": not options.no_spreading,
+    }
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:

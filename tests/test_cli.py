@@ -62,8 +62,9 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_run_writes_all_its_files_and_nothing_else(walked: Path) -> None:
     names = {file.name for file in walked.iterdir()}
-    pictures = {"range_time.png", "range_doppler.png", "cloud_rdt.png"}
-    assert names == {"maps.h5", "cloud_rdt.npz", "cloud_rdt.ply", "summary.json", "if.zarr", *pictures}
+    pictures = {f"{name}.png" for name in ("range_time", "spectrogram", "range_doppler", "range_angle", "cloud_rdt", "cloud_xyz")}
+    clouds = {"cloud_rdt.npz", "cloud_rdt.ply", "cloud_xyz.npz"}
+    assert names == {"maps.h5", "summary.json", "report.html", "if.zarr", *pictures, *clouds}
 
 
 def test_the_summary_says_what_was_done(walked: Path) -> None:
@@ -91,6 +92,14 @@ def test_maps_open_in_xarray_with_their_axes(walked: Path) -> None:
         assert maps.time.values[0] == pytest.approx(133 * 0.75e-3 / 2)
         assert maps.velocity.attrs["units"] == "m/s"
         assert float(maps.range[1]) == pytest.approx(0.0374741, abs=1e-6)  # c / 2B
+        # 128 cycles of 266 every 6: starts at 0, 6, ... 138.
+        assert maps.spectrogram.dims == ("spectrogram_time", "spectrogram_velocity")
+        assert maps.spectrogram.shape == (24, 128)
+        assert maps.range_azimuth.dims == ("time", "range", "azimuth")
+        assert maps.range_elevation.dims == ("time", "range", "elevation")
+        # The body is to the right of the radar, 14 degrees where it stands at the origin.
+        azimuth = int(np.argmax(maps.range_azimuth.sum(("time", "range")).data))
+        assert -25 < np.degrees(float(maps.azimuth[azimuth])) < -5
         brightest = maps.range_doppler.isel(time=0).argmax(...)
         assert 3.0 < float(maps.range[brightest["range"]]) < 7.0  # the walk is about 4 m from the radar
 
@@ -104,6 +113,17 @@ def test_the_cloud_lies_where_the_person_is(walked: Path) -> None:
     assert time == pytest.approx(0.1, abs=0.05)
     assert distance == pytest.approx(4.1, abs=0.5)  # the radar is 4.1 m from the origin
     assert -4 < velocity < -0.5  # toward the radar, the swinging leg fastest
+
+
+def test_the_cloud_in_the_room_is_about_the_person(walked: Path) -> None:
+    cloud = np.load(walked / "cloud_xyz.npz")
+    assert len(cloud["points"]) == len(cloud["velocity"]) == len(cloud["power"]) == len(cloud["time"]) > 500
+    # The body walks from x = 0.1 m to -0.1 m, 0.2 m to either side of y = 0, and is 1.8 m high; a beam is 0.13 m wide.
+    x, y, z = np.median(cloud["points"], axis=0)
+    assert abs(x) < 0.4
+    assert abs(y) < 0.2
+    assert 0.5 < z < 1.5
+    assert (np.diff(cloud["time"]) >= 0).all()
 
 
 def test_if_samples_are_kept_whole(walked: Path) -> None:

@@ -1,4 +1,4 @@
-"""How far apart two results are: maps, masks, clouds. Pure functions on arrays."""
+"""How far apart two results are: maps and clouds. Pure functions on arrays."""
 
 from __future__ import annotations
 
@@ -51,12 +51,6 @@ def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
     """Cells 10 dB or more above the median, which is noise in a map of one person, and at most 60 dB below the peak."""
     values = np.asarray(power)
     return np.asarray(values > max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0))))
-
-
-def overlap(mask: NDArray[np.bool_], reference: NDArray[np.bool_]) -> float:
-    """Cells in both masks over cells in either; 1 where both are empty."""
-    either = int(np.count_nonzero(mask | reference))
-    return int(np.count_nonzero(mask & reference)) / either if either else 1.0
 
 
 def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: ArrayLike) -> float:

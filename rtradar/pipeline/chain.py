@@ -19,26 +19,22 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.body import Body
-from rtradar.clouds import RdtCloud, RdtCloudResult, save_cloud_npz, save_ply
+from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
-from rtradar.pipeline.store import MapStore
+from rtradar.pipeline.pictures import draw_pictures
+from rtradar.pipeline.products import Products
 from rtradar.pipeline.survey import Survey, survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, peak_memory_mb
-from rtradar.process import SlidingWindows, os_cfar, power_map, range_spectrum
+from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
 from rtradar.radar import Radar
-from rtradar.report import draw_range_doppler, draw_range_time, draw_rdt_cloud
+from rtradar.report import write_report
 from rtradar.scatter import Rung, build_rung
 from rtradar.scene import Scene
 from rtradar.signal import Noise, synthesize
 
-CLOUD_POINTS = 3000
-"""Points in the RDT cloud (paper, section 3.2.4)."""
-
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
-_RANGE_TIME_STEP_S = 5e-3
-_PICTURE_ROWS = 1500
 _VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh")
 
 
@@ -52,12 +48,15 @@ class Result:
         RDT cloud: time [s], range [m], velocity [m/s].
     summary : dict
         All that stands in ``summary.json``.
+    survey : Survey
+        Echo power of each part over time, and what was hidden.
     out : path
         Folder of the files.
     """
 
     points: NDArray[np.float64]
     summary: dict[str, Any]
+    survey: Survey
     out: Path
 
 
@@ -77,6 +76,7 @@ def run(
     variant: str = "auto",
     spreading: bool = True,
     save_if: bool = False,
+    noise_power_m2: float | None = None,
 ) -> Result:
     """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
 
@@ -107,6 +107,8 @@ def run(
         Whether amplitudes hold 1 / (R1 R2); off as in the paper.
     save_if : bool
         Whether IF samples are kept, in ``if.zarr``.
+    noise_power_m2 : float, optional
+        Noise power per sample [m^2], in place of ``snr_db``: for runs that shall share it.
 
     Returns
     -------
@@ -144,15 +146,39 @@ def run(
         surveyed = survey(rung, radar, body, n_chirps, spreading=spreading)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    noise = Noise.for_snr(surveyed.power, snr_db, seed)
+    noise = Noise.for_snr(surveyed.power, snr_db, seed) if noise_power_m2 is None else Noise(noise_power_m2, seed)
+    title = f"{motion.name}, {radar.name}, {fidelity}"
     with all_or_nothing(Path(out)) as folder:
-        chain = _Chain(
-            folder, radar, rung, noise, stages, n_chirps, pfa, seed, save_if, title=f"{motion.name}, {radar.name}, {fidelity}"
-        )
-        cloud = chain.stream()
+        products = Products(folder / "maps.h5", radar, pfa=pfa, seed=seed, stages=stages, title=title)
+        try:
+            kept = _if_array(folder / "if.zarr", radar, n_chirps) if save_if else None
+            _stream(radar, rung, noise, products, stages, n_chirps, kept, title)
+            clouds = products.finish()
+        finally:
+            products.close()
+        del products  # its windows are the largest arrays, and pictures need room
+        if not len(clouds.rdt.points):
+            warnings.warn("nothing was detected: the clouds are empty", ValidityWarning, stacklevel=2)
+        with stages.time("write"):
+            save_cloud_npz(folder / "cloud_rdt.npz", clouds.rdt.points)
+            save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
+            save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
+        with stages.time("pictures"):
+            pictures = draw_pictures(folder, radar, clouds, title)
         capture_s = n_chirps * radar.chirp_duration_s
-        wall_s = time.perf_counter() - began - warmup_s
-        summary = {
+
+        def cost() -> dict[str, Any]:
+            wall_s = time.perf_counter() - began - warmup_s
+            return {
+                "stages": stages.rounded(),
+                "wall_s": round(wall_s, 4),
+                "warmup_s": round(warmup_s, 4),
+                "capture_s": capture_s,
+                "real_time_factor": round(wall_s / capture_s, 4),
+                "peak_memory_mb": round(peak_memory_mb(), 1),
+            }
+
+        summary: dict[str, Any] = {
             "parameters": {
                 "motion": motion.name,
                 "scene": scene.name,
@@ -170,124 +196,53 @@ def run(
             "versions": {"python": platform.python_version(), **_versions()},
             "fidelity": fidelity,
             "variant": rung.variant,
-            "stages": {name: round(seconds, 4) for name, seconds in stages.seconds.items()},
-            "wall_s": round(wall_s, 4),
-            "warmup_s": round(warmup_s, 4),
-            "capture_s": capture_s,
-            "real_time_factor": round(wall_s / capture_s, 4),
-            "peak_memory_mb": round(peak_memory_mb(), 1),
+            **cost(),
             "windows": len(windows),
             "chirps": n_chirps,
-            "detections": cloud.n_voxels,
-            "rdt_triangles": cloud.n_triangles,
-            "rdt_points": len(cloud.points),
+            "detections": clouds.rdt.n_voxels,
+            "rdt_triangles": clouds.rdt.n_triangles,
+            "rdt_points": len(clouds.rdt.points),
+            "xyz_points": len(clouds.spatial.points),
+            "xyz_points_found": clouds.n_spatial,
             "echo_power_m2": surveyed.power if surveyed.visible else 0.0,
             "part_power_m2": surveyed.part_power,
             "noise_power_m2": noise.power,
             "limits": _limits(surveyed, [str(warning.message) for warning in caught]),
         }
-        text = json.dumps(summary, indent=2, allow_nan=False)
+        with stages.time("report"):
+            write_report(
+                folder / "report.html",
+                body=body,
+                radar=radar,
+                summary=summary,
+                pictures=pictures,
+                rdt_points=clouds.rdt.points,
+                spatial=clouds.spatial,
+            )
+        text = json.dumps(summary | cost(), indent=2, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    return Result(cloud.points, json.loads(text), Path(out))
+    return Result(clouds.rdt.points, json.loads(text), surveyed, Path(out))
 
 
-class _Chain:
-    """Signal to cloud for one capture, block by block."""
-
-    def __init__(
-        self,
-        folder: Path,
-        radar: Radar,
-        rung: Rung,
-        noise: Noise,
-        stages: Stages,
-        n_chirps: int,
-        pfa: float,
-        seed: int,
-        save_if: bool,
-        title: str,
-    ) -> None:
-        self._folder, self._radar, self._rung, self._noise, self._stages = folder, radar, rung, noise, stages
-        self._n_chirps, self._pfa, self._title = n_chirps, pfa, title
-        self._windows = SlidingWindows(radar)
-        self._cloud = RdtCloud(radar, CLOUD_POINTS, seed)
-        self._busiest: tuple[int, float, NDArray[Any], NDArray[Any]] | None = None
-        self._if = _if_array(folder / "if.zarr", radar, n_chirps) if save_if else None
-
-    def stream(self) -> RdtCloudResult:
-        """All blocks, then files and pictures."""
-        radar = self._radar
-        block = math.ceil(radar.frame_hop_s / radar.cycle_duration_s) * radar.n_tx
-        fixed = {"range": radar.range_m, "velocity": radar.velocity_mps(radar.cycles_per_frame)}
-        path = self._folder / "maps.h5"
-        with MapStore(path, fixed, {"title": self._title}) as store:
-            for first in tqdm(range(0, self._n_chirps, block), desc=self._title, unit="block", disable=None):
-                samples = self._samples(np.arange(first, min(first + block, self._n_chirps)))
-                if self._if is not None:
-                    with self._stages.time("write"):
-                        self._if[first : first + len(samples)] = samples
-                with self._stages.time("range"):
-                    spectra = range_spectrum(samples, radar)
-                self._range_time(store, spectra, first)
-                for _, start, cube in self._windows.push(spectra):
-                    self._window(store, start, cube)
-        with self._stages.time("cloud"):
-            cloud = self._cloud.finish()
-        if not len(cloud.points):
-            warnings.warn("nothing was detected: the RDT cloud is empty", ValidityWarning, stacklevel=3)
-        with self._stages.time("write"):
-            save_cloud_npz(self._folder / "cloud_rdt.npz", cloud.points)
-            save_ply(self._folder / "cloud_rdt.ply", cloud.points)
-        with self._stages.time("pictures"):
-            self._draw(path, cloud)
-        return cloud
-
-    def _samples(self, chirps: NDArray[np.int64]) -> NDArray[np.complex64]:
-        with self._stages.time("scatter"):
-            echoes = self._rung.echoes(chirps)
-        with self._stages.time("signal"):
-            times = self._radar.chirp_times(len(chirps), int(chirps[0]))
-            samples = synthesize(echoes, self._radar, times, dtype=np.complex64)
-        with self._stages.time("noise"):
-            self._noise.add(samples, self._radar, int(chirps[0]))
-        return samples
-
-    def _range_time(self, store: MapStore, spectra: NDArray[np.complex64], first: int) -> None:
-        rows = max(1, round(_RANGE_TIME_STEP_S / self._radar.cycle_duration_s)) * self._radar.n_tx
-        with self._stages.time("range"):
-            for begin in range(0, len(spectra), rows):
-                part = spectra[begin : begin + rows]
-                power = (part.real**2 + part.imag**2).mean(axis=(0, 1))
-                store.append("slow_time", (first + begin + len(part) / 2) * self._radar.chirp_duration_s, range_time=power)
-
-    def _window(self, store: MapStore, start: int, cube: NDArray[np.complex64]) -> None:
-        radar = self._radar
-        with self._stages.time("doppler"):
-            power = power_map(cube, radar)
-        with self._stages.time("cfar"):
-            mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
-        middle = float(radar.window_times(np.array([start]))[0])
-        with self._stages.time("cloud"):
-            self._cloud.push(mask, middle)
-        with self._stages.time("write"):
-            store.append("time", middle, range_doppler=power, detections=mask)
-        count = int(mask.sum())
-        if self._busiest is None or count > self._busiest[0]:
-            self._busiest = (count, middle, power, mask)
-
-    def _draw(self, maps: Path, cloud: RdtCloudResult) -> None:
-        import h5py
-
-        with h5py.File(maps) as file:
-            slow_time = file["slow_time"][:]
-            every = math.ceil(len(slow_time) / _PICTURE_ROWS)
-            power = file["range_time"][::every]
-        draw_range_time(self._folder / "range_time.png", power, slow_time[::every], self._radar, self._title)
-        if self._busiest is not None:
-            _, middle, busiest, mask = self._busiest
-            title = f"{self._title}, window at {middle:.2f} s"
-            draw_range_doppler(self._folder / "range_doppler.png", busiest, mask, self._radar, title)
-        draw_rdt_cloud(self._folder / "cloud_rdt.png", cloud.points, self._title)
+def _stream(
+    radar: Radar, rung: Rung, noise: Noise, products: Products, stages: Stages, n_chirps: int, kept: Any, title: str
+) -> None:
+    """Echoes, IF samples, noise and range spectra, a hop of the windows at a time."""
+    block = math.ceil(radar.frame_hop_s / radar.cycle_duration_s) * radar.n_tx
+    for first in tqdm(range(0, n_chirps, block), desc=title, unit="block", disable=None):
+        chirps = np.arange(first, min(first + block, n_chirps))
+        with stages.time("scatter"):
+            echoes = rung.echoes(chirps)
+        with stages.time("signal"):
+            samples = synthesize(echoes, radar, radar.chirp_times(len(chirps), first), dtype=np.complex64)
+        with stages.time("noise"):
+            noise.add(samples, radar, first)
+        if kept is not None:
+            with stages.time("write"):
+                kept[first : first + len(samples)] = samples
+        with stages.time("range"):
+            spectra = range_spectrum(samples, radar)
+        products.take(spectra, first)
 
 
 def _check(snr_db: float, pfa: float, seed: int) -> None:
@@ -303,6 +258,9 @@ def _warm_up(rung: Rung, radar: Radar) -> None:
     """Compile, or load from disk, all that is compiled on first use, so that times are of the work."""
     synthesize(rung.echoes(np.arange(radar.n_tx)), radar, radar.chirp_times(radar.n_tx), dtype=np.complex64)
     os_cfar(np.ones((16, 16), dtype=np.float32), looks=radar.n_channels)
+    if measures_angle(radar):
+        cycle = np.zeros((1, radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex64)
+        angle_spectra(cell_spectra(cycle, radar, [0], [0]), radar, [0.0], [0.0])
 
 
 def _if_array(path: Path, radar: Radar, n_chirps: int) -> Any:

@@ -1,28 +1,39 @@
-"""Maps to an HDF5 file, window by window, with their axes: netCDF-4 to those who read it so."""
+"""Maps to an HDF5 file, step by step, with their axes: netCDF-4 to those who read it so."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 _AXES = {
     "time": ("s", "centre of the processing window since the start of the capture"),
     "slow_time": ("s", "centre of the averaged cycles since the start of the capture"),
+    "spectrogram_time": ("s", "centre of the spectrogram's window since the start of the capture"),
     "range": ("m", "half the path from Tx to Rx"),
     "velocity": ("m/s", "rate of range, positive receding"),
+    "spectrogram_velocity": ("m/s", "rate of range, positive receding"),
+    "azimuth": ("rad", "atan2(y, x) in the radar's frame, positive to the left of its boresight"),
+    "elevation": ("rad", "asin(z / r) in the radar's frame, positive upward"),
 }
+
+_GROWING = ("time", "slow_time", "spectrogram_time")
 
 _MAPS = {
     "range_doppler": (("time", "range", "velocity"), np.float32, "m2", "power summed over all channels"),
     "detections": (("time", "range", "velocity"), np.uint8, "1", "1 where OS-CFAR detects"),
     "range_time": (("slow_time", "range"), np.float32, "m2", "power averaged over channels and a few cycles"),
+    "spectrogram": (("spectrogram_time", "spectrogram_velocity"), np.float32, "m2", "power of one channel summed over range"),
+    "range_azimuth": (("time", "range", "azimuth"), np.float32, "m2", "power summed over detected cells"),
+    "range_elevation": (("time", "range", "elevation"), np.float32, "m2", "power summed over detected cells"),
 }
+
+_SPARSE = ("detections", "range_azimuth", "range_elevation")
+"""Mostly zeros, which cost nothing once packed."""
 
 
 class MapStore:
@@ -33,44 +44,52 @@ class MapStore:
     path : path
         Written anew.
     fixed : mapping of str to (n,) float64
-        The axes whose values are known: ``range`` and ``velocity``.
+        The axes whose values are known, such as ``range`` and ``velocity``. Maps with another axis that does not grow are
+        left out: a radar without a z-line has no elevation.
     attributes : mapping
         Of the file.
     """
 
     def __init__(self, path: Path, fixed: Mapping[str, NDArray[np.float64]], attributes: Mapping[str, Any]) -> None:
-        self._file = h5py.File(path, "w")
+        # The newest format indexes growing data in constant memory.
+        self._file = h5py.File(path, "w", libver="latest")
         for key, value in attributes.items():
             self._file.attrs[key] = value
-        for name, (unit, meaning) in _AXES.items():
-            values = fixed.get(name)
+        for name in (*_GROWING, *fixed):
+            growing = name in _GROWING
             axis = self._file.create_dataset(
                 name,
-                data=np.zeros(0) if values is None else values,
-                maxshape=(None,) if values is None else values.shape,
-                chunks=(1024,) if values is None else None,
+                data=np.zeros(0) if growing else fixed[name],
+                maxshape=(None,) if growing else fixed[name].shape,
+                chunks=(1024,) if growing else None,
             )
             axis.make_scale(name)
-            axis.attrs["units"], axis.attrs["long_name"] = unit, meaning
+            axis.attrs["units"], axis.attrs["long_name"] = _AXES[name]
         for name, (axes, kind, unit, meaning) in _MAPS.items():
-            shape = tuple(len(fixed[axis]) for axis in axes[1:])
-            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if kind == np.uint8 else {}
+            if any(axis_name not in fixed for axis_name in axes[1:]):
+                continue
+            shape = tuple(len(fixed[axis_name]) for axis_name in axes[1:])
+            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if name in _SPARSE else {}
             data = self._file.create_dataset(
-                name, shape=(0, *shape), maxshape=(None, *shape), dtype=kind, chunks=(1, *shape), **packed
+                name,
+                shape=(0, *shape),
+                maxshape=(None, *shape),
+                dtype=kind,
+                chunks=(1 if len(shape) > 1 else 64, *shape),
+                **packed,
             )
             data.attrs["units"], data.attrs["long_name"] = unit, meaning
             for number, axis_name in enumerate(axes):
                 data.dims[number].attach_scale(self._file[axis_name])
 
-    def append(self, axis: str, value: float, **maps: NDArray[Any]) -> None:
-        """Add one step along ``axis`` ("time" or "slow_time") at ``value`` [s], with the maps that grow along it."""
-        for name, values in ((axis, value), *maps.items()):
+    def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
+        """Add steps along a growing axis at ``values (n,)`` [s], with ``(n, ...)`` of each map that grows along it."""
+        for name, added in ((axis, values), *maps.items()):
+            steps = np.asarray(added)
             data = self._file[name]
-            data.resize(len(data) + 1, axis=0)
-            data[-1] = values
+            data.resize(len(data) + len(steps), axis=0)
+            data[len(data) - len(steps) :] = steps
 
-    def __enter__(self) -> MapStore:
-        return self
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def close(self) -> None:
+        """Write what is held, and let the file go; may be called again."""
         self._file.close()

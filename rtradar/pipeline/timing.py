@@ -16,6 +16,10 @@ class Stages:
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
 
+    def rounded(self) -> dict[str, float]:
+        """The same in whole tenths of a millisecond."""
+        return {name: round(seconds, 4) for name, seconds in self.seconds.items()}
+
     @contextmanager
     def time(self, name: str) -> Iterator[None]:
         """Add the time spent inside to stage ``name``."""

@@ -14,20 +14,21 @@ from rtradar.radar import Radar
 _DYNAMIC_RANGE_DB = 60.0
 
 
-def _figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
+    """An empty figure of that size [inch], without a window."""
     figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 
 
-def _decibels(power: NDArray[np.floating]) -> tuple[NDArray[np.float64], float, float]:
+def decibels(power: NDArray[np.floating]) -> tuple[NDArray[np.float64], float, float]:
     """Power in dB, and the limits of its colours: the peak, and the noise floor or 60 dB less."""
     values = 10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny))
     top = float(values.max())
     return values, max(top - _DYNAMIC_RANGE_DB, float(np.median(values)) - 3), top
 
 
-def _bins(centres: NDArray[np.float64]) -> tuple[float, float]:
+def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
     """Outer edges of evenly spaced bins."""
     half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
     return float(centres[0] - half), float(centres[-1] + half)
@@ -47,9 +48,9 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
     radar : Radar
     title : str
     """
-    figure = _figure(8, 4.5)
+    figure = new_figure(8, 4.5)
     axes = figure.subplots()
-    values, low, high = _decibels(power)
+    values, low, high = decibels(power)
     image = axes.imshow(
         values.T,
         origin="lower",
@@ -57,7 +58,7 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
         cmap="viridis",
         vmin=low,
         vmax=high,
-        extent=(*_bins(slow_time), *_bins(radar.range_m)),
+        extent=(*bin_edges(slow_time), *bin_edges(radar.range_m)),
     )
     axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
     figure.colorbar(image, label="Power [dB re 1 m²]")
@@ -78,11 +79,11 @@ def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np
     radar : Radar
     title : str
     """
-    figure = _figure(11, 4.5)
+    figure = new_figure(11, 4.5)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    values, low, high = _decibels(power)
+    values, low, high = decibels(power)
     velocity, distance = radar.velocity_mps(power.shape[1]), radar.range_m
-    extent = (*_bins(velocity), *_bins(distance))
+    extent = (*bin_edges(velocity), *bin_edges(distance))
     image = left.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
     right.imshow(values, origin="lower", aspect="auto", cmap="Greys", vmin=low, vmax=high, extent=extent)
     rows, columns = np.nonzero(mask)
@@ -107,7 +108,7 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
         Time [s], range [m], velocity [m/s].
     title : str
     """
-    figure = _figure(8, 6.5)
+    figure = new_figure(8, 6.5)
     axes = figure.add_subplot(projection="3d")
     time, distance, velocity = points.T
     largest = float(np.abs(velocity).max(initial=1e-9))

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtradar.pipeline.agreement import above_noise, chamfer, level_agreement, overlap
+from rtradar.pipeline.agreement import above_noise, chamfer, level_agreement
 
 EVERYWHERE = np.ones(4, dtype=bool)
 
@@ -53,14 +53,6 @@ def test_noise_is_left_out() -> None:
     assert np.flatnonzero(above_noise(power)).tolist() == [2]  # 11 is 80 dB below the peak
     power[2] = 1e6
     assert np.flatnonzero(above_noise(power)).tolist() == [1, 2]
-
-
-def test_overlap_by_hand() -> None:
-    first, second = np.array([1, 1, 1, 0], bool), np.array([0, 1, 1, 1], bool)
-    assert overlap(first, second) == overlap(second, first) == 0.5
-    assert overlap(first, first) == 1
-    assert overlap(first, ~first) == 0
-    assert overlap(np.zeros(3, bool), np.zeros(3, bool)) == 1
 
 
 def test_chamfer_by_hand() -> None:

@@ -114,3 +114,22 @@ def test_bad_values_are_refused_and_leave_nothing(tmp_path: Path, options: dict[
     with pytest.raises(InputError, match=says):
         run(tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("lines", "there"), [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})])
+def test_a_radar_without_a_line_has_no_angles_along_it(lines: dict[str, int], there: set[str], tmp_path: Path) -> None:
+    radar = rt.Radar(tx_z=0, rx_z=0, chirp_duration_s=500e-6, samples_per_chirp=128, frame_duration_s=0.05, **lines)
+    rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
+    with h5py.File(tmp_path / "maps.h5") as maps:
+        assert {"range_azimuth", "range_elevation"} & set(maps) == there
+    assert (tmp_path / "range_angle.png").exists() == bool(there)
+    assert (len(np.load(tmp_path / "cloud_xyz.npz")["points"]) > 0) == bool(there)
+    assert (tmp_path / "report.html").exists()
+
+
+def test_a_capture_shorter_than_the_spectrograms_window_has_none(tmp_path: Path) -> None:
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=1e-3, samples_per_chirp=128, frame_duration_s=0.05)
+    rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)  # 100 cycles of 128
+    with h5py.File(tmp_path / "maps.h5") as maps:
+        assert maps["spectrogram"].shape == (0, 128)
+    assert not (tmp_path / "spectrogram.png").exists()

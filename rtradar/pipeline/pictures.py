@@ -1,0 +1,85 @@
+"""The pictures of one run, drawn from its maps."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.pipeline.products import Clouds
+from rtradar.radar import Radar
+from rtradar.report import (
+    draw_range_angle,
+    draw_range_doppler,
+    draw_range_time,
+    draw_rdt_cloud,
+    draw_spatial_cloud,
+    draw_spectrogram,
+)
+
+_COLUMNS = 600
+"""Steps of time in a picture, those of 3 s; longer captures are averaged to as many, so that memory does not grow."""
+
+_SPATIAL_DOTS = 20_000
+
+
+def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dict[str, Path]:
+    """Draw what ``maps.h5`` in this folder holds, and the clouds, into the same folder.
+
+    Parameters
+    ----------
+    folder : path
+    radar : Radar
+    clouds : Clouds
+    title : str
+        Of the run.
+
+    Returns
+    -------
+    dict of title to path
+        PNG files, in the order in which they are best looked at.
+    """
+    drawn: dict[str, Path] = {}
+
+    def to(name: str, file: str) -> Path:
+        drawn[name] = folder / file
+        return drawn[name]
+
+    with h5py.File(folder / "maps.h5") as maps:
+        power, times = thinned(maps, "range_time", "slow_time")
+        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, title)
+        if len(maps["spectrogram_time"]):
+            power, times = thinned(maps, "spectrogram", "spectrogram_time")
+            velocity = maps["spectrogram_velocity"][:]
+            draw_spectrogram(to("Spectrogram", "spectrogram.png"), power, times, velocity, title)
+        window = busiest_window(maps)
+        moment = f"{title}, window at {float(maps['time'][window]):.2f} s"
+        power, mask = maps["range_doppler"][window], maps["detections"][window].astype(bool)
+        draw_range_doppler(to("Range-Doppler map and detections", "range_doppler.png"), power, mask, radar, moment)
+        angles = {angle: (maps[f"range_{angle}"][window], maps[angle][:]) for angle in ("azimuth", "elevation") if angle in maps}
+    if angles:
+        draw_range_angle(to("Range-azimuth and range-elevation", "range_angle.png"), angles, radar, moment)
+    draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title)
+    if angles:
+        every = math.ceil(max(len(clouds.spatial.points), 1) / _SPATIAL_DOTS)
+        points, velocity = clouds.spatial.points[::every], clouds.spatial.velocity[::every]
+        draw_spatial_cloud(to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title)
+    return drawn
+
+
+def busiest_window(maps: Any) -> int:
+    """Index of the window with the most detections, of an open file of maps."""
+    counts = [int(np.count_nonzero(mask)) for mask in maps["detections"]]
+    return int(np.argmax(counts))
+
+
+def thinned(maps: Any, name: str, axis: str) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """A map (time, ...) and its times [s], averaged to a few hundred steps."""
+    every = math.ceil(len(maps[axis]) / _COLUMNS)
+    starts = range(0, len(maps[axis]), every)
+    times = np.array([maps[axis][first : first + every].mean() for first in starts])
+    return np.stack([maps[name][first : first + every].mean(axis=0) for first in starts]), times

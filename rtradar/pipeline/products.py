@@ -1,0 +1,132 @@
+"""From range spectra, block by block, to maps in a file and to clouds, in constant memory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, UniformSample, spatial_points
+from rtradar.pipeline.store import MapStore
+from rtradar.pipeline.timing import Stages
+from rtradar.process import (
+    SPECTROGRAM_CYCLES,
+    SlidingSpectrogram,
+    SlidingWindows,
+    angle_grid,
+    angle_spectra,
+    cell_spectra,
+    os_cfar,
+    power_map,
+    range_azimuth,
+    range_elevation,
+)
+from rtradar.radar import Radar
+
+CLOUD_POINTS = 3000
+"""Points in the RDT cloud (paper, section 3.2.4)."""
+
+SPATIAL_POINTS = 100_000
+"""Points kept in the spatial cloud: all of 5 s and more; of longer captures a uniform sample, so that memory does not grow."""
+
+_RANGE_TIME_STEP_S = 5e-3
+
+
+class Clouds(NamedTuple):
+    """``rdt``: the range-Doppler-time cloud; ``spatial``: points in the room; ``n_spatial``: points it was sampled from."""
+
+    rdt: RdtCloudResult
+    spatial: SpatialCloud
+    n_spatial: int
+
+
+class Products:
+    """All that is made of the range spectra of one capture.
+
+    Parameters
+    ----------
+    path : path
+        HDF5 file of the maps, written anew.
+    radar : Radar
+    pfa : float
+        False-alarm rate of OS-CFAR.
+    seed : int
+        Of the sampling of clouds.
+    stages : Stages
+        Where the time goes.
+    title : str
+        Of the file.
+    """
+
+    def __init__(self, path: Path, radar: Radar, *, pfa: float, seed: int, stages: Stages, title: str) -> None:
+        self._radar, self._pfa, self._stages = radar, pfa, stages
+        self._windows, self._spectrogram = SlidingWindows(radar), SlidingSpectrogram(radar)
+        self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
+        axes = {
+            "range": radar.range_m,
+            "velocity": radar.velocity_mps(radar.cycles_per_frame),
+            "spectrogram_velocity": radar.velocity_mps(SPECTROGRAM_CYCLES),
+        }
+        # Two channels on a line tell a direction along it.
+        lines = {"azimuth": radar.tx_y * radar.rx_y > 1, "elevation": radar.tx_z * radar.rx_z > 1}
+        self._angle_names = [name for name, there in lines.items() if there]
+        axes |= {name: angle_grid(radar) for name in self._angle_names}
+        self._store = MapStore(path, axes, {"title": title})
+
+    def take(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles."""
+        radar, stages, store = self._radar, self._stages, self._store
+        with stages.time("range"):
+            self._range_time(spectra, first)
+        with stages.time("spectrogram"):
+            columns = self._spectrogram.push(spectra)
+            store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
+        for _, start, cube in self._windows.push(spectra):
+            with stages.time("doppler"):
+                power = power_map(cube, radar)
+            with stages.time("cfar"):
+                mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
+            middle = float(radar.window_times(np.array([start]))[0])
+            with stages.time("cloud"):
+                self._rdt.push(mask, middle)
+            with stages.time("angle"):
+                maps = self._angles(cube, mask, middle)
+            with stages.time("write"):
+                angles = {name: values[None] for name, values in maps.items()}
+                store.extend("time", [middle], range_doppler=power[None], detections=mask[None], **angles)
+
+    def _range_time(self, spectra: NDArray[np.complex64], first: int) -> None:
+        radar = self._radar
+        rows = max(1, round(_RANGE_TIME_STEP_S / radar.cycle_duration_s)) * radar.n_tx
+        for begin in range(0, len(spectra), rows):
+            part = spectra[begin : begin + rows]
+            power = (part.real**2 + part.imag**2).mean(axis=(0, 1))
+            middle = (first + begin + len(part) / 2) * radar.chirp_duration_s
+            self._store.extend("slow_time", [middle], range_time=power[None])
+
+    def _angles(self, cube: NDArray[np.complex64], mask: NDArray[np.bool_], middle: float) -> dict[str, NDArray[np.floating]]:
+        if not self._angle_names:
+            return {}
+        radar = self._radar
+        rows, columns = np.nonzero(mask)
+        velocity = radar.velocity_mps(radar.cycles_per_frame)
+        spectra = angle_spectra(cell_spectra(cube, radar, rows, columns), radar, radar.range_m[rows], velocity[columns])
+        found = spatial_points(spectra, radar, middle)
+        self._spatial.add(np.column_stack([found.points, found.velocity, found.power, found.time]))
+        makers = {"azimuth": range_azimuth, "elevation": range_elevation}
+        return {f"range_{name}": makers[name](spectra, radar) for name in self._angle_names}
+
+    def finish(self) -> Clouds:
+        """Close the file and give the clouds."""
+        self._store.close()
+        with self._stages.time("cloud"):
+            rdt = self._rdt.finish()
+            rows = self._spatial.rows()
+            rows = rows[np.argsort(rows[:, 5], kind="stable")]
+        return Clouds(rdt, SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5]), self._spatial.n_seen)
+
+    def close(self) -> None:
+        """Close the file; also after an error."""
+        self._store.close()

@@ -1,0 +1,201 @@
+"""`report.html`: one run on one page, in one file that opens without a network."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Iterable, Mapping
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from rtradar.body import Body
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.radar import Radar
+from rtradar.report.sections import (
+    limits_box,
+    limits_table,
+    mapping_table,
+    picture,
+    stages_table,
+    table,
+    tiles,
+)
+from rtradar.report.viewer import figure_data, rdt_data, spatial_data
+
+_PAGE = Template("""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="$policy">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title</title>
+<style>
+$style</style>
+</head>
+<body>
+<header>
+<p class="kind">rtradar report</p>
+<h1>$motion</h1>
+<p class="sub">$subtitle</p>
+</header>
+<main>
+$limits
+$tiles
+<noscript><p class="box warn">The 3D views need JavaScript; all else on this page does without.</p></noscript>
+$body</main>
+<script type="application/json" id="report-data">$data</script>
+<script>$library</script>
+<script>$script</script>
+</body>
+</html>
+""")
+
+_FIGURE = """<section id="figure"><h2>The recording before the radar</h2>
+<div class="scene tall" id="scene-figure"></div>
+<div class="player" id="player"><button type="button" id="play">Play</button>
+<input type="range" id="moment" min="0" value="0" step="1" aria-label="Moment of the recording">
+<output id="clock" for="moment"></output>
+<label>Speed <select id="speed"><option value="0.1">× 0.1</option><option value="0.25">× 0.25</option>
+<option value="0.5">× 0.5</option><option value="1" selected>× 1</option></select></label></div>
+<p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone. Drag to turn, scroll to come nearer.
+World axes: x from the radar to the person, y to the left seen from the radar, z up.</p></section>
+"""
+
+
+def write_report(
+    path: str | Path,
+    *,
+    body: Body,
+    radar: Radar,
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, Path],
+    rdt_points: ArrayLike,
+    spatial: SpatialCloud | None = None,
+) -> None:
+    """Write one run as a page with a moving figure, clouds that can be turned, pictures and tables.
+
+    The file holds all it needs, plotly.js included (about 5 MB), and its content security policy forbids every request.
+
+    Parameters
+    ----------
+    path : path
+        HTML file.
+    body : Body
+        Placed before the radar.
+    radar : Radar
+    summary : mapping
+        As in ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``, ``versions`` and ``part_power_m2`` have
+        places of their own; other numbers and texts are listed under their names.
+    pictures : mapping of title to path
+        PNG files, in the order in which they shall stand.
+    rdt_points : (point, 3)
+        Time [s], range [m], velocity [m/s].
+    spatial : SpatialCloud, optional
+        Shown whole, and about the moving figure frame by frame.
+
+    Raises
+    ------
+    InputError
+        Where a picture is missing or no PNG, or ``rdt_points`` has a wrong shape or values that are not finite.
+    """
+    from plotly.offline import get_plotlyjs  # slow to import, and 5 MB
+
+    data = {"figure": figure_data(body, radar, summary.get("part_power_m2")), "rdt": rdt_data(rdt_points)}
+    if spatial is not None:
+        data["spatial"] = spatial_data(spatial)
+    library, script = get_plotlyjs(), _asset("viewer.js")
+    parameters = summary.get("parameters", {})
+    motion, fidelity = str(parameters.get("motion", "Recording")), str(summary.get("fidelity", ""))
+    page = _PAGE.substitute(
+        policy=_policy((library, script)),
+        title=escape(f"{motion} - rtradar"),
+        motion=escape(motion),
+        subtitle=escape(", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}")))),
+        style=_asset("page.css"),
+        limits=limits_box(summary.get("limits", ())),
+        tiles=tiles(_headline(summary)),
+        body=_FIGURE + _clouds(data) + _pictures(pictures) + _tables(summary, radar),
+        data=_json(data),
+        library=library,
+        script=script,
+    )
+    Path(path).write_text(page, encoding="utf-8", newline="\n")
+
+
+def _asset(name: str) -> str:
+    return files("rtradar.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _policy(scripts: Iterable[str]) -> str:
+    """Content security policy: these scripts and no other, embedded pictures, and nothing from anywhere else."""
+    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    # Plotly writes style rules of its own, and makes pictures for download as blobs.
+    sources = f"script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
+    return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
+
+
+def _json(data: object) -> str:
+    """JSON that no text in it can end: the parser of HTML sees no < at all."""
+    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+    if "capture_s" in summary:
+        yield f"{summary['capture_s']:.2f} s", "of radar"
+    if "wall_s" in summary:
+        yield f"{summary['wall_s']:.1f} s", "to compute"
+    if "real_time_factor" in summary:
+        yield f"{summary['real_time_factor']:.2g} s", "for each second of radar"
+    if "peak_memory_mb" in summary:
+        yield f"{summary['peak_memory_mb']:.0f} MB", "peak memory"
+    if "detections" in summary:
+        yield f"{summary['detections']:,}".replace(",", "\u202f"), "detections"
+
+
+def _clouds(data: Mapping[str, Any]) -> str:
+    views = [("rdt", "Range-Doppler-time cloud", "The surface about the detections of all windows, sampled.")]
+    if "spatial" in data:
+        views.append(("spatial", "Spatial cloud", "Where the detected cells are, by range, azimuth and elevation; world axes."))
+    parts = []
+    for name, title, note in views:
+        cloud = data[name]
+        thinned = "" if cloud["shown"] == cloud["count"] else f" {cloud['shown']} of {cloud['count']} points are shown."
+        scene = f'<div class="scene" id="scene-{name}"></div>' if cloud["count"] else '<p class="empty">Nothing was detected.</p>'
+        parts.append(f'<section id="{name}"><h2>{title}</h2>{scene}<p class="note">{note}{thinned}</p></section>\n')
+    return f'<div class="clouds">{"".join(parts)}</div>\n'
+
+
+def _pictures(pictures: Mapping[str, Path]) -> str:
+    if not pictures:
+        return ""
+    shown = "\n".join(picture(title, Path(path)) for title, path in pictures.items())
+    return f'<section id="maps"><h2>Maps</h2><div class="pictures">{shown}</div></section>\n'
+
+
+def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
+    parameters = dict(summary.get("parameters", {}))
+    settings = parameters.pop("radar", {})
+    own = ("parameters", "limits", "stages", "versions", "part_power_m2")
+    power = summary.get("part_power_m2", {})
+    total = sum(power.values()) or 1.0
+    sections = (
+        ("Derived limits of the radar", limits_table(radar)),
+        ("Time of each stage", stages_table(summary.get("stages", {}))),
+        ("Parameters", mapping_table(parameters)),
+        ("Radar", mapping_table(settings)),
+        ("Capture", mapping_table({key: value for key, value in summary.items() if key not in own})),
+        ("Echo power by part", table((name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items())),
+        ("Versions", table((name, str(value)) for name, value in summary.get("versions", {}).items())),
+    )
+    return (
+        '<div class="tables">'
+        + "".join(f"<section><h2>{t}</h2>{html}</section>\n" for t, html in sections if "<tr>" in html)
+        + "</div>\n"
+    )

@@ -1,0 +1,144 @@
+"""What the page's 3D views draw: a moving body, and clouds, packed small."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.body import Body, unit_sphere
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+FRAME_RATE_HZ = 20.0
+"""Poses a second of the moving figure."""
+
+MOST_FRAMES = 400
+"""20 s at the full rate, 0.5 MB; longer recordings have fewer poses a second."""
+
+MOST_POINTS = 20_000
+"""Points of one cloud that a browser still turns smoothly."""
+
+_SUBDIVISIONS = 2
+_DYNAMIC_RANGE_DB = 30.0
+_MARGIN_M = 0.4
+
+
+def figure_data(body: Body, radar: Radar, part_power_m2: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """The recording as poses of ellipsoids, with the radar and the floor.
+
+    Parameters
+    ----------
+    body : Body
+        Placed before the radar.
+    radar : Radar
+    part_power_m2 : mapping of part name to float, optional
+        Mean echo power of each part [m^2], for its colour.
+
+    Returns
+    -------
+    dict
+        Ready for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three semi-axes of each part [m], world;
+        ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m];
+        ``power_db`` of each part, at most 30 dB below the strongest, or None.
+    """
+    intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
+    times = np.linspace(0.0, body.duration_s, intervals + 1)
+    centres, frames, semi_axes = body.at(times)
+    # Columns of a frame are directions: after the swap, row k is semi-axis k.
+    axes = np.swapaxes(frames * semi_axes[:, None, :], 2, 3)
+    poses = np.concatenate([centres[:, :, None, :], axes], axis=2)
+    vertices, faces = unit_sphere(_SUBDIVISIONS)
+    # An ellipsoid reaches sqrt(sum of squares of its semi-axes' components) along each world axis.
+    reach = np.sqrt((axes**2).sum(axis=2))
+    return {
+        "parts": list(body.part_names),
+        "times": np.round(times, 4).tolist(),
+        "poses": _floats(poses),
+        "vertices": _floats(vertices),
+        "faces": faces.ravel().tolist(),
+        "tx": np.round(radar.tx, 4).tolist(),
+        "rx": np.round(radar.rx, 4).tolist(),
+        "ranges": _ranges(
+            (centres - reach).reshape(-1, 3), (centres + reach).reshape(-1, 3), np.concatenate([radar.tx, radar.rx])
+        ),
+        "power_db": _power_db(body.part_names, part_power_m2 or {}),
+        "window_s": radar.frame_duration_s,
+    }
+
+
+def rdt_data(points: ArrayLike) -> dict[str, Any]:
+    """The range-Doppler-time cloud, thinned evenly to `MOST_POINTS`.
+
+    Parameters
+    ----------
+    points : (point, 3)
+        Time [s], range [m], velocity [m/s].
+
+    Returns
+    -------
+    dict
+        Ready for JSON: ``count``, ``shown``, and ``points`` as float32 (point, 3).
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit, or a value is not finite.
+    """
+    places = np.asarray(points, dtype=np.float64)
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise InputError(f"report: rdt_points has shape {places.shape}; it must be (point, 3): time, range, velocity")
+    if not np.isfinite(places).all():
+        raise InputError("report: rdt_points holds NaN or infinity; every value must be finite")
+    return _thinned(points=places)
+
+
+def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
+    """The spatial cloud, thinned evenly to `MOST_POINTS`.
+
+    Parameters
+    ----------
+    cloud : SpatialCloud
+
+    Returns
+    -------
+    dict
+        Ready for JSON: ``count``, ``shown``, and as float32 ``points`` (point, 3), ``velocity`` and ``time`` (point,).
+    """
+    return _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
+
+
+def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
+    every = max(1, math.ceil(len(points) / MOST_POINTS))
+    packed = {name: _floats(array[::every]) for name, array in {"points": points, **values}.items()}
+    return {"count": len(points), "shown": len(points[::every]), **packed}
+
+
+def _floats(array: NDArray[np.float64]) -> str:
+    """Base64 of little-endian float32, last axis fastest."""
+    return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
+
+
+def _ranges(low: NDArray[np.float64], high: NDArray[np.float64], antennas: NDArray[np.float64]) -> list[list[float]]:
+    """Box about all poses, the radar and the floor, in half metres."""
+    least = np.minimum(low.min(axis=0), antennas.min(axis=0))
+    most = np.maximum(high.max(axis=0), antennas.max(axis=0))
+    least[:2] -= _MARGIN_M
+    most[:2] += _MARGIN_M
+    # The floor is z = 0: a heel a little below it needs no more room.
+    least[2] = 0.0 if least[2] > -0.1 else least[2]
+    box = np.stack([np.floor(2 * least) / 2, np.ceil(2 * most) / 2], axis=1)
+    return [[float(a), float(b)] for a, b in box]
+
+
+def _power_db(parts: tuple[str, ...], power: Mapping[str, float]) -> list[float] | None:
+    values = np.array([power.get(part, 0.0) for part in parts])
+    if not values.max() > 0:
+        return None
+    decibels = 10 * np.log10(np.maximum(values, values.max() * 10 ** (-_DYNAMIC_RANGE_DB / 10)))
+    return [round(float(value), 2) for value in decibels]

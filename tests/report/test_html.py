@@ -1,0 +1,253 @@
+"""The report as a file: whole, escaped, closed to the network, and with the numbers that it was given."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import hashlib
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.motion import place
+from rtradar.report.html import write_report
+from rtradar.report.sections import limits_table, quantity
+from rtradar.report.viewer import MOST_FRAMES, MOST_POINTS, figure_data, rdt_data, spatial_data
+
+RADAR = rt.Radar.preset("paper-12ghz")
+EVIL = "walk</script><script>alert('1')</script><img src=x>&\"amc"
+
+
+class Elements(HTMLParser):
+    """All elements with their attributes, the texts of scripts, and all text outside of them."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str | None]]] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self._inside = ""
+        self.feed(text)
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, dict(attrs)))
+        self._inside = tag
+        if tag == "script":
+            self.scripts.append("")
+
+    def handle_endtag(self, tag: str) -> None:
+        self._inside = ""
+
+    def handle_data(self, data: str) -> None:
+        if self._inside == "script":
+            self.scripts[-1] += data
+        elif self._inside != "style":
+            self.text += data
+
+
+@pytest.fixture(scope="module")
+def body() -> Body:
+    return Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.5))
+
+
+def summary() -> dict[str, Any]:
+    return {
+        "parameters": {"motion": EVIL, "snr_db": 20.0, "pfa": 1e-6, "radar": dataclasses.asdict(RADAR)},
+        "versions": {"numpy": "<2.4>"},
+        "fidelity": "specular",
+        "stages": {"scatter": 3.0, "cfar": 1.0},
+        "wall_s": 4.5,
+        "capture_s": 0.5,
+        "real_time_factor": 9.0,
+        "peak_memory_mb": 446.6,
+        "detections": 7416,
+        "limits": [{"name": "beyond_range", "share": 0.125, "message": f"echo power from {EVIL}"}],
+    }
+
+
+def write(path: Path, body: Body, **changes: Any) -> Elements:
+    given: dict[str, Any] = {"summary": summary(), "pictures": {}, "rdt_points": np.array([[0.1, 4.0, -1.0]])} | changes
+    write_report(path, body=body, radar=RADAR, **given)
+    return Elements(path.read_text(encoding="utf-8"))
+
+
+def floats(text: str) -> NDArray[np.float32]:
+    return np.frombuffer(base64.b64decode(text), dtype="<f4")
+
+
+def test_no_text_from_outside_becomes_markup(tmp_path: Path, body: Body) -> None:
+    image = tmp_path / "map.png"
+    matplotlib.image.imsave(image, np.zeros((3, 5)))
+    page = write(tmp_path / "r.html", body, pictures={EVIL: image})
+    tags = [tag for tag, _ in page.elements]
+    # The data, plotly.js and the viewer; the one picture.
+    assert (tags.count("script"), tags.count("img")) == (3, 1)
+    assert next(attributes for tag, attributes in page.elements if tag == "img")["alt"] == EVIL
+    # Title, heading, limit, caption and table of parameters show it as it is.
+    assert page.text.count(EVIL) == 5
+    assert "<2.4>" in page.text
+
+
+def test_refers_to_nothing_outside(tmp_path: Path, body: Body) -> None:
+    image = tmp_path / "map.png"
+    matplotlib.image.imsave(image, np.zeros((3, 5)))
+    page = write(tmp_path / "r.html", body, pictures={"A map": image})
+    for tag, attributes in page.elements:
+        assert tag not in ("link", "iframe", "object", "embed", "base", "a")
+        for name in ("src", "href", "srcset", "action", "data"):
+            assert (attributes.get(name) or "data:").startswith("data:")
+    shown = next(attributes for tag, attributes in page.elements if tag == "img")
+    assert base64.b64decode((shown["src"] or "").removeprefix("data:image/png;base64,")) == image.read_bytes()
+    assert (shown["width"], shown["height"]) == ("5", "3")
+
+
+def test_the_policy_allows_these_scripts_alone(tmp_path: Path, body: Body) -> None:
+    page = write(tmp_path / "r.html", body)
+    policy = next(
+        a["content"] or "" for t, a in page.elements if t == "meta" and a.get("http-equiv") == "Content-Security-Policy"
+    )
+    rules = {rule.split()[0]: rule.split()[1:] for rule in policy.split(";")}
+    assert rules["default-src"] == ["'none'"]
+    assert not {"connect-src", "script-src-elem", "frame-src"} & rules.keys()
+    expected = [f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in page.scripts[1:]]
+    assert rules["script-src"] == expected
+
+
+def test_shows_the_numbers_that_it_was_given(tmp_path: Path, body: Body) -> None:
+    page = write(tmp_path / "r.html", body)
+    text = re.sub(r"\s+", " ", page.text)
+    for shown in ("12.5% of the echo power from", "beyond_range", "447 MB", "7 416", "62.5 µs", "12 GHz", "75%", "3.000 s"):
+        assert shown in text, shown
+
+
+def test_says_so_where_there_is_nothing(tmp_path: Path, body: Body) -> None:
+    page = write(tmp_path / "r.html", body, summary={}, rdt_points=np.zeros((0, 3)))
+    assert "Nothing was detected" in page.text
+    assert "Nothing came near the end" in page.text
+    assert "scene-rdt" not in [attributes.get("id") for _, attributes in page.elements]
+
+
+def test_the_same_gives_the_same_file(tmp_path: Path, body: Body) -> None:
+    write(tmp_path / "a.html", body)
+    write(tmp_path / "b.html", body)
+    assert (tmp_path / "a.html").read_bytes() == (tmp_path / "b.html").read_bytes()
+
+
+def test_poses_give_back_the_ellipsoids(body: Body) -> None:
+    data = json.loads(json.dumps(figure_data(body, RADAR)))
+    times = data["times"]
+    # 20 a second, both ends included.
+    np.testing.assert_allclose(times, np.arange(11) / 20, atol=1e-4)
+    poses = floats(data["poses"]).reshape(11, 21, 4, 3)
+    sphere = floats(data["vertices"]).reshape(-1, 3)
+    now = body.ellipsoids(0.25)
+    for part in (0, 7, 20):
+        vertices = poses[5, part, 0] + sphere @ poses[5, part, 1:]
+        local = (vertices - now.centres[part]) @ now.frames[part] / now.semi_axes[part]
+        # On the unit sphere of the mesh, whose corners lie up to 2 % outside; float32 of some metres is 1e-6 of some centimetres.
+        np.testing.assert_allclose(local, sphere, atol=2e-5)
+    assert np.linalg.norm(sphere, axis=1).max() < 1.02
+    ends = poses[5, :, 0] + poses[5, :, 3]
+    np.testing.assert_allclose(ends, body.motion.at([0.25])[0][0, 1:], atol=1e-6)
+
+
+def test_the_box_holds_body_and_radar(body: Body) -> None:
+    data = figure_data(body, RADAR)
+    low, high = np.array(data["ranges"]).T
+    sphere = floats(data["vertices"]).reshape(-1, 3)
+    for pose in floats(data["poses"]).reshape(-1, 4, 3):
+        vertices = pose[0] + sphere @ pose[1:]
+        assert (vertices.max(axis=0) < high).all()
+        assert (vertices.min(axis=0) > low - [0, 0, 0.1]).all()
+    for antennas in (RADAR.tx, RADAR.rx):
+        assert ((antennas > low) & (antennas < high)).all()
+
+
+def test_long_recordings_have_fewer_poses() -> None:
+    long = Body.from_motion(place(rt.synthetic_motion("jumping_jack", seed=0, duration_s=25.0)))
+    data = figure_data(long, RADAR)
+    assert len(data["times"]) == MOST_FRAMES
+    assert data["times"][-1] == pytest.approx(long.duration_s, abs=1e-4)
+
+
+def test_colours_reach_30_db_below_the_strongest(body: Body) -> None:
+    power = dict.fromkeys(body.part_names, 0.0) | {"head": 1e-3, "neck": 1e-4}
+    shown = dict(zip(body.part_names, figure_data(body, RADAR, power)["power_db"], strict=True))
+    assert (shown["head"], shown["neck"], shown["left foot"]) == (-30.0, -40.0, -60.0)
+    assert figure_data(body, RADAR, dict.fromkeys(body.part_names, 0.0))["power_db"] is None
+
+
+def test_large_clouds_are_thinned_and_counted() -> None:
+    count = 2 * MOST_POINTS + 1
+    points = np.stack([np.arange(count), np.zeros(count), np.ones(count)], axis=1)
+    data = rdt_data(points)
+    assert (data["count"], data["shown"]) == (count, len(range(0, count, 3)))
+    np.testing.assert_array_equal(floats(data["points"]).reshape(-1, 3), points[::3])
+    cloud = spatial_data(SpatialCloud(points, points[:, 0], points[:, 1], points[:, 0] / 10))
+    np.testing.assert_allclose(floats(cloud["time"]), points[::3, 0] / 10, rtol=1e-7)  # float32
+
+
+@pytest.mark.parametrize(
+    ("points", "said"), [(np.zeros((4, 2)), "(4, 2)"), (np.zeros(3), "(3,)"), (np.full((2, 3), np.nan), "NaN")]
+)
+def test_refuses_what_is_no_cloud(points: NDArray[np.float64], said: str) -> None:
+    with pytest.raises(rt.InputError, match=re.escape(said)) as caught:
+        rdt_data(points)
+    assert "\n" not in str(caught.value)
+
+
+def test_refuses_what_is_no_png(tmp_path: Path, body: Body) -> None:
+    (tmp_path / "x.png").write_bytes(b"GIF89a")
+    for name, said in (("x.png", "no PNG"), ("y.png", "No such file")):
+        with pytest.raises(rt.InputError, match=said):
+            write(tmp_path / "r.html", body, pictures={"A map": tmp_path / name})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "shown"),
+    [
+        ("start_frequency_hz", 12e9, ("start frequency", "12 GHz")),
+        ("chirp_duration_s", 62.5e-6, ("chirp duration", "62.5 µs")),
+        ("start_s", 0.0, ("start", "0 s")),
+        ("snr_db", "inf", ("SNR", "inf dB")),
+        ("heading_deg", -90.0, ("heading", "-90°")),
+        ("position_m", [-4.0, 1.0, 1.0], ("position", "(-4, 1, 1) m")),
+        ("echo_power_m2", 2.10867e-3, ("echo power", "0.0021087 m²")),
+        ("pfa", 1e-6, ("Pfa", "1e-06")),
+        ("chirps", 15996000, ("chirps", "15996000")),
+        ("spreading", True, ("spreading", "yes")),
+        ("tx_y", 6, ("Tx y", "6")),
+        ("duration_s", None, ("duration", "-")),
+    ],
+)
+def test_quantities_read_as_people_write_them(name: str, value: object, shown: tuple[str, str]) -> None:
+    assert quantity(name, value) == shown
+
+
+def test_limits_are_those_of_the_sweep_centre() -> None:
+    # By hand for 14 GHz: c / 2B = 3.747 cm, x 256 = 9.593 m; lambda = 21.414 mm; lambda / 4 / 0.75 ms = 7.138 m/s;
+    # lambda / 2 / (133 x 0.75 ms) = 0.1073 m/s.
+    html = limits_table(RADAR)
+    for value in (
+        "9.593 m",
+        "3.747 cm",
+        "±7.138 m/s",
+        "0.1073 m/s",
+        "±59.0°",
+        "1.81°",
+        "21.414 mm",
+        "750 µs",
+        "133",
+        "12 × 8 = 96",
+    ):
+        assert f"<td>{value}</td>" in html, value
