@@ -150,8 +150,8 @@ class Steering:
     runs: NDArray[np.int64]
 
 
-# 512: both lines, all 256 range bins of the paper's radars, 75 kB each.
-@lru_cache(maxsize=512)
+# 96: both lines, the range bins of a person and of where one goes next; 75 kB each.
+@lru_cache(maxsize=96)
 def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> Steering:
     """Phases and range bins of a line for points at one range.
 

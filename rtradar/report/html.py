@@ -57,6 +57,9 @@ $body</main>
 </html>
 """)
 
+# Places of the two large pieces; no text on a page holds a zero byte.
+_DATA, _LIBRARY = "\0data\0", "\0library\0"
+
 _FIGURE = """<section id="figure"><h2>The recording before the radar</h2>
 <div class="scene tall" id="scene-figure"></div>
 <div class="player" id="player"><button type="button" id="play">Play</button>
@@ -122,11 +125,19 @@ def write_report(
         limits=limits_box(summary.get("limits", ())),
         tiles=tiles(_headline(summary)),
         body=_FIGURE + _clouds(data) + _pictures(pictures) + _tables(summary, radar),
-        data=_json(data),
-        library=library,
+        data=_DATA,
+        library=_LIBRARY,
         script=script,
     )
-    Path(path).write_text(page, encoding="utf-8", newline="\n")
+    # The two large pieces go in one after the other: a page put together first would take the memory of several.
+    head, rest = page.split(_DATA)
+    middle, tail = rest.split(_LIBRARY)
+    with open(path, "w", encoding="utf-8", newline="\n") as file:
+        file.write(head)
+        file.write(_json(data))
+        file.write(middle)
+        file.write(library)
+        file.write(tail)
 
 
 def _asset(name: str) -> str:

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
+from rtradar.motion.motion import sign_continuous
 
 
 def random_motion(seed: int, frames: int = 12, joints: int = 5, wild: float = 0.5) -> Motion:
@@ -150,3 +152,28 @@ def test_scaling() -> None:
 def test_nonsense_is_refused(changes: dict[str, object], words: str) -> None:
     with pytest.raises(InputError, match=words):
         dataclasses.replace(random_motion(0), **changes)  # type: ignore[arg-type]
+
+
+def test_a_long_recording_is_one_spline() -> None:
+    # Stretches of 256 frames with their own splines, against the spline of all 1000 frames.
+    times = np.arange(1000) / 120
+    angles = np.column_stack([np.sin(2 * times), 0.3 * np.cos(7 * times), 0.5 * times])
+    rotations = Rotation.from_euler("xyz", angles).as_quat()[:, None]
+    roots = np.column_stack([times, np.sin(times), np.cos(3 * times)])
+    motion = Motion(
+        name="long",
+        joints=("root",),
+        parents=(-1,),
+        offsets=np.zeros((1, 3)),
+        root_positions=roots,
+        rotations=rotations,
+        rate_hz=120.0,
+    )
+    at = np.linspace(0, motion.duration_s, 5003)
+    positions, quaternions = motion.at(at)
+    whole = CubicSpline(times, sign_continuous(rotations))(at)
+    whole /= np.linalg.norm(whole, axis=-1, keepdims=True)
+    np.testing.assert_allclose(quaternions, whole, atol=1e-13)  # rounding of two ways to solve for one spline
+    np.testing.assert_allclose(positions[:, 0], PchipInterpolator(times, roots)(at), atol=1e-13)
+    # What is asked for together does not matter, nor in which order.
+    np.testing.assert_array_equal(motion.at(at[::-7])[1], quaternions[::-7])
