@@ -20,6 +20,9 @@ SPATIAL_AXES = ("x", "y", "z")
 SPATIAL_UNITS = ("m", "m", "m")
 """Their units."""
 
+SHOWN_DB = 40.0
+"""Below the strongest point lie most of those that are of no body: in a walk of 3 s, 4 in 5 of them, and 1 in 5 of the others."""
+
 
 @dataclass(frozen=True)
 class SpatialCloud:
@@ -55,6 +58,11 @@ class SpatialCloud:
                 raise InputError(f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)")
             if not np.isfinite(values).all():
                 raise InputError(f"spatial cloud: {field} holds NaN or infinity; every value must be finite")
+
+    def strongest(self) -> SpatialCloud:
+        """Points at most `SHOWN_DB` below the strongest, which pictures show."""
+        kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
+        return SpatialCloud(self.points[kept], self.velocity[kept], self.power[kept], self.time[kept])
 
 
 def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> SpatialCloud:

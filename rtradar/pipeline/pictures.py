@@ -65,8 +65,9 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dic
         draw_range_angle(to("Range-azimuth and range-elevation", "range_angle.png"), angles, radar, moment)
     draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title)
     if angles:
-        every = math.ceil(max(len(clouds.spatial.points), 1) / _SPATIAL_DOTS)
-        points, velocity = clouds.spatial.points[::every], clouds.spatial.velocity[::every]
+        shown = clouds.spatial.strongest()
+        every = math.ceil(max(len(shown.points), 1) / _SPATIAL_DOTS)
+        points, velocity = shown.points[::every], shown.velocity[::every]
         draw_spatial_cloud(to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title)
     return drawn
 

@@ -33,7 +33,7 @@ $style</style>
 <section><h2>What differs</h2>$measures
 <p class="note">Differences are to the reference, $reference. Maps are compared in decibels: range-Doppler in the cells that
 either rung detects, spectrograms in the cells 10 dB above the median of either. All rungs have the same noise, sample by
-sample.</p></section>
+sample. Echo power is of one chirp every 10 ms, each from another Tx, which makes it saw.</p></section>
 <section id="maps"><h2>Side by side</h2><div class="pictures">$pictures</div></section>
 <div class="tables"><section><h2>Seconds a stage</h2>$stages</section>
 <section><h2>Mean echo power by part [dB re 1 m²]</h2>$parts</section>

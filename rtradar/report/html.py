@@ -15,7 +15,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from rtradar.body import Body
-from rtradar.clouds.spatial import SpatialCloud
+from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.sections import (
     limits_box,
@@ -173,7 +173,9 @@ def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
 def _clouds(data: Mapping[str, Any]) -> str:
     views = [("rdt", "Range-Doppler-time cloud", "The surface about the detections of all windows, sampled.")]
     if "spatial" in data:
-        views.append(("spatial", "Spatial cloud", "Where the detected cells are, by range, azimuth and elevation; world axes."))
+        views.append(
+            ("spatial", "Spatial cloud", f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes.")
+        )
     parts = []
     for name, title, note in views:
         cloud = data[name]

@@ -99,7 +99,7 @@ def rdt_data(points: ArrayLike) -> dict[str, Any]:
 
 
 def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
-    """The spatial cloud, thinned evenly to `MOST_POINTS`.
+    """The strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`.
 
     Parameters
     ----------
@@ -110,6 +110,7 @@ def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
     dict
         Ready for JSON: ``count``, ``shown``, and as float32 ``points`` (point, 3), ``velocity`` and ``time`` (point,).
     """
+    cloud = cloud.strongest()
     return _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
 
 

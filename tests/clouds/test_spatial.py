@@ -108,3 +108,11 @@ def test_the_file_holds_the_cloud(tmp_path: Path) -> None:
 def test_clouds_that_do_not_fit(points: np.ndarray, velocity: np.ndarray, message: str) -> None:
     with pytest.raises(InputError, match=message):
         SpatialCloud(points, velocity, np.zeros(len(points)), np.zeros(len(points)))
+
+
+def test_the_strongest_points_are_those_within_forty_decibels() -> None:
+    power = np.array([1.0, 2e-4, 0.99e-4, 1e-9])
+    cloud = SpatialCloud(np.arange(12.0).reshape(4, 3), np.arange(4.0), power, np.zeros(4))
+    assert cloud.strongest().velocity.tolist() == [0, 1]
+    nothing = SpatialCloud(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0))
+    assert len(nothing.strongest().points) == 0
