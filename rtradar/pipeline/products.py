@@ -22,6 +22,7 @@ from rtradar.process import (
     power_map,
     range_azimuth,
     range_elevation,
+    range_time,
 )
 from rtradar.radar import Radar
 
@@ -30,8 +31,6 @@ CLOUD_POINTS = 3000
 
 SPATIAL_POINTS = 30_000
 """Most points in the spatial cloud: about 3 s of a walk at 12 GHz; of more a uniform sample, so that memory does not grow."""
-
-_RANGE_TIME_STEP_S = 5e-3
 
 
 class Clouds(NamedTuple):
@@ -79,7 +78,8 @@ class Products:
         """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles."""
         radar, stages, store = self._radar, self._stages, self._store
         with stages.time("range"):
-            self._range_time(spectra, first)
+            power, times = range_time(spectra, radar, first_chirp=first)
+            store.extend("slow_time", times, range_time=power)
         with stages.time("spectrogram"):
             columns = self._spectrogram.push(spectra)
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
@@ -96,15 +96,6 @@ class Products:
             with stages.time("write"):
                 angles = {name: values[None] for name, values in maps.items()}
                 store.extend("time", [middle], range_doppler=power[None], detections=mask[None], **angles)
-
-    def _range_time(self, spectra: NDArray[np.complex64], first: int) -> None:
-        radar = self._radar
-        rows = max(1, round(_RANGE_TIME_STEP_S / radar.cycle_duration_s)) * radar.n_tx
-        for begin in range(0, len(spectra), rows):
-            part = spectra[begin : begin + rows]
-            power = (part.real**2 + part.imag**2).mean(axis=(0, 1))
-            middle = (first + begin + len(part) / 2) * radar.chirp_duration_s
-            self._store.extend("slow_time", [middle], range_time=power[None])
 
     def _angles(self, cube: NDArray[np.complex64], mask: NDArray[np.bool_], middle: float) -> dict[str, NDArray[np.floating]]:
         if not self._angle_names:

@@ -5,7 +5,7 @@ from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevatio
 from rtradar.process.cells import cell_spectra
 from rtradar.process.cfar import ca_cfar, os_cfar
 from rtradar.process.cfar_law import ca_scale, os_scale
-from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum
+from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum, range_time
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram
 from rtradar.process.steering import measures_angle
@@ -32,5 +32,6 @@ __all__ = [
     "range_doppler",
     "range_elevation",
     "range_spectrum",
+    "range_time",
     "spectrogram",
 ]

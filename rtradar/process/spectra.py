@@ -138,6 +138,48 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
     return spectra
 
 
+def range_time(
+    spectra: NDArray[np.complexfloating], radar: Radar, *, first_chirp: int = 0, step_s: float = 5e-3
+) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    """Power over slow time and range, averaged over channels and over whole TDM cycles.
+
+    Parameters
+    ----------
+    spectra : (chirp, rx, range) complex
+        From `range_spectrum`; the first chirp comes from Tx 0.
+    radar : Radar
+        Gives the schedule.
+    first_chirp : int
+        Its number in the capture.
+    step_s : float
+        About how long each average is [s]; at least one cycle. The last may be shorter.
+
+    Returns
+    -------
+    power : (slow_time, range) float32 or float64
+        In the unit of the squared IF.
+    slow_time : (slow_time,) float64
+        Centre of each average since the start of the capture [s].
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar.
+    """
+    chirps = np.asarray(spectra)
+    if chirps.ndim != 3 or chirps.shape[1] != radar.n_rx:
+        raise InputError(
+            f"range_time: spectra have shape {chirps.shape}; radar '{radar.name}' needs (chirp, {radar.n_rx}, range)"
+        )
+    rows = max(1, round(step_s / radar.cycle_duration_s)) * radar.n_tx
+    parts = [chirps[begin : begin + rows] for begin in range(0, len(chirps), rows)]
+    power = [(part.real**2 + part.imag**2).mean(axis=(0, 1)) for part in parts]
+    begins = np.arange(0, len(chirps), rows)
+    middles = first_chirp + (begins + np.minimum(begins + rows, len(chirps))) / 2
+    kind = chirps.real.dtype
+    return np.array(power, dtype=kind).reshape(len(parts), chirps.shape[2]), middles * radar.chirp_duration_s
+
+
 def power_map(
     spectra: NDArray[np.complexfloating], radar: Radar, *, channel: int | None = None, doppler_window: ArrayLike | None = None
 ) -> NDArray[np.floating]:

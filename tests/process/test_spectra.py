@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.process import power_map, range_doppler, range_spectrum
+from rtradar.process import power_map, range_doppler, range_spectrum, range_time
 from rtradar.radar import Radar
 
 # Small in every axis; 1.2 ms of 20 cycles, bins of 3.75 cm and 0.6 m/s.
@@ -173,3 +173,19 @@ def test_bad_input_is_refused(call, message: str) -> None:
     with pytest.raises(InputError, match=message) as error:
         call()
     assert "\n" not in str(error.value)
+
+
+def test_range_time_is_the_mean_power_of_its_cycles() -> None:
+    radar = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=8, frame_duration_s=3.75e-3, chirp_duration_s=1e-3)
+    random = np.random.default_rng(0)
+    spectra = random.standard_normal((15, 2, 8)) + 1j * random.standard_normal((15, 2, 8))
+    power, times = range_time(spectra, radar, first_chirp=30, step_s=6e-3)  # two cycles of three chirps
+    expected = [(np.abs(spectra[first : first + 6]) ** 2).sum(axis=(0, 1)) / (2 * n) for first, n in ((0, 6), (6, 6), (12, 3))]
+    np.testing.assert_allclose(power, expected, rtol=1e-12)
+    np.testing.assert_allclose(times, [33e-3, 39e-3, 43.5e-3], rtol=1e-12)
+    whole, one_by_one = range_time(spectra, radar, step_s=1e-9)[0], range_time(spectra[:3], radar)[0]
+    assert whole.shape == (5, 8)  # one cycle at least
+    np.testing.assert_allclose(whole[0], one_by_one[0], rtol=1e-12)
+    assert range_time(spectra[:0], radar)[0].shape == (0, 8)
+    with pytest.raises(InputError, match="range_time: spectra have shape"):
+        range_time(spectra[:, :1], radar)
