@@ -9,6 +9,7 @@ import os
 import platform
 import time
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -77,6 +78,7 @@ def run(
     spreading: bool = True,
     save_if: bool = False,
     noise_power_m2: float | None = None,
+    dials: Mapping[str, Any] | None = None,
 ) -> Result:
     """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
 
@@ -109,6 +111,8 @@ def run(
         Whether IF samples are kept, in ``if.zarr``.
     noise_power_m2 : float, optional
         Noise power per sample [m^2], in place of ``snr_db``: for runs that shall share it.
+    dials : mapping, optional
+        Of the rung, such as ``{"shadow_rays": 256}`` of ``fresnel``; its class documents them.
 
     Returns
     -------
@@ -138,7 +142,7 @@ def run(
             f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
         )
     warm = time.perf_counter()
-    rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading)
+    rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}))
     _warm_up(rung, radar)
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
@@ -190,6 +194,7 @@ def run(
                 "pfa": pfa,
                 "variant": variant,
                 "spreading": spreading,
+                "dials": dict(dials or {}),
                 "radar": dataclasses.asdict(radar),
             },
             "seed": seed,

@@ -2,48 +2,71 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import inspect
+from importlib import import_module
+from typing import Any, NamedTuple
 
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.analytic import Analytic
 from rtradar.scatter.poses import Rung
 
 
-def _analytic(radar: Radar, body: Body, variant: str, spreading: bool) -> Rung:
-    return Analytic(radar, body, spreading=spreading)
+class _Home(NamedTuple):
+    """Where a rung is: module and class within this package, what is fixed of it, and whether it traces."""
+
+    module: str
+    kind: str
+    fixed: dict[str, Any]
+    traces: bool
 
 
-def _analytic_paper(radar: Radar, body: Body, variant: str, spreading: bool) -> Rung:
-    return Analytic(radar, body, paper=True, spreading=spreading)
-
-
-def _specular(radar: Radar, body: Body, variant: str, spreading: bool) -> Rung:
-    # On use: it brings Mitsuba, which the closed forms do without.
-    from rtradar.scatter.specular import Specular
-
-    return Specular(radar, body, variant=variant, spreading=spreading)
-
-
-RUNGS: dict[str, Callable[[Radar, Body, str, bool], Rung]] = {
-    "analytic-paper": _analytic_paper,
-    "analytic": _analytic,
-    "specular": _specular,
+RUNGS: dict[str, _Home] = {
+    "analytic-paper": _Home("analytic", "Analytic", {"paper": True}, traces=False),
+    "analytic": _Home("analytic", "Analytic", {"paper": False}, traces=False),
+    "specular": _Home("specular", "Specular", {}, traces=True),
+    "fresnel": _Home("fresnel", "Fresnel", {}, traces=True),
+    "physical-optics": _Home("physical_optics", "PhysicalOptics", {}, traces=True),
+    "rays": _Home("rays", "Rays", {}, traces=True),
+    "reference": _Home("reference", "Reference", {}, traces=True),
 }
-"""Every rung, cheapest first: name to a function of radar, body, variant and spreading."""
+"""Every rung, cheapest first."""
+
+_COMMON = ("self", "radar", "body", "variant", "spreading")
 
 
-def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True) -> Rung:
+def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **dials: Any) -> Rung:
     """The rung of that name, for this body and radar.
+
+    Parameters
+    ----------
+    fidelity : str
+        One of `RUNGS`.
+    radar : Radar
+    body : Body
+    variant : {"auto", "llvm", "scalar", "cuda"}
+        Mitsuba's backend, for rungs that trace.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    **dials
+        Of the rung, such as ``shadow_rays`` of ``fresnel``; its class documents them.
 
     Raises
     ------
     InputError
-        Where there is no such rung.
+        Where there is no such rung, or it has no such dial.
     BackendError
         Where it traces and no backend of that kind works here.
     """
     if fidelity not in RUNGS:
         raise InputError(f"fidelity '{fidelity}' is unknown; allowed: {', '.join(RUNGS)}")
-    return RUNGS[fidelity](radar, body, variant, spreading)
+    home = RUNGS[fidelity]
+    # On use: what traces brings Mitsuba, which the closed forms do without.
+    kind = getattr(import_module(f"rtradar.scatter.{home.module}"), home.kind)
+    known = [name for name in inspect.signature(kind).parameters if name not in (*_COMMON, *home.fixed)]
+    for dial in dials:
+        if dial not in known:
+            raise InputError(f"fidelity '{fidelity}' has no dial '{dial}'; it has: {', '.join(known) or 'none'}")
+    backend = {"variant": variant} if home.traces else {}
+    rung: Rung = kind(radar, body, spreading=spreading, **home.fixed, **backend, **dials)
+    return rung

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+import inspect
+from collections.abc import Callable
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,10 +14,36 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.validity import warn_of_small_radii
+
+if TYPE_CHECKING:
+    import trimesh
+
+
+Field = Callable[..., NDArray[np.complex128]]
+
+
+class _Home(NamedTuple):
+    """Where the field of a rung is computed: module and function within this package, and whether it takes meshes."""
+
+    module: str
+    function: str
+    meshes: bool
+
+
+_HOMES = {
+    "analytic": _Home("scattering_length", "_analytic_field", meshes=False),
+    "specular": _Home("scattering_length", "_specular_field", meshes=False),
+    "fresnel": _Home("fresnel", "fresnel_scattering", meshes=False),
+    "physical-optics": _Home("facet_scattering", "facet_scattering", meshes=True),
+    "reference": _Home("facet_scattering", "facet_scattering", meshes=True),
+    "rays": _Home("rays", "rays_scattering", meshes=True),
+}
+_COMMON = ("target", "tx", "rx", "frequency", "polarization")
 
 
 def scattering_length(
-    target: Ellipsoids,
+    target: Ellipsoids | trimesh.Trimesh,
     tx: ArrayLike,
     rx: ArrayLike,
     frequency: ArrayLike,
@@ -26,18 +55,20 @@ def scattering_length(
 
     Parameters
     ----------
-    target : Ellipsoids
-        Where its parts hide each other, `specular` sees it.
+    target : Ellipsoids or trimesh.Trimesh
+        Its parts hide each other where the rung traces. Meshes, of perfect conductors, are for ``physical-optics``,
+        ``reference`` (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
     tx, rx : (n, 3) array_like
         Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single (3,).
     frequency : float or (n,) array_like
         [Hz].
-    fidelity : {"specular", "analytic"}
+    fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}
         The rung.
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
     **dials
-        Of the rung: ``variant`` ("auto", "llvm", "scalar", "cuda") for `specular`.
+        Of the rung: ``variant`` ("auto", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
+        ``facets`` of ``physical-optics`` and ``reference``, ``rays_per_wavelength`` and ``bounces`` of ``rays``.
 
     Returns
     -------
@@ -50,76 +81,104 @@ def scattering_length(
     InputError
         Where shapes do not fit, an antenna is inside the target, or the rung or a dial is unknown.
     """
-    tx_array, rx_array, wavenumber = _pairs(tx, rx, frequency)
+    tx_array, rx_array, frequencies = _pairs(tx, rx, frequency)
     if polarization not in ("v", "h"):
         raise InputError(f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h")
-    known = {"analytic": (), "specular": ("variant",)}
-    if fidelity not in known:
-        raise InputError(f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(known)}")
-    for dial in dials:
-        if dial not in known[fidelity]:
-            allowed = ", ".join(known[fidelity]) or "none"
-            raise InputError(f"scattering_length: '{fidelity}' has no dial '{dial}'; it has: {allowed}")
-    if not isinstance(target, Ellipsoids):
+    if fidelity not in _HOMES:
+        raise InputError(f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(_HOMES)}")
+    home = _HOMES[fidelity]
+    if isinstance(target, Ellipsoids):
+        for name, antennas in (("tx", tx_array), ("rx", rx_array)):
+            _refuse_inside(target, name, antennas)
+    elif not home.meshes:
         raise InputError(
             f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it needs curvature in closed form"
         )
-    for name, antennas in (("tx", tx_array), ("rx", rx_array)):
-        _refuse_inside(target, name, antennas)
-    pairs = len(tx_array)
-    poses = (
-        np.broadcast_to(target.centres, (pairs, *target.centres.shape)),
-        np.broadcast_to(target.frames, (pairs, *target.frames.shape)),
-        target.semi_axes,
-    )
-    if fidelity == "analytic":
-        length, amplitude = far_field_echo(tx_array, rx_array[:, None], *poses)
-    else:
-        length, amplitude = _specular(target, tx_array, rx_array, poses, polarization, **dials)
-    range_tx, range_rx = np.linalg.norm(tx_array, axis=1), np.linalg.norm(rx_array, axis=1)
-    phase = np.exp(-1j * wavenumber[:, None] * (length[:, 0] - (range_tx + range_rx)[:, None]))
+    elif not (hasattr(target, "vertices") and hasattr(target, "faces")):
+        raise InputError(f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or trimesh.Trimesh")
+    # On use: what traces brings Mitsuba.
+    field: Field = getattr(import_module(f"rtradar.scatter.{home.module}"), home.function)
+    known = [name for name in inspect.signature(field).parameters if name not in _COMMON]
+    for dial in dials:
+        if dial not in known:
+            allowed = ", ".join(known) or "none"
+            raise InputError(f"scattering_length: '{fidelity}' has no dial '{dial}'; it has: {allowed}")
+    if isinstance(target, Ellipsoids) and len(tx_array):
+        _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
+        wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
+        warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
+    return field(target, tx_array, rx_array, frequencies, polarization=polarization, **dials)
+
+
+def _analytic_field(
+    target: Ellipsoids,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    polarization: Literal["v", "h"],
+) -> NDArray[np.complex128]:
+    length, amplitude = far_field_echo(tx, rx[:, None], *_poses(target, len(tx)))
+    return _sum(length, amplitude, tx, rx, frequency)
+
+
+def _specular_field(
+    target: Ellipsoids,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+    polarization: Literal["v", "h"],
+    variant: str = "auto",
+) -> NDArray[np.complex128]:
+    from rtradar.scatter.mirror import mirror
+    from rtradar.scatter.occlusion import unobstructed
+    from rtradar.trace.backend import select, use
+    from rtradar.trace.body_tracer import BodyTracer
+
+    length, amplitude, points = mirror(tx, rx[:, None], *_poses(target, len(tx)), polarization=polarization, points=True)
+    tracer = BodyTracer(use(select(variant)), target.semi_axes)
+    tracer.pose(target.centres, target.frames)
+    return _sum(length, amplitude * unobstructed(tracer, tx, rx[:, None], points), tx, rx, frequency)
+
+
+def _poses(target: Ellipsoids, pairs: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """The pose repeated for every pair, and the semi-axes."""
+    centres, frames = (np.broadcast_to(array, (pairs, *array.shape)) for array in (target.centres, target.frames))
+    return centres, frames, target.semi_axes
+
+
+def _sum(
+    length: NDArray[np.float64],
+    amplitude: NDArray[np.generic],
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    frequency: NDArray[np.float64],
+) -> NDArray[np.complex128]:
+    """Echoes (pair, 1, part) with 1 / (R1 R2) in them to one field a pair, relative to the path over the origin."""
+    range_tx, range_rx = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
+    excess = length[:, 0] - (range_tx + range_rx)[:, None]
+    phase = np.exp(-2j * np.pi * frequency[:, None] / SPEED_OF_LIGHT_MPS * excess)
     return np.asarray((amplitude[:, 0] * phase).sum(axis=1) * range_tx * range_rx)
 
 
 def _pairs(
     tx: ArrayLike, rx: ArrayLike, frequency: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Antennas (n, 3) twice and wavenumbers (n,)."""
+    """Antennas (n, 3) twice and frequencies (n,)."""
     try:
         tx_array, rx_array = (np.atleast_2d(np.asarray(antenna, dtype=np.float64)) for antenna in (tx, rx))
-        wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+        frequencies = np.asarray(frequency, dtype=np.float64)
     except (TypeError, ValueError):
         raise InputError("scattering_length: tx, rx [m] and frequency [Hz] must be numbers") from None
-    shapes = f"tx {tx_array.shape}, rx {rx_array.shape}, frequency {wavenumber.shape}"
-    counts = {len(tx_array), len(rx_array), *wavenumber.shape} - {1}
-    if tx_array.shape[1:] != (3,) or rx_array.shape[1:] != (3,) or wavenumber.ndim > 1 or len(counts) > 1:
+    shapes = f"tx {tx_array.shape}, rx {rx_array.shape}, frequency {frequencies.shape}"
+    counts = {len(tx_array), len(rx_array), *frequencies.shape} - {1}
+    if tx_array.shape[1:] != (3,) or rx_array.shape[1:] != (3,) or frequencies.ndim > 1 or len(counts) > 1:
         raise InputError(f"scattering_length: shapes {shapes}; they must be (n, 3), (n, 3), (n,), or one for all")
     if not (np.isfinite(tx_array).all() and np.isfinite(rx_array).all()):
         raise InputError("scattering_length: tx and rx must be finite [m]")
-    if not (np.isfinite(wavenumber) & (wavenumber > 0)).all():
+    if not (np.isfinite(frequencies) & (frequencies > 0)).all():
         raise InputError("scattering_length: frequency must be positive and finite [Hz]")
     n = counts.pop() if counts else 1
-    return np.broadcast_to(tx_array, (n, 3)), np.broadcast_to(rx_array, (n, 3)), np.broadcast_to(wavenumber, (n,))
-
-
-def _specular(
-    target: Ellipsoids,
-    tx: NDArray[np.float64],
-    rx: NDArray[np.float64],
-    poses: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
-    polarization: Literal["v", "h"],
-    variant: str = "auto",
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    # On use: these bring numba and Mitsuba.
-    from rtradar.scatter.mirror import mirror
-    from rtradar.scatter.occlusion import unobstructed
-    from rtradar.trace.backend import select, use
-    from rtradar.trace.body_tracer import BodyTracer
-
-    length, amplitude, points = mirror(tx, rx[:, None], *poses, polarization=polarization, points=True)
-    tracer = BodyTracer(use(select(variant)), target.semi_axes)
-    tracer.pose(target.centres, target.frames)
-    return length, amplitude * unobstructed(tracer, tx, rx[:, None], points)
+    return np.broadcast_to(tx_array, (n, 3)), np.broadcast_to(rx_array, (n, 3)), np.broadcast_to(frequencies, (n,))
 
 
 def _refuse_inside(target: Ellipsoids, name: str, antennas: NDArray[np.float64]) -> None:

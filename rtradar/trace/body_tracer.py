@@ -113,7 +113,9 @@ class BodyTracer:
         dr.eval(found.t, found.prim_index, found.prim_uv, instance)
         distance = found.t.numpy().astype(np.float64)
         part = np.where(np.isfinite(distance), self._part_of[instance.numpy()], -1)
-        return part, distance, found.prim_index.numpy().astype(np.int64), found.prim_uv.numpy().astype(np.float64).T
+        # A ray that misses leaves its coordinates unset, and what stands there need not be a number.
+        barycentric = np.where(part >= 0, found.prim_uv.numpy(), np.float32(0))
+        return part, distance, found.prim_index.numpy().astype(np.int64), barycentric.astype(np.float64).T
 
     def _trace_scalar(self, starts: NDArray[np.float64], directions: NDArray[np.float64]) -> tuple[Any, Any, Any, Any]:
         mi = self._mi

@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 FIDELITIES = ("specular", "analytic")
 seeds = st.integers(0, 2**32 - 1)
 
+# Laws hold for any size, also where optics is no longer true.
+pytestmark = pytest.mark.filterwarnings("ignore:.*radius of curvature:rtradar.errors.ValidityWarning")
+
 
 def ellipsoid(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) -> rt.Ellipsoids:
     return rt.Ellipsoids([centre], [np.eye(3) if frame is None else frame], [axes])

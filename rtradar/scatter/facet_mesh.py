@@ -1,0 +1,196 @@
+"""Physical optics of any triangle mesh: closed, or open and then a thin sheet lit from both sides.
+
+Triangles of the mesh are flat, and stay so however they are divided: they are divided where spherical waves bend over them
+by more than linear phase can follow, and where the edge of a shadow runs through them, as Mitsuba tells at four points of
+each, down to a quarter of a wavelength.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.scatter.facet_integral import facet_integral
+from rtradar.scatter.facets import mesh_facets
+from rtradar.scatter.polarization import copolar
+from rtradar.trace.backend import select, use
+from rtradar.trace.mesh_visibility import MeshTracer
+
+if TYPE_CHECKING:
+    import trimesh
+
+LARGEST_KA = 400.0
+"""Of a smooth mesh; a larger one must have the facets that an ellipsoid of its surface would need."""
+
+_BENT_PHASE = 0.05
+"""Phase that spherical waves may depart from linear over a facet [rad]: 2 % of its field, were all alike."""
+
+_MOST_FACETS = 5_000_000
+_DIVISIONS = 7
+"""How often a facet on the edge of a shadow is divided at the most."""
+
+_FOUR = np.array([[1, 1, 1], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / np.array([[3], [6], [6], [6]])
+"""Middles of the four equal triangles that a triangle divides into, barycentric."""
+
+_HALVES = np.array(
+    [
+        [[1, 0, 0], [0.5, 0.5, 0], [0.5, 0, 0.5]],
+        [[0.5, 0.5, 0], [0, 1, 0], [0, 0.5, 0.5]],
+        [[0.5, 0, 0.5], [0, 0.5, 0.5], [0, 0, 1]],
+        [[0.5, 0.5, 0], [0, 0.5, 0.5], [0.5, 0, 0.5]],
+    ]
+)
+"""Corners of those four, barycentric, turned as the whole."""
+
+Array = NDArray[np.float64]
+
+
+def mesh_scattering(
+    mesh: trimesh.Trimesh,
+    tx: Array,
+    rx: Array,
+    wavenumber: Array,
+    polarization: Literal["v", "h"],
+    variant: str,
+) -> NDArray[np.complex128]:
+    """Scattering length (n,) [m] of a mesh for antennas ``tx, rx (n, 3)`` [m] and ``wavenumber (n,)`` [rad/m].
+
+    Raises
+    ------
+    InputError
+        Where the mesh has no surface, is too coarse, or an antenna is inside of it.
+    BackendError
+        Where no backend of that kind works here.
+    """
+    corners, closed = _oriented(mesh)
+    _refuse_coarse(mesh, float(wavenumber.max()))
+    tracer = MeshTracer(use(select(variant)), corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    middle = corners.mean(axis=(0, 1))
+    if closed:
+        for name, antennas in (("tx", tx), ("rx", rx)):
+            _refuse_inside(corners, name, antennas)
+    field = np.empty(len(tx), dtype=np.complex128)
+    for pair in range(len(tx)):
+        divided, face = _divide_bent(corners, tx[pair], rx[pair], wavenumber[pair])
+        divided, shares = _seen(tracer, divided, face, np.stack([tx[pair], rx[pair]]), closed, wavenumber[pair])
+        facets = mesh_facets(divided.reshape(-1, 3), np.arange(3 * len(divided)).reshape(-1, 3), both_sides=not closed)
+        distances = np.linalg.norm(tx[pair]), np.linalg.norm(rx[pair])
+        one = facet_integral(
+            facets,
+            np.zeros(1, dtype=np.int64),
+            np.stack([tx[pair], rx[pair]])[None],
+            np.array([[0, 1]]),
+            shares,
+            np.array([[0, 1]]),
+            np.array([[distances[0] + distances[1]]]),
+            wavenumber[pair : pair + 1, None],
+        )
+        field[pair] = one[0, 0, 0] * distances[0] * distances[1]
+    return field * copolar(tx - middle, rx - middle, polarization)
+
+
+def _oriented(mesh: trimesh.Trimesh) -> tuple[Array, bool]:
+    """Corners (facet, 3, 3) of the triangles that have an area, outward where the mesh is closed; whether it is."""
+    vertices = np.asarray(mesh.vertices, dtype=np.float64)
+    if len(mesh.faces) == 0 or not np.isfinite(vertices).all():
+        raise InputError("scattering_length: the mesh has no triangle or holds NaN; give one with finite vertices")
+    closed = bool(mesh.is_watertight)
+    if closed and not mesh.is_winding_consistent:
+        mesh = mesh.copy()
+        mesh.fix_normals()
+    corners = vertices[np.asarray(mesh.faces)]
+    if closed and mesh.volume < 0:
+        corners = corners[:, ::-1]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    if not area.any():
+        raise InputError("scattering_length: no triangle of the mesh has an area; give a surface")
+    return np.ascontiguousarray(corners[area > 0]), closed
+
+
+def _refuse_coarse(mesh: trimesh.Trimesh, wavenumber: float) -> None:
+    """A smooth mesh beyond ka = 400 needs 6 (ka)^2 facets on the surface of its sphere, and its share of them."""
+    spread = np.asarray(mesh.vertices) - np.asarray(mesh.bounds).mean(axis=0)
+    radius = float(np.linalg.norm(spread, axis=1).max())
+    ka = wavenumber * radius
+    if ka <= LARGEST_KA:
+        return
+    angles = np.asarray(mesh.face_adjacency_angles)
+    # What meets at sharper angles is an edge, at less than a thousandth of a radian one plane.
+    if np.count_nonzero((angles > 1e-3) & (angles < 0.5)) <= len(angles) / 2:
+        return
+    needed = math.ceil(6 * ka**2 * float(mesh.area) / (4 * math.pi * radius**2))
+    if len(mesh.faces) < needed:
+        raise InputError(
+            f"physical optics of a smooth mesh with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs {needed} facets; "
+            f"it has {len(mesh.faces)}: mesh it finer"
+        )
+
+
+def _refuse_inside(corners: Array, name: str, antennas: Array) -> None:
+    """By the solid angle under which the mesh is seen, 4 pi from inside (Van Oosterom and Strackee, 1983)."""
+    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+    for index in np.flatnonzero(((antennas >= low) & (antennas <= high)).all(axis=1)):
+        ways = corners - antennas[index]
+        a, b, c = ways[:, 0], ways[:, 1], ways[:, 2]
+        la, lb, lc = (np.linalg.norm(way, axis=1) for way in (a, b, c))
+        volume = np.sum(a * np.cross(b, c), axis=1)
+        below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
+        if abs(np.arctan2(volume, below).sum()) > math.pi:
+            raise InputError(f"scattering_length: {name}[{index}] is inside the mesh; antennas must stand outside the target")
+
+
+def _divide_bent(corners: Array, tx: Array, rx: Array, wavenumber: float) -> tuple[Array, NDArray[np.int64]]:
+    """Divide facets until spherical waves are plane over each; corners (n, 3, 3), and the triangle each came from (n,)."""
+    face = np.arange(len(corners))
+    done: list[tuple[Array, NDArray[np.int64]]] = []
+    while len(corners):
+        middle = corners.mean(axis=1)
+        size = np.linalg.norm(corners - middle[:, None], axis=2).max(axis=1)
+        # No nearer than the facet's own middle less its size; an antenna on the surface divides only so far.
+        bend = np.zeros(len(corners))
+        for antenna in (tx, rx):
+            distance = np.maximum(np.linalg.norm(middle - antenna, axis=1), size)
+            bend += wavenumber * size**2 / (2 * distance)
+        coarse = bend > _BENT_PHASE
+        done.append((corners[~coarse], face[~coarse]))
+        corners, face = _quarter(corners[coarse]), np.repeat(face[coarse], 4)
+        if len(corners) + sum(len(kept) for kept, _ in done) > _MOST_FACETS:
+            raise InputError(
+                f"physical optics of this mesh from so near takes more than {_MOST_FACETS} facets; stand farther away, "
+                "lower the frequency, or take 'specular' on ellipsoids"
+            )
+    return np.concatenate([kept for kept, _ in done]), np.concatenate([of for _, of in done])
+
+
+def _seen(
+    tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antennas: Array, closed: bool, wavenumber: float
+) -> tuple[Array, NDArray[np.float32]]:
+    """Divide facets on edges of shadows; their corners (n, 3, 3), and the share that each antenna sees (antenna, n)."""
+    done: list[tuple[Array, Array]] = []
+    for level in range(_DIVISIONS + 1):
+        shares = np.stack([_sampled(tracer, corners, face, antenna, closed) for antenna in antennas])
+        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        mixed = ((shares > 0) & (shares < 1)).any(axis=0) & (edge > math.pi / (2 * wavenumber)) & (level < _DIVISIONS)
+        done.append((corners[~mixed], shares[:, ~mixed]))
+        corners, face = _quarter(corners[mixed]), np.repeat(face[mixed], 4)
+        if not len(corners):
+            break
+    return np.concatenate([kept for kept, _ in done]), np.concatenate([of for _, of in done], axis=1).astype(np.float32)
+
+
+def _sampled(tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antenna: Array, closed: bool) -> Array:
+    """Share of four points of each facet that the antenna sees; those that face away from it are not asked about."""
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    facing = np.flatnonzero((np.sum(normal * (antenna - corners[:, 0]), axis=1) > 0) | (not closed))
+    points = _FOUR @ corners[facing]
+    share = np.zeros(len(corners))
+    share[facing] = tracer.sees(antenna, points.reshape(-1, 3), np.repeat(face[facing], 4)).reshape(-1, 4).mean(axis=1)
+    return share
+
+
+def _quarter(corners: Array) -> Array:
+    return (_HALVES @ corners[:, None]).reshape(-1, 3, 3)

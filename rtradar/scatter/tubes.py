@@ -1,0 +1,217 @@
+"""Tubes of rays: small facets fixed in the material of a target, at whose corners and middles rays are aimed.
+
+A facet seen from a Tx is a tube. As the facets move with the body, each tube keeps its place in the material, and the sum
+over tubes changes as smoothly from chirp to chirp as the body moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+
+MOST_TUBES = 4_000_000
+"""Some 1.5 GB; a body at 77 GHz with 3 rays per wavelength has 2.4 million."""
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Tubes:
+    """Facets at which rays are aimed.
+
+    Parameters
+    ----------
+    places, normals : (tube, 4, 3) float64
+        Three corners and the centroid of each facet [m], and the unit normals of the smooth surface there.
+    surface : (tube,) int64
+        Part or face that the facet belongs to.
+    """
+
+    places: Array
+    normals: Array
+    surface: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        return len(self.surface)
+
+
+@dataclass(frozen=True)
+class EllipsoidGrid:
+    """Facets of the parts of a body, in the axes in which each part is a unit sphere; they outlive every pose.
+
+    Parameters
+    ----------
+    corners : (tube, 3, 3) float64
+        On a sphere a little larger than 1, so that the mean of |x|^2 over the facets is 1.
+    part : (tube,) int64
+    """
+
+    corners: Array
+    part: NDArray[np.int64]
+
+    @classmethod
+    def cover(cls, semi_axes: Array, edge: float) -> EllipsoidGrid:
+        """As many facets on each part as equilateral triangles of that edge [m] would cover it.
+
+        They are stretched with the part: long where it bends little, which costs no accuracy, for the phase over each is
+        integrated exactly as far as it is linear.
+
+        Raises
+        ------
+        InputError
+            Where they would be more than `MOST_TUBES`.
+        """
+        divisions = np.maximum(2, np.ceil(np.sqrt(_areas(semi_axes) / (5 * np.sqrt(3) * edge**2))))
+        _refuse_many(20 * divisions**2)
+        grids = [_sphere(int(n)) for n in divisions]
+        return cls(np.concatenate(grids), np.repeat(np.arange(len(grids)), [len(grid) for grid in grids]))
+
+    def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
+        """Those facets, each in four, on the sphere of the corners' own radius less what finer facets stand out less."""
+        quarters = _in_four(self.corners[which])
+        # The corners stand out by 3/2 of what the middle lies below the sphere's mean; a quarter of it with half the edge.
+        out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
+        size = np.linalg.norm(quarters, axis=-1, keepdims=True)
+        quarters *= (1 + np.repeat(out, 4)[:, None, None] / 4) / size
+        return EllipsoidGrid(quarters, np.repeat(self.part[which], 4))
+
+
+@dataclass(frozen=True)
+class PosedGrid:
+    """Facets of a body in one pose.
+
+    Parameters
+    ----------
+    grid : EllipsoidGrid
+    centres, frames, semi_axes : (part, 3), (part, 3, 3), (part, 3) float64
+        [m].
+    """
+
+    grid: EllipsoidGrid
+    centres: Array
+    frames: Array
+    semi_axes: Array
+
+    @cached_property
+    def tubes(self) -> Tubes:
+        """The facets in the world."""
+        u, part = _with_middle(self.grid.corners), self.grid.part
+        place, normal = np.empty_like(u), np.empty_like(u)
+        for index, (centre, frame, axes) in enumerate(zip(self.centres, self.frames, self.semi_axes, strict=True)):
+            own = slice(*np.searchsorted(part, [index, index + 1]))
+            place[own] = centre + (u[own] * axes) @ frame.T
+            normal[own] = (u[own] / axes) @ frame.T
+        normal /= np.linalg.norm(normal, axis=-1, keepdims=True)
+        return Tubes(place, normal, part)
+
+    def split(self, which: NDArray[np.int64]) -> PosedGrid:
+        """Those facets, each in four."""
+        return PosedGrid(self.grid.split(which), self.centres, self.frames, self.semi_axes)
+
+
+@dataclass(frozen=True)
+class MeshGrid:
+    """Facets of the faces of a mesh.
+
+    Parameters
+    ----------
+    corners : (tube, 3, 3) float64
+        [m].
+    face : (tube,) int64
+    """
+
+    corners: Array
+    face: NDArray[np.int64]
+
+    @classmethod
+    def cover(cls, vertices: Array, faces: NDArray[np.integer], edge: float) -> MeshGrid:
+        """Cut every face, along each side into the same number, until no facet has a side longer than ``edge`` [m].
+
+        Raises
+        ------
+        InputError
+            Where they would be more than `MOST_TUBES`.
+        """
+        triangles = np.asarray(vertices, dtype=np.float64)[faces]
+        longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
+        divisions = np.maximum(1, np.ceil(longest / edge * (1 - 1e-12)))
+        _refuse_many(divisions**2)
+        flat = np.linalg.norm(_across(triangles), axis=1) <= 1e-12 * longest**2
+        corners, face = [np.empty((0, 3, 3))], [np.empty(0, dtype=np.int64)]
+        for n in np.unique(divisions[~flat]).astype(int):
+            own = np.flatnonzero((divisions == n) & ~flat)
+            corners.append(np.einsum("fkc,tci->tfki", _cut(n), triangles[own]).reshape(-1, 3, 3))
+            face.append(np.repeat(own, n * n))
+        return cls(np.concatenate(corners), np.concatenate(face))
+
+    @cached_property
+    def tubes(self) -> Tubes:
+        """The facets with their flat normals, anticlockwise seen from the side they point to."""
+        normal = _across(self.corners)
+        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+        places = _with_middle(self.corners)
+        return Tubes(places, np.broadcast_to(normal[:, None], places.shape), self.face)
+
+    def split(self, which: NDArray[np.int64]) -> MeshGrid:
+        """Those facets, each in four."""
+        return MeshGrid(_in_four(self.corners[which]), np.repeat(self.face[which], 4))
+
+
+def _with_middle(corners: Array) -> Array:
+    return np.concatenate([corners, corners.mean(axis=1, keepdims=True)], axis=1)
+
+
+def _across(triangles: Array) -> Array:
+    return np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+
+
+def _refuse_many(counts: Array) -> None:
+    if counts.sum() > MOST_TUBES:
+        raise InputError(f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; lower rays_per_wavelength or the frequency")
+
+
+def _areas(semi_axes: Array) -> Array:
+    """Surface of ellipsoids by Thomsen's formula, 1 % off at most [m^2]."""
+    p = 1.6075
+    powers = np.asarray(semi_axes) ** p
+    a, b, c = powers[:, 0], powers[:, 1], powers[:, 2]
+    return 4 * np.pi * ((a * b + a * c + b * c) / 3) ** (1 / p)
+
+
+@lru_cache(maxsize=64)
+def _cut(n: int) -> Array:
+    """Barycentric weights (n^2, 3 corners, 3) of a triangle cut into n^2 like ones, all of its orientation."""
+    i, j = (index.ravel() for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+    up, down = i + j < n, i + j < n - 1
+
+    def at(i: NDArray[np.int64], j: NDArray[np.int64]) -> Array:
+        return np.stack([n - i - j, i, j], axis=-1) / n
+
+    upright = np.stack([at(i[up], j[up]), at(i[up] + 1, j[up]), at(i[up], j[up] + 1)], axis=1)
+    i, j = i[down], j[down]
+    turned = np.stack([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)], axis=1)
+    return np.concatenate([upright, turned])
+
+
+@lru_cache(maxsize=64)
+def _sphere(n: int) -> Array:
+    """Corners (20 n^2, 3, 3) of an icosahedron cut n-fold and blown up to a sphere whose mean |x|^2 is 1."""
+    import trimesh  # slow to import
+
+    ball = trimesh.creation.icosahedron()
+    triangles = np.asarray(ball.vertices, dtype=np.float64)[np.asarray(ball.faces)]
+    corners = np.einsum("fkc,tci->tfki", _cut(n), triangles).reshape(-1, 3, 3)
+    corners /= np.linalg.norm(corners, axis=-1, keepdims=True)
+    areas = np.linalg.norm(_across(corners), axis=1)
+    # Mean of |x|^2 over a triangle with corners of length 1: (3 + |a + b + c|^2) / 12.
+    means = (3 + (corners.sum(axis=1) ** 2).sum(axis=-1)) / 12
+    return corners / np.sqrt((areas * means).sum() / areas.sum())
+
+
+def _in_four(triangles: Array) -> Array:
+    return np.einsum("fkc,tci->tfki", _cut(2), triangles).reshape(-1, 3, 3)

@@ -1,0 +1,220 @@
+"""Surfaces for rays that bounce: Mitsuba says which one a ray meets, float64 says where.
+
+The scene of Mitsuba is in float32 and made of triangles, so of its answer only the name of what was met is kept: the
+part of a body, or the face of a mesh. The place follows in float64 from the ray and that ellipsoid, or that face's plane.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.trace.body_tracer import BodyTracer
+
+_LIFT_OF_PART = 1e-3
+"""Of the largest semi-axis: the traced triangles of a part lie up to 0.07 % outside it, and must not stop rays that leave it."""
+_LIFT_OF_MESH = 1e-5
+"""Of the mesh's radius: a hundred times the step of float32."""
+_BEHIND = 1e-7  # relative; what is met this little before a point is the point itself
+
+Array = NDArray[np.float64]
+
+
+class Surfaces(Protocol):
+    """What rays can meet: a posed body or a mesh; surfaces go by their numbers, -1 is none.
+
+    ``flat`` tells whether surfaces are flat faces.
+    """
+
+    flat: bool
+
+    def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether nothing but the surface that a point lies on, ``own (ray,)``, is nearer to its antenna, both (ray, 3)."""
+        ...
+
+    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+        """Surface (ray,) met first from points on surfaces ``own``, on the side of the normals, and how far, in float32 [m].
+
+        ``directions (ray, 3)`` are unit vectors; the way is infinite where nothing is met.
+        """
+        ...
+
+    def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
+        """Way to that surface along lines, float64 [m]; NaN where there is none. Leading axes as those of ``surface``."""
+        ...
+
+    def normal(self, surface: NDArray[np.int64], points: Array, directions: Array) -> Array:
+        """Unit normals of the surfaces at points on them, on the side that rays along ``directions`` come from."""
+        ...
+
+
+class _PartTracer(BodyTracer):
+    """A posed body that tells which part is met, and no place: most rays ask no more."""
+
+    def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Part (ray,) met first, -1 for none, and distance (ray,) [m]; ``directions (ray, 3)`` are unit vectors."""
+        if len(origins) == 0:
+            # Dr.Jit takes the process down over arrays without entries.
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
+        if self._scalar:
+            part, distance, _, _ = self._trace_scalar(starts, directions)
+            return part, distance + ahead
+        instance, distance = first_hits(self._mi, self._scene, starts, directions, "instance")
+        return np.where(np.isfinite(distance), self._part_of[instance], -1), distance + ahead
+
+
+def first_hits(
+    mi: Any, scene: Any, starts: Array, directions: Array, what: Literal["instance", "prim_index"]
+) -> tuple[NDArray[np.uint32], Array]:
+    """Number (ray,) of what vector variants meet first, without meaning where the distance (ray,) is infinite."""
+    import drjit as dr
+
+    origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, directions))
+    found = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)), coherent=False)
+    met = dr.reinterpret_array(mi.UInt32, getattr(found, what))
+    dr.eval(found.t, met)
+    return met.numpy(), found.t.numpy().astype(np.float64)
+
+
+def into_ball(starts: Array, directions: Array, radius: float) -> tuple[Array, Array]:
+    """Where rays enter the ball about 0, (ray, 3), and how far that is: float32 is too coarse for a far antenna."""
+    along = -np.einsum("ij,ij->i", starts, directions)
+    # Of the nearest point, not of the start: squares of 1e6 m would swallow it.
+    nearest = starts + along[:, None] * directions
+    half_chord = np.sqrt(np.maximum(radius**2 - np.einsum("ij,ij->i", nearest, nearest), 0.0))
+    ahead = np.maximum(along - half_chord, 0.0)
+    return starts + ahead[:, None] * directions, ahead
+
+
+class BodySurfaces:
+    """Ellipsoids, posed; a surface is a part.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    semi_axes : (part, 3) float64
+        [m].
+    """
+
+    flat = False
+
+    def __init__(self, mi: Any, semi_axes: Array) -> None:
+        self._tracer = _PartTracer(mi, semi_axes)
+        self._axes = np.asarray(semi_axes, dtype=np.float64)
+        self._centres, self._frames = np.zeros_like(self._axes), np.zeros((len(self._axes), 3, 3))
+
+    def pose(self, centres: Array, frames: Array) -> None:
+        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``."""
+        self._tracer.pose(centres, frames)
+        self._centres, self._frames = centres, frames
+
+    def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """As `Surfaces.sees`; a part does not hide itself here, for its normal tells that."""
+        directions = points - antennas
+        range_m = np.sqrt(np.einsum("ij,ij->i", directions, directions))
+        part, distance = self._tracer.first_parts(antennas, directions / range_m[:, None])
+        return ~((part != own) & (distance < range_m * (1 - _BEHIND)))
+
+    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+        """As `Surfaces.meets`."""
+        lifted = points + _LIFT_OF_PART * self._axes.max(axis=1)[own][:, None] * normals
+        return self._tracer.first_parts(lifted, directions)
+
+    def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
+        """As `Surfaces.distance`: where the line enters the ellipsoid."""
+        o, d = self._stretched(surface, origins - self._centres[surface]), self._stretched(surface, directions)
+        square, half, rest = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
+        root = half**2 - square * rest
+        return np.where(root > 0, (-half - np.sqrt(np.maximum(root, 0.0))) / square, np.nan)
+
+    def normal(self, surface: NDArray[np.int64], points: Array, directions: Array) -> Array:
+        """As `Surfaces.normal`; always outward, and so no normal for rays that come from inside."""
+        local = self._stretched(surface, points - self._centres[surface]) / self._axes[surface]
+        normal = np.einsum("...ij,...j->...i", self._frames[surface], local)
+        return normal / np.linalg.norm(normal, axis=-1, keepdims=True)
+
+    def _stretched(self, surface: NDArray[np.int64], vectors: Array) -> Array:
+        """To the axes in which the part is the unit sphere."""
+        return np.einsum("...ji,...j->...i", self._frames[surface], vectors) / self._axes[surface]
+
+
+class MeshSurfaces:
+    """A triangle mesh; a surface is a face, and reflects on both sides.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    vertices, faces : (vertex, 3) float64, (face, 3) int
+        [m].
+    """
+
+    flat = True
+
+    def __init__(self, mi: Any, vertices: Array, faces: NDArray[np.integer]) -> None:
+        corners = np.asarray(vertices, dtype=np.float64)[faces]
+        used = corners.reshape(-1, 3)
+        self._mi, self._scalar = mi, mi.variant().startswith("scalar")
+        self._centre = (used.max(axis=0) + used.min(axis=0)) / 2
+        self._ball = float(np.linalg.norm(used - self._centre, axis=1).max()) * 1.01
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        # A face without area has no normal and is never met: any unit vector serves.
+        size = np.linalg.norm(across, axis=1, keepdims=True)
+        self._normals = np.where(size > 0, across / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
+        self._places = corners[:, 0]
+        mesh = mi.Mesh("target", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
+        parameters["faces"] = np.ravel(faces).astype(np.uint32)
+        parameters.update()
+        self._scene = mi.load_dict({"type": "scene", "target": mesh})
+
+    def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """As `Surfaces.sees`."""
+        face, met = self._first_hits(antennas, points - antennas)
+        # Within the ball float32 knows distances to a millionth of its radius.
+        nearer = met < np.linalg.norm(points - antennas, axis=1) - 1e-6 * self._ball
+        return ~((face != own) & nearer)
+
+    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+        """As `Surfaces.meets`."""
+        return self._first_hits(points + _LIFT_OF_MESH * self._ball * normals, directions)
+
+    def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
+        """As `Surfaces.distance`: to the plane of the face, which has no border."""
+        normal = self._normals[surface]
+        steepness = (directions * normal).sum(-1)
+        height = ((self._places[surface] - origins) * normal).sum(-1)
+        return np.where(steepness != 0, height / np.where(steepness != 0, steepness, 1.0), np.nan)
+
+    def normal(self, surface: NDArray[np.int64], points: Array, directions: Array) -> Array:
+        """As `Surfaces.normal`."""
+        normal = self._normals[surface]
+        return np.where((directions * normal).sum(-1, keepdims=True) > 0, -normal, normal)
+
+    def _first_hits(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Face (ray,) met first, -1 for none, and distance (ray,) [m], infinite for none."""
+        if len(origins) == 0:
+            # Dr.Jit takes the process down over arrays without entries.
+            return np.empty(0, dtype=np.int64), np.empty(0)
+        directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
+        if self._scalar:
+            face, distance = self._trace_scalar(starts, directions)
+        else:
+            number, distance = first_hits(self._mi, self._scene, starts, directions, "prim_index")
+            face = np.where(np.isfinite(distance), number.astype(np.int64), -1)
+        return face, distance + ahead
+
+    def _trace_scalar(self, starts: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        mi = self._mi
+        face, distance = np.full(len(starts), -1, dtype=np.int64), np.full(len(starts), np.inf)
+        for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
+            found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction)))
+            if found.is_valid():
+                face[ray], distance[ray] = found.prim_index, found.t
+        return face, distance

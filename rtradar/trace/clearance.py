@@ -1,0 +1,28 @@
+"""How far a line of sight passes outside an ellipsoid, in closed form."""
+
+from __future__ import annotations
+
+import math
+
+from numba import njit
+
+
+@njit(cache=True, error_model="numpy")
+def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-def]
+    """Least distance of the way from antenna to point from the ellipsoid's middle, in its own unit, less 1.
+
+    Negative where the way goes through, or the point is inside. All in world axes (3,), columns of ``frame`` the directions
+    of the semi-axes.
+    """
+    start_square, span, along = 0.0, 0.0, 0.0
+    for i in range(3):
+        start, way = 0.0, 0.0
+        for j in range(3):
+            start += frame[j, i] * (antenna[j] - centre[j])
+            way += frame[j, i] * (point[j] - antenna[j])
+        start, way = start / axes[i], way / axes[i]
+        start_square += start * start
+        span += way * way
+        along += start * way
+    nearest = min(1.0, max(0.0, -along / span))
+    return math.sqrt(max(start_square + nearest * (2 * along + nearest * span), 0.0)) - 1

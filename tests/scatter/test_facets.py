@@ -1,0 +1,290 @@
+"""Facets: the integral over one, closed forms of many, the laws of scattering, shadows, and what is refused."""
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import rtradar as rt
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.scatter.facet_integral import facet_integral
+from rtradar.scatter.facet_scattering import facet_scattering
+from rtradar.scatter.facet_shadows import _positive_share
+from rtradar.scatter.facets import ellipsoid_facets, mesh_facets, subdivisions_for
+from rtradar.scatter.polarization import copolar
+from rtradar.trace.clearance import clearance
+
+Array = NDArray[np.float64]
+seeds = st.integers(0, 2**32 - 1)
+
+
+def ellipsoid(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) -> rt.Ellipsoids:
+    return rt.Ellipsoids([centre], [np.eye(3) if frame is None else frame], [axes])
+
+
+def square(side: float, x: float = 0.0, y: float = 0.0) -> trimesh.Trimesh:
+    half = side / 2
+    corners = [[x, y - half, -half], [x, y + half, -half], [x, y + half, half], [x, y - half, half]]
+    return trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False)
+
+
+def both(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
+    return trimesh.util.concatenate(meshes)
+
+
+def field(target: object, tx: Array, rx: Array, frequency: float, **dials: object) -> NDArray[np.complex128]:
+    tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
+    return facet_scattering(target, tx, rx, np.full(len(tx), frequency), **dials)  # type: ignore[arg-type]
+
+
+def directions(rng: np.random.Generator, n: int) -> Array:
+    random = rng.normal(size=(n, 3))
+    return random / np.linalg.norm(random, axis=1, keepdims=True)
+
+
+# -- one facet --------------------------------------------------------------------------------------------------------
+
+
+def mean_over_triangle(phases: Array, cells: int = 400) -> complex:
+    """Mean of exp(j phase), phase linear between its three corner values, by the midpoints of small triangles."""
+    i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
+    up, down = i + j < cells, i + j < cells - 1
+    u = np.concatenate([(i[up] + 1 / 3) / cells, (i[down] + 2 / 3) / cells])
+    v = np.concatenate([(j[up] + 1 / 3) / cells, (j[down] + 2 / 3) / cells])
+    return complex(np.exp(1j * (phases[0] + (phases[1] - phases[0]) * u + (phases[2] - phases[0]) * v)).mean())
+
+
+@settings(max_examples=40)
+@given(seeds, st.floats(-3, 1.7))
+def test_linear_phase_is_integrated_exactly(seed: int, size: float) -> None:
+    rng = np.random.default_rng(seed)
+    corners = rng.normal(size=(3, 3))
+    facets = mesh_facets(corners, np.array([[0, 1, 2]]), both_sides=True)
+    # As far as this its waves are plane to 1e-7 rad.
+    antenna = 1e9 * directions(rng, 1)[0]
+    path = 2 * (np.linalg.norm(corners - antenna, axis=1) - np.linalg.norm(antenna))
+    # From all alike to 50 rad of difference, through series and differences alike.
+    k = 10**size / np.ptp(path)
+    got = facet_integral(
+        facets,
+        np.zeros(1, dtype=int),
+        np.array([[antenna, antenna]]),
+        np.array([[0, 0]]),
+        np.ones((1, 1), np.float32),
+        np.array([[0, 1]]),
+        np.array([[2 * np.linalg.norm(antenna)]]),
+        np.array([[k]]),
+        spreading=False,
+    )[0, 0, 0]
+    facing = abs(facets.normals[0, 0] @ antenna) / np.linalg.norm(antenna)
+    expected = 1j * k / np.sqrt(np.pi) * facing * facets.areas[0, 0] * mean_over_triangle(-k * path)
+    # The midpoint sum is within (50 / 400)^2 / 24 of the exact mean; paths of 1e9 m have 1e-7 m of rounding.
+    scale = k / np.sqrt(np.pi) * facing * facets.areas[0, 0]
+    assert abs(got - expected) < 1e-3 * scale
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2))
+def test_positive_share_of_a_linear_function(a: float, b: float, c: float) -> None:
+    rng = np.random.default_rng(0)
+    u, v = rng.uniform(size=(2, 20_000))
+    fold = u + v > 1
+    u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
+    # 20 000 draws of a share have a standard deviation of at most 0.0036.
+    assert _positive_share(a, b, c) == pytest.approx(np.mean(a + (b - a) * u + (c - a) * v >= 0), abs=0.02)
+
+
+@given(seeds)
+def test_clearance_is_the_least_along_the_way(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    antenna, point, centre = rng.uniform(-2, 2, (3, 3))
+    axes, frame = rng.uniform(0.1, 1, 3), Rotation.random(random_state=seed).as_matrix()
+    way = antenna + np.linspace(0, 1, 20_001)[:, None] * (point - antenna)
+    least = np.linalg.norm((way - centre) @ frame / axes, axis=1).min() - 1
+    # Steps of 2e-4 over ways of up to 7 m and semi-axes of at least 0.1 m.
+    assert clearance(antenna, point, centre, frame, axes) == pytest.approx(least, abs=4e-3)
+
+
+# -- closed forms -----------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ka", [5.0, 10.0, 29.34, 80.0])
+def test_a_sphere_has_the_closed_form_of_physical_optics(ka: float) -> None:
+    frequency = ka * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
+    tx = 1e6 * directions(np.random.default_rng(1), 4)
+    decibel = 20 * np.log10(np.abs(field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency) / rt.rcs.sphere(0.1, frequency, "po")))
+    np.testing.assert_allclose(decibel, 0, atol=0.1)  # the accuracy promised
+
+
+def test_a_sphere_has_its_phase_over_the_origin() -> None:
+    tx = 1e6 * directions(np.random.default_rng(1), 4)
+    moved = field(ellipsoid(0.1, 0.1, 0.1, centre=-0.3 * tx[0] / 1e6), tx[0], tx[0], 3e9)
+    turn = np.exp(-2j * np.pi * 3e9 / SPEED_OF_LIGHT_MPS * 0.6)
+    # What is left is the spreading of 1e6 m against 1e6 + 0.3 m, and rounding of 1e6 m.
+    np.testing.assert_allclose(moved / field(ellipsoid(0.1, 0.1, 0.1), tx[0], tx[0], 3e9), turn, atol=1e-5)
+
+
+@pytest.mark.parametrize("frequency", [1e9, 3e9])
+def test_a_large_plate_returns_four_pi_area_squared_over_wavelength_squared(frequency: float) -> None:
+    tx = np.array([[1e7, 0, 0], [-1e7, 0, 0]])  # a sheet has two sides
+    wavelength = SPEED_OF_LIGHT_MPS / frequency
+    # Waves from 1e7 m bend over 5 m by 1e-4 rad.
+    np.testing.assert_allclose(np.abs(field(square(5.0), tx, tx, frequency)) ** 2, 4 * np.pi * 25**2 / wavelength**2, rtol=1e-6)
+
+
+def test_a_plate_aslant_has_side_lobes_of_a_square() -> None:
+    angle, k = np.radians(10), 2 * np.pi * 1e9 / SPEED_OF_LIGHT_MPS
+    tx = 1e7 * np.array([np.cos(angle), np.sin(angle), 0])
+    expected = k / np.sqrt(np.pi) * 25 * np.cos(angle) * np.abs(np.sinc(k * 5 * np.sin(angle) / np.pi))
+    np.testing.assert_allclose(np.abs(field(square(5.0), tx, tx, 1e9)), expected, rtol=1e-5)
+
+
+def test_a_mesh_of_a_sphere_is_a_sphere() -> None:
+    mesh = trimesh.creation.icosphere(5, radius=0.1)
+    tx, rx = np.array([[4.0, 0.3, 0.0]]), np.array([[4.0, -0.2, 0.1]])
+    fine = field(ellipsoid(0.1, 0.1, 0.1), tx, rx, 12e9, facets=20 * 4**5)
+    # The mesh lies 0.4 % of a facet inside the sphere: 2 k sag is 0.01.
+    np.testing.assert_allclose(field(mesh, tx, rx, 12e9), fine, rtol=0.02)
+    mesh.invert()  # outward is told by the volume
+    np.testing.assert_allclose(field(mesh, tx, rx, 12e9), fine, rtol=0.02)
+
+
+# -- laws -------------------------------------------------------------------------------------------------------------
+
+
+@settings(max_examples=15)
+@given(seeds)
+def test_tx_and_rx_may_be_swapped(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    frame = Rotation.random(random_state=seed).as_matrix()
+    tx = directions(rng, 3) * rng.uniform(1, 10, (3, 1))
+    rx = tx + rng.normal(0, 0.5, (3, 3))
+    for target in (ellipsoid(0.05, 0.07, 0.2, frame=frame), square(0.3, 0.1, 0.1)):
+        np.testing.assert_allclose(field(target, rx, tx, 5e9), field(target, tx, rx, 5e9), rtol=1e-9, atol=1e-12)
+
+
+@settings(max_examples=10)
+@given(seeds)
+def test_everything_may_be_turned(seed: int) -> None:
+    # About world z, which polarisation keeps.
+    rng = np.random.default_rng(seed)
+    turn = Rotation.from_euler("z", rng.uniform(0, 2 * np.pi)).as_matrix()
+    tx = directions(rng, 3) * rng.uniform(1, 10, (3, 1))
+    rx = tx + rng.normal(0, 0.5, (3, 3))
+    frame, centre = Rotation.random(random_state=seed).as_matrix(), np.array([0.1, 0.0, 0.2])
+    here = field(ellipsoid(0.05, 0.07, 0.2, centre=centre, frame=frame), tx, rx, 5e9)
+    there = field(ellipsoid(0.05, 0.07, 0.2, centre=turn @ centre, frame=turn @ frame), tx @ turn.T, rx @ turn.T, 5e9)
+    np.testing.assert_allclose(there, here, rtol=1e-8, atol=1e-12)
+
+
+def test_parts_beside_each_other_add_up() -> None:
+    rng = np.random.default_rng(2)
+    one, other = ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)), ellipsoid(0.05, 0.05, 0.2, centre=(0.2, -0.5, 0.1))
+    fields = ("centres", "frames", "semi_axes")
+    together = rt.Ellipsoids(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in fields))
+    tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.2, (5, 3))
+    rx = tx + np.array([0.0, 0.1, 0.0])
+    whole, *parts = (field(target, tx, rx, 6e9, facets=1280) for target in (together, one, other))
+    np.testing.assert_allclose(whole, sum(parts), rtol=1e-9)
+
+
+def test_polarization_of_a_mirror_by_hand() -> None:
+    # Tx along x, Rx along y: the mirror stands at 45 degrees. v lies along its surface and turns round, as everywhere;
+    # h is carried over from y to x, and kept.
+    tx, rx = np.array([1.0, 0, 0]), np.array([0, 2.0, 0])
+    assert copolar(tx, rx, "v") == pytest.approx(1)
+    assert copolar(tx, rx, "h") == pytest.approx(1)
+    for polarization in ("v", "h"):
+        assert copolar(tx, tx, polarization) == 1
+        assert copolar(tx, -tx, polarization) == 1
+        assert copolar(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]), polarization) == 1
+
+
+# -- shadows ----------------------------------------------------------------------------------------------------------
+
+
+def test_a_plate_in_the_shadow_of_another_shows_its_free_half() -> None:
+    # The front one ends at y = 0 as seen from the antenna, in the middle of the one behind.
+    tx = np.array([1e5, 0.0, 0.0])
+    front, behind = square(1.2, 2.0, -0.6), square(1.0)
+    half = trimesh.Trimesh([[0, 0, -0.5], [0, 0.5, -0.5], [0, 0.5, 0.5], [0, 0, 0.5]], [[0, 1, 2], [0, 2, 3]], process=False)
+    whole, alone, free = (field(target, tx, tx, 3e9) for target in (both(front, behind), front, half))
+    # The edge is found within a quarter of a wavelength, 25 mm of 500, and by half of that in the mean.
+    assert abs(whole - alone - free)[0] < 0.025 * abs(free)[0]
+
+
+def test_a_part_straight_behind_another_returns_nothing() -> None:
+    tx = np.array([[-4.0, 0.0, 0.0], [-4.0, 0.1, 0.05]])
+    both_parts = rt.Ellipsoids([[-0.4, 0, 0], [0, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1, 0.2, 0.2], [0.05, 0.05, 0.1]])
+    whole = field(both_parts, tx, tx, 6e9, facets=1280)
+    front = field(ellipsoid(0.1, 0.2, 0.2, centre=(-0.4, 0, 0)), tx, tx, 6e9, facets=1280)
+    np.testing.assert_allclose(whole, front, rtol=1e-12)
+
+
+def test_a_shadow_moves_over_a_body_without_jumps(backend: object) -> None:
+    # A sphere passes before an ellipsoid in steps of half a millimetre, a tenth of a facet.
+    kind = backend.kind  # type: ignore[attr-defined]
+    tx = np.array([[-4.0, 0.0, 0.0]])
+    y = np.arange(-10, 11) * 0.5e-3
+    alone = field(ellipsoid(0.07, 0.07, 0.2), tx, tx, 6e9, facets=1280)[0]
+    values = []
+    for place in y[:: 10 if kind == "scalar" else 1]:
+        sphere = ellipsoid(0.06, 0.06, 0.06, centre=(-0.5, place + 0.06, 0))
+        target = rt.Ellipsoids(
+            [[0, 0, 0], *sphere.centres], np.tile(np.eye(3), (2, 1, 1)), [[0.07, 0.07, 0.2], *sphere.semi_axes]
+        )
+        shadowed = field(target, tx, tx, 6e9, facets=1280, variant=kind) - field(sphere, tx, tx, 6e9, facets=1280)
+        values.append(shadowed[0] / alone)
+    # Over 10 mm a fifth of the field comes free; a facet that popped would be a step of 0.02 among those of 0.012.
+    assert abs(values[-1] - values[0]) > 0.15
+    if kind != "scalar":
+        assert np.abs(np.diff(values, 2)).max() < 0.002
+
+
+def test_what_faces_away_returns_nothing_and_no_nan() -> None:
+    assert field(ellipsoid(0.1, 0.1, 0.1), np.array([4.0, 0, 0]), np.array([-4.0, 0, 0]), 3e9)[0] == 0
+    edge_on = np.array([0.0, 4.0, 0.0])
+    np.testing.assert_allclose(field(square(0.5), edge_on, edge_on, 3e9), 0, atol=1e-12)
+    # From either side of a sheet there is no way through.
+    assert field(square(0.5), np.array([4.0, 0, 0]), np.array([-4.0, 0, 0]), 3e9)[0] == 0
+
+
+# -- bad input --------------------------------------------------------------------------------------------------------
+
+
+def test_too_large_a_part_is_refused_unless_its_facets_are_asked_for() -> None:
+    tx, frequency = np.array([4.0, 0, 0]), 420 * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
+    with pytest.raises(InputError, match=r"ka = 420, above 400, needs \d+ facets an ellipsoid; set facets=\d+"):
+        field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency)
+    with pytest.raises(InputError, match="needs"):
+        field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency, facets=5120)
+    with pytest.raises(InputError, match="take 'specular'"):
+        field(ellipsoid(1.0, 1.0, 1.0), tx, tx, frequency)
+    with pytest.raises(InputError, match=r"smooth mesh with ka = 420, above 400, needs \d+ facets; it has 1280"):
+        field(trimesh.creation.icosphere(3, radius=0.1), tx, tx, frequency)
+
+
+@pytest.mark.parametrize("facets", [0, 19, 2.5, True, 10**9, "many"])
+def test_facets_must_be_a_count(facets: object) -> None:
+    with pytest.raises(InputError, match=r"facets = .* whole number from 20"):
+        field(ellipsoid(0.1, 0.1, 0.1), np.ones(3), np.ones(3), 1e9, facets=facets)
+
+
+def test_subdivisions_give_at_least_what_is_asked() -> None:
+    assert [subdivisions_for(n) for n in (20, 21, 80, 5120, 5121)] == [0, 1, 1, 4, 5]
+    assert len(ellipsoid_facets(np.array([[1.0, 1.0, 1.0]]), 2).faces) == 320
+
+
+def test_meshes_that_cannot_be_used_are_refused() -> None:
+    tx = np.array([4.0, 0, 0])
+    with pytest.raises(InputError, match="brings its own"):
+        field(square(1.0), tx, tx, 1e9, facets=100)
+    with pytest.raises(InputError, match="no triangle"):
+        field(trimesh.Trimesh(), tx, tx, 1e9)
+    with pytest.raises(InputError, match="has an area"):
+        field(trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False), tx, tx, 1e9)
+    with pytest.raises(InputError, match=r"rx\[0\] is inside the mesh"):
+        field(trimesh.creation.icosphere(2, radius=0.1), tx, np.array([0.01, 0, 0]), 1e9)
