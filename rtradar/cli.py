@@ -1,4 +1,4 @@
-"""The command line: ``rtradar doctor``, ``rtradar run`` and ``rtradar compare``.
+"""The command line: ``rtradar doctor``, ``rtradar run``, ``rtradar compare`` and ``rtradar validate``.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
 and how to mend it.
@@ -84,7 +84,11 @@ def _parser() -> argparse.ArgumentParser:
     doctor.set_defaults(command=_doctor)
 
     run = commands.add_parser("run", help="one recording in; maps, clouds, pictures and a summary out")
-    run.add_argument("--fidelity", default="specular", help="analytic-paper, analytic or specular (default: specular)")
+    run.add_argument(
+        "--fidelity",
+        default="specular",
+        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays or reference (default: specular)",
+    )
     run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
     _add_capture(run)
     run.set_defaults(command=_run)
@@ -98,6 +102,14 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_capture(compare)
     compare.set_defaults(command=_compare)
+
+    validate = commands.add_parser("validate", help="hold every claim against its reference; 1 where one fails")
+    validate.add_argument("--quick", action="store_true", help="fewer cases of each claim")
+    validate.add_argument("--only", metavar="NAME", help="one claim by its key (sphere, path, doppler, ...), or one script")
+    validate.add_argument("--json", type=Path, metavar="FILE", help="write all rows there as JSON")
+    validate.add_argument("--figure", type=Path, metavar="DIR", help="draw one picture a script there")
+    validate.add_argument("--readme", type=Path, metavar="FILE", help="replace the table of figures in this markdown file")
+    validate.set_defaults(command=_validate)
     return parser
 
 
@@ -161,6 +173,12 @@ def _compare(options: argparse.Namespace) -> int:
     print(found.table())
     print(f"see {options.out / 'compare.html'}")
     return 0
+
+
+def _validate(options: argparse.Namespace) -> int:
+    from rtradar.validate import validate
+
+    return validate(quick=options.quick, only=options.only, json_path=options.json, figures=options.figure, readme=options.readme)
 
 
 def _capture(options: argparse.Namespace) -> dict[str, Any]:

@@ -9,22 +9,20 @@ spectrum of a Hann window is three bins wide) and with a guard of two the cell u
 T, so the rate is the mean of Q(looks, T), Q the survival function of its Gamma law. That needs no alarm to happen and
 reaches down to the default of 1e-6.
 
-    python validation/cfar.py [--maps 60] [--seed 0] [--json FILE]
+    python validation/cfar.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import math
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import NamedTuple
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
+from rows import Row, judged, main, reported
 from scipy.special import gammaincc
 
 from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, range_spectrum
@@ -34,12 +32,11 @@ from rtradar.radar import Radar
 
 GUARD, TRAIN, QUANTILE = 2, 4, 0.75
 CAPTURE_S = 3.0
-MOST_VOXELS = 20
+MOST_OFF = 0.1
 DETECTORS: dict[str, Callable[..., NDArray[np.bool_]]] = {"os": os_cfar, "ca": ca_cfar}
 
 
-@dataclass(frozen=True)
-class Row:
+class Rate(NamedTuple):
     """One rate: on which cells, by which detector, asked and measured."""
 
     cells: str
@@ -140,21 +137,21 @@ class Tally:
                 level = ordered if detector == "os" else averaged
                 means.append(float(gammaincc(self.looks, self.scales[pfa][detector][counts] * level).mean()))
 
-    def rows(self) -> Iterator[Row]:
+    def rates(self) -> Iterator[Rate]:
         for (detector, pfa), values in self.counted.items():
             conditional = rate(self.survival[detector, pfa]) if self.conditional else (None, None)
             alarms = self.alarms[detector, pfa]
-            yield Row(self.cells, detector, self.looks, pfa, self.n_cells, alarms, *rate(values), *conditional)
+            yield Rate(self.cells, detector, self.looks, pfa, self.n_cells, alarms, *rate(values), *conditional)
 
 
-def measure(n_maps: int, seed: int) -> list[Row]:
+def rates(n_maps: int, seed: int) -> Iterator[Rate]:
+    """Of ``n_maps`` windowed maps of 96 channels, and four times as many of independent cells."""
     rng = np.random.default_rng(seed)
-    rows: list[Row] = []
     for looks in (1, 96):
         tally = Tally("independent", looks, (1e-2, 1e-3), conditional=False)
         for power in independent_maps(4 * n_maps, looks, rng):
             tally.add(power)
-        rows += tally.rows()
+        yield from tally.rates()
     radar = Radar.preset("paper-12ghz")
     pfas = (1e-2, 1e-3, 1e-4, 1e-6)
     one, summed = Tally("windowed", 1, pfas, conditional=True), Tally("windowed", radar.n_channels, pfas, conditional=True)
@@ -162,54 +159,42 @@ def measure(n_maps: int, seed: int) -> list[Row]:
         summed.add(total)
         for single in singles:
             one.add(single)
-    return [*rows, *one.rows(), *summed.rows()]
+    yield from one.rates()
+    yield from summed.rates()
 
 
-def voxels(rows: list[Row]) -> list[dict[str, object]]:
+def rate_rows(found: Rate) -> Iterator[Row]:
+    claim = f"{found.cells} cells, {found.detector}, {found.looks} look{'s' if found.looks > 1 else ''}, {found.pfa:g} asked"
+    counted = found.counted / found.pfa
+    if found.cells == "independent":
+        yield judged(claim, f"counted over asked, {found.n_cells} cells", "", counted, MOST_OFF, reference=1.0)
+    else:
+        yield reported(claim, f"counted over asked, {found.alarms} alarms", "", counted)
+    yield reported(claim, "one standard deviation of that", "", found.counted_error / found.pfa)
+    if found.conditional is not None and found.conditional_error is not None:
+        yield reported(claim, "from the thresholds, over asked", "", found.conditional / found.pfa)
+        yield reported(claim, "one standard deviation of that, too", "", found.conditional_error / found.pfa)
+
+
+def voxel_rows(found: list[Rate]) -> Iterator[Row]:
     """False voxels expected in the RDT volume of a capture, OS-CFAR at the default rate.
 
     The rate of the 12 GHz map serves the 77 GHz map too: the law of a cell and its neighbours does not know the number of bins.
     """
-    found = []
     for name in ("paper-12ghz", "paper-77ghz"):
         radar = Radar.preset(name)
         windows = len(radar.window_starts(math.floor(CAPTURE_S / radar.chirp_duration_s)))
         cells = radar.samples_per_chirp * radar.cycles_per_frame
-        for row in rows:
-            if row.cells == "windowed" and row.detector == "os" and row.pfa == 1e-6 and row.conditional is not None:
-                expected = windows * cells * row.conditional
-                found.append({"radar": name, "looks": row.looks, "windows": windows, "cells": cells, "expected": expected})
-    return found
+        for one in found:
+            if one.cells == "windowed" and one.detector == "os" and one.pfa == 1e-6 and one.conditional is not None:
+                claim = f"{name}, {CAPTURE_S:g} s of noise alone, {one.looks} looks"
+                yield reported(claim, f"false voxels expected in {windows} windows", "", windows * cells * one.conditional)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(description="False-alarm rates of the CFAR detectors on noise alone.")
-    parser.add_argument("--maps", type=int, default=60, help="windowed maps of 96 channels; independent ones: 4 times as many")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--json", type=Path, help="write the rows there as well")
-    options = parser.parse_args()
-
-    rows = measure(options.maps, options.seed)
-    print("cells        detector looks  asked    cells      alarms  counted/asked    from thresholds/asked")
-    for row in rows:
-        conditional = ""
-        if row.conditional is not None and row.conditional_error is not None:
-            conditional = f"{row.conditional / row.pfa:8.3f} +- {row.conditional_error / row.pfa:.3f}"
-        print(
-            f"{row.cells:12s} {row.detector:8s} {row.looks:5d}  {row.pfa:.0e} {row.n_cells:10d} {row.alarms:9d} "
-            f"{row.counted / row.pfa:8.3f} +- {row.counted_error / row.pfa:.3f} {conditional}"
-        )
-    expected = voxels(rows)
-    print(f"\nfalse voxels expected in {CAPTURE_S:g} s of noise alone, OS-CFAR at 1e-6")
-    for entry in expected:
-        print("{radar}: {looks:3d} looks, {windows} windows of {cells} cells: {expected:.1f}".format(**entry))
-    if options.json:
-        options.json.write_text(json.dumps({"rows": [asdict(row) for row in rows], "voxels": expected}, indent=1) + "\n")
-
-    wrong = [row for row in rows if row.cells == "independent" and abs(row.counted / row.pfa - 1) > 0.1]
-    print("independent cells within 10 %:", "no" if wrong else "yes")
-    return 1 if wrong else 0
+def measure(quick: bool) -> list[Row]:
+    found = list(rates(12 if quick else 60, seed=0))
+    return [*(row for one in found for row in rate_rows(one)), *voxel_rows(found)]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("False-alarm rates of the CFAR detectors on noise alone.", measure))

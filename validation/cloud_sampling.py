@@ -1,6 +1,6 @@
 """How far apart the RDT clouds of two seeds of one run are: what is left when nothing but noise and sampling differ.
 
-    python validation/cloud_sampling.py [--quick] [--json FILE]
+python validation/cloud_sampling.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations

@@ -5,21 +5,18 @@ and sample. It is timed with its turns in float64, and compared with them in lon
 anywhere in the band: constant amplitudes, and the parabola through three frequencies. Relative to the root mean square
 of the IF. Speed is reported, not judged: it is the machine's.
 
-    python validation/if_sum.py [--json FILE]
+    python validation/if_sum.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
 
-import argparse
-import json
 import sys
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rows import Row, judged, main, reported
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
@@ -32,30 +29,6 @@ PARTS = 21
 TOLERANCE = 1e-5
 COMPARED = slice(None, None, 16)
 REPEATS = 3
-
-
-@dataclass(frozen=True)
-class Row:
-    """One figure against its reference."""
-
-    claim: str
-    quantity: str
-    unit: str
-    reference: float
-    ours: float
-    error: float
-    tolerance: float
-    passed: bool
-
-
-@dataclass(frozen=True)
-class Speed:
-    """Seconds of one block of chirps."""
-
-    case: str
-    chirps: int
-    plain_s: float
-    fast_s: float
 
 
 def block(radar: Radar, chirps: int, nodes: int, rng: np.random.Generator) -> Echoes:
@@ -102,7 +75,7 @@ def every_sixteenth(echoes: Echoes) -> Echoes:
     )
 
 
-def measure(preset: str, nodes: int, rng: np.random.Generator) -> tuple[Row, Speed]:
+def case_rows(preset: str, nodes: int, rng: np.random.Generator) -> Iterator[Row]:
     radar = Radar.preset(preset)
     chirps = Radar.preset("paper-12ghz").chirps_per_frame
     echoes = block(radar, chirps, nodes, rng)
@@ -114,11 +87,11 @@ def measure(preset: str, nodes: int, rng: np.random.Generator) -> tuple[Row, Spe
 
     reference = plain_sum(every_sixteenth(echoes), radar, np.longdouble)
     error = float(np.abs(fast[COMPARED] - reference).max() / np.sqrt(np.mean(np.abs(reference) ** 2)))
-    case = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}"
-    return (
-        Row("fast IF is the plain sum", f"{case}: largest relative error", "1", 0.0, error, error, TOLERANCE, error < TOLERANCE),
-        Speed(case, chirps, plain_s, fast_s),
-    )
+    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}"
+    yield judged(claim, "largest relative error to the plain sum", "", error, TOLERANCE, key="if-sum")
+    yield reported(claim, f"plain sum, {chirps} chirps, {PARTS} echoes", "s", plain_s, key="if-sum")
+    yield reported(claim, "fast", "s", fast_s, key="if-sum")
+    yield reported(claim, "times faster", "", plain_s / fast_s, key="if-sum")
 
 
 def timed(work: Callable[[], object]) -> float:
@@ -127,34 +100,11 @@ def timed(work: Callable[[], object]) -> float:
     return time.perf_counter() - start
 
 
-def measurements(seed: int = 0) -> Iterator[tuple[Row, Speed]]:
-    rng = np.random.default_rng(seed)
-    for preset in ("paper-12ghz", "paper-77ghz"):
-        for nodes in (1, 3):
-            yield measure(preset, nodes, rng)
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description="The fast IF against the plain sum: error and speed.")
-    parser.add_argument("--json", type=Path, help="write the rows there as well")
-    options = parser.parse_args()
-
-    rows: list[Row] = []
-    speeds: list[Speed] = []
-    for row, speed in measurements():
-        rows.append(row)
-        speeds.append(speed)
-        print(
-            f"{row.quantity:46s} {row.error:8.1e} (tolerance {row.tolerance:.0e}) {'passed' if row.passed else 'FAILED'}; "
-            f"{speed.chirps} chirps, {PARTS} echoes: plain {speed.plain_s:.2f} s, fast {speed.fast_s:.3f} s, "
-            f"{speed.plain_s / speed.fast_s:.0f} times faster",
-            flush=True,
-        )
-    if options.json:
-        content = {"rows": [asdict(row) for row in rows], "speeds": [asdict(speed) for speed in speeds]}
-        options.json.write_text(json.dumps(content, indent=1) + "\n")
-    return 0 if all(row.passed for row in rows) else 1
+def measure(quick: bool) -> list[Row]:
+    rng = np.random.default_rng(0)
+    presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
+    return [row for preset in presets for nodes in (1, 3) for row in case_rows(preset, nodes, rng)]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("The fast IF against the plain sum: error and speed.", measure))

@@ -8,7 +8,9 @@ does to its neighbours. Last, what smooth motion becomes on a radar: a limb of 0
 root that bobs 2 cm at 2 Hz, both sampled at 120 Hz: their position error, as phase of a 77 GHz echo relative to a
 carrier of 0 dB. All of that phase repeats with the frames, so it is the power of false Doppler lines.
 
-Run: RTRADAR_MOCAP=/path/to/mocap python validation/interpolation.py
+Without RTRADAR_MOCAP, the folder of recordings, only the last two are told.
+
+    RTRADAR_MOCAP=/path/to/mocap python validation/interpolation.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -16,12 +18,12 @@ from __future__ import annotations
 import itertools
 import os
 import sys
-import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from rows import Row, main, reported
 from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
@@ -142,38 +144,38 @@ def smooth_root(spline: Callable[[Array, Array], Callable[[Array], Array]]) -> f
     return error_db(spline(times, 0.01 * np.sin(4 * np.pi * times))(at) - 0.01 * np.sin(4 * np.pi * at))
 
 
-def main() -> int:
-    """Print the tables; 2 where the recordings are not there."""
-    folder = os.environ.get("RTRADAR_MOCAP")
-    if not folder:
-        print("set RTRADAR_MOCAP to the folder of recordings", file=sys.stderr)
-        return 2
-    print(f"{'recordings':22s}{'method':16s}{'rms deg':>9s}{'max deg':>9s}{'rms mm':>9s}{'max mm':>9s}{'s':>8s}")
+def rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def recorded_rows(folder: Path, quick: bool) -> Iterator[Row]:
     for case, files in CASES.items():
-        motions = [load_motion(Path(folder, d, f), Path(folder, d, s) if s else None) for d, f, s in files]
+        motions = [load_motion(folder / d / f, folder / d / s if s else None) for d, f, s in (files[:1] if quick else files)]
         for name, method in METHODS.items():
-            start = time.perf_counter()
             errors = [held_out(motion, method) for motion in motions]
-            seconds = time.perf_counter() - start
             turn, shift = (np.concatenate([pair[k].ravel() for pair in errors]) for k in (0, 1))
-            print(
-                f"{case:22s}{name:16s}{np.sqrt(np.mean(turn**2)):9.3f}{turn.max():9.2f}"
-                f"{np.sqrt(np.mean(shift**2)):9.3f}{shift.max():9.2f}{seconds:8.2f}"
-            )
-    kick = load_motion(Path(folder, "hdm05", "HDM_bd_kickLFront1Reps_001_120.amc"), Path(folder, "hdm05", "HDM_bd.asf"))
-    print(
-        f"\n{'method':16s}{'velocity step at a frame':>26s}   deg left in intervals 1 to 4 beside a spike of 60 deg"
-        " | smooth limb, 77 GHz, dB"
-    )
+            yield reported(f"{case}, {name}", "rotations, rms", "deg", rms(turn))
+            yield reported(f"{case}, {name}", "rotations, largest", "deg", float(turn.max()))
+            yield reported(f"{case}, {name}", "places, rms", "mm", rms(shift))
+            yield reported(f"{case}, {name}", "places, largest", "mm", float(shift.max()))
+    kick = load_motion(folder / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", folder / "hdm05/HDM_bd.asf")
     for name, method in METHODS.items():
-        print(
-            f"{name:16s}{velocity_step(kick, method):26.2g}   "
-            + " ".join(f"{value:7.3f}" for value in spike_reach(method))
-            + f"{smooth_limb(method):12.1f}"
-        )
-    print(f"\nbobbing root, 77 GHz, dB: pchip {smooth_root(PchipInterpolator):.1f}, cubic {smooth_root(CubicSpline):.1f}")
-    return 0
+        yield reported(f"kick, {name}", "step of angular velocity at a frame, relative", "", velocity_step(kick, method))
+
+
+def measure(quick: bool) -> list[Row]:
+    rows: list[Row] = []
+    for name, method in METHODS.items():
+        for interval, reach in enumerate(spike_reach(method), start=1):
+            rows.append(reported(f"spike of 60 deg, {name}", f"left in interval {interval} beside it", "deg", float(reach)))
+        rows.append(reported(f"smooth limb, 77 GHz, {name}", "false Doppler", "dB", smooth_limb(method)))
+    for name, spline in (("pchip", PchipInterpolator), ("cubic", CubicSpline)):
+        rows.append(reported(f"bobbing root, 77 GHz, {name}", "false Doppler", "dB", smooth_root(spline)))
+    folder = os.environ.get("RTRADAR_MOCAP")
+    if folder:
+        rows += recorded_rows(Path(folder), quick)
+    return rows
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(main("How well interpolation of rotations meets frames that it was not shown.", measure))

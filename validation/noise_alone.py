@@ -30,11 +30,13 @@ def measure(quick: bool) -> list[Row]:
             found = rt.run(motion, radar, out=folder, fidelity="analytic", snr_db=-150.0).summary
         cells = found["windows"] * radar.samples_per_chirp * radar.cycles_per_frame
         claim = f"{name}, {found['windows']} windows"
-        rows.append(reported(claim, "false alarms at exactly the asked rate", "voxels", cells * found["parameters"]["pfa"]))
+        rows.append(
+            reported(claim, "false alarms at exactly the asked rate", "voxels", cells * found["parameters"]["pfa"], key="cfar")
+        )
         if name == "paper-12ghz":
-            rows.append(judged(claim, "false alarms", "voxels", found["detections"], MOST_VOXELS))
+            rows.append(judged(claim, "false alarms", "voxels", found["detections"], MOST_VOXELS, key="cfar"))
         else:
-            rows.append(reported(claim, "false alarms", "voxels", found["detections"]))
+            rows.append(reported(claim, "false alarms", "voxels", found["detections"], key="cfar"))
     return rows
 
 

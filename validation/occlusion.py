@@ -16,12 +16,14 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
+import rows
 from numba import njit, prange
 from numpy.typing import NDArray
 from physical_optics import lit_points, wave_number
-from rows import Row, judged, main, reported
+from rows import Row, main
 from scipy.signal.windows import hann
 
 import rtradar as rt
@@ -29,6 +31,7 @@ from rtradar.body.body import Poses
 from rtradar.scatter import build_rung
 
 Array = NDArray[np.float64]
+judged, reported = (partial(kind, key="edge") for kind in (rows.judged, rows.reported))
 ANTENNA = np.array([-4.0, 0.0, 0.0])  # the target stands at the origin
 BEFORE_M = 0.5  # of the target stands the occluder
 TO_OCCLUDER_M = 3.5
@@ -181,7 +184,7 @@ def covered_rows(quick: bool) -> Iterator[Row]:
                 if 0.02 < share < 0.98:
                     crossing.append(errors[-1])
                     quantity = f"{share:3.0%} covered: field over the free one"
-                    yield Row(claim, quantity, "", abs(optics), abs(got), errors[-1], None, bool(np.isfinite(errors[-1])))
+                    yield Row(claim, quantity, "", abs(optics), abs(got), errors[-1], None, bool(np.isfinite(errors[-1])), "edge")
             # All or nothing where half the field is left is wrong by a half; physical optics swings a little past that.
             yield judged(claim, "worst complex error", "", max(errors), 0.6)
             yield reported(claim, "rms complex error where partly covered", "", float(np.sqrt(np.mean(np.square(crossing)))))

@@ -94,8 +94,15 @@ class Body:
         if self.motion.joints != NODES:
             raise InputError("Body: the motion is not on the 22 nodes; use Body.from_motion")
         axes = np.ascontiguousarray(self.semi_axes, dtype=np.float64)
-        if axes.shape != (len(PART_NAMES), 3) or not (np.isfinite(axes) & (axes > 0)).all():
-            raise InputError(f"Body: semi_axes must be ({len(PART_NAMES)}, 3), positive and finite")
+        if axes.shape != (len(PART_NAMES), 3):
+            raise InputError(f"Body: semi_axes have shape {axes.shape}; semi_axes must be ({len(PART_NAMES)}, 3)")
+        good = (np.isfinite(axes) & (axes > 0)).all(axis=1)
+        if not good.all():
+            part = int(np.argmin(good))
+            raise InputError(
+                f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes of {axes[part].tolist()} m; "
+                "semi_axes must be positive and finite: give the bone a length"
+            )
         object.__setattr__(self, "semi_axes", axes)
 
     @classmethod

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import spherical_jn, spherical_yn
+from scipy.special import jv, yv
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 
@@ -59,9 +59,12 @@ def sphere(radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", 
 def _mie_backscatter(ka: float) -> complex:
     """Sum over n of -j (-1)^n (2n+1) (a_n - b_n) for exp(+j omega t): it tends to ka exp(2jka) for large ka."""
     # Wiscombe's count of terms that matter, with a margin.
-    orders = np.arange(1, int(np.ceil(ka + 4.05 * ka ** (1 / 3) + 10)))
-    j, y = spherical_jn(orders, ka), spherical_yn(orders, ka)
-    dj, dy = spherical_jn(orders, ka, derivative=True), spherical_yn(orders, ka, derivative=True)
+    orders = np.arange(int(np.ceil(ka + 4.05 * ka ** (1 / 3) + 10)))
+    # Spherical Bessel functions but for a factor that a_n and b_n do not know. SciPy's own walk up to each order anew.
+    j, y = jv(orders + 0.5, ka), yv(orders + 0.5, ka)
+    orders = orders[1:]
+    dj, dy = j[:-1] - (orders + 1) / ka * j[1:], y[:-1] - (orders + 1) / ka * y[1:]
+    j, y = j[1:], y[1:]
     known = np.isfinite(y) & np.isfinite(dy)
     orders, j, y, dj, dy = orders[known], j[known], y[known], dj[known], dy[known]
     a = (j + ka * dj) / (j + ka * dj - 1j * (y + ka * dy))

@@ -18,6 +18,8 @@ MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
 
 _LANES = 16
+_INSTANTS = 16
+"""At so many instants of a block the speed of echoes is looked at."""
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -153,11 +155,15 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     same = np.flatnonzero(echoes.tx == echoes.tx[0]) if len(times) else np.zeros(0, dtype=np.int64)
     if len(same) < 2:
         return
-    same = same[[0, len(same) // 2, -1]] if len(same) > 2 else same
-    heard = (echoes.amplitude[:, same] != 0).any(axis=0) & in_band(echoes, radar)[same]
-    length = np.where(heard, echoes.length[same], np.nan)
-    rate = np.diff(length, axis=0) / np.diff(times[same])[:, None, None]
-    bins = float(np.nan_to_num(np.abs(rate)).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
+    # Neighbours, for what is fast soon leaves the band.
+    first = np.unique(np.linspace(0, len(same) - 2, _INSTANTS).astype(np.int64))
+    before, after = same[first], same[first + 1]
+    inside = in_band(echoes, radar)
+    heard = np.ones_like(inside[before])
+    for chirps in (before, after):
+        heard &= (echoes.amplitude[:, chirps] != 0).any(axis=0) & inside[chirps]
+    rate = np.abs(echoes.length[after] - echoes.length[before]) / (times[after] - times[before])[:, None, None]
+    bins = float(np.where(heard, rate, 0.0).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(
             f"an echo moves {bins:.2f} range bins inside one chirp, more than {MAX_BINS_IN_CHIRP}: it is taken to stand "

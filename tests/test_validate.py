@@ -1,0 +1,167 @@
+"""`rtradar validate`: which scripts it runs, what it makes of their rows, and how it says no."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from rtradar import validate
+from rtradar.cli import main
+from rtradar.errors import InputError
+
+ROWS = validate.validation_folder() / "rows.py"
+
+GOOD = """
+import sys
+from rows import Row, judged, main, reported
+def measure(quick):
+    share = 0.5 if quick else 0.25
+    return [judged("a ball", "round", "m", share, 1.0, key="sphere"), reported("a ball", "red", "", 3.0, key="colour")]
+if __name__ == "__main__":
+    sys.exit(main("Balls.", measure))
+"""
+BAD = """
+import sys
+from rows import judged, main
+def measure(quick):
+    print("what goes to stdout does not matter")
+    return [judged("a floor", "flat", "dB", -70.0, -80.0), judged("a wall", "straight", "dB", float("nan"), 1.0)]
+if __name__ == "__main__":
+    sys.exit(main("Floors.", measure))
+"""
+BROKEN = """
+from rows import main
+def measure(quick): ...
+if __name__ == "__main__":
+    raise RuntimeError("the judge is ill")
+"""
+HELPER = "def measure(quick): ...\n"  # no main from rows: not a claim
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder of scripts in place of the real one."""
+    place = tmp_path / "validation"
+    place.mkdir()
+    shutil.copy(ROWS, place)
+    (place / "balls.py").write_text(GOOD)
+    (place / "helper.py").write_text(HELPER)
+    monkeypatch.setattr(validate, "validation_folder", lambda: place)
+    return place
+
+
+def test_good_rows_pass_and_are_kept(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--json", str(tmp_path / "v.json")]) == 0
+    said = capsys.readouterr()
+    assert "passed: 1 of 1 judged figures within their limits, 1 reported; 1 scripts" in said.out
+    assert said.err == ""  # no progress bar where there is no terminal
+    found = json.loads((tmp_path / "v.json").read_text())
+    assert found["passed"] is True
+    assert [(row["key"], row["script"], row["error"]) for row in found["rows"]] == [
+        ("sphere", "balls.py", 0.25),
+        ("colour", "balls.py", 3.0),
+    ]
+    assert found["scripts"][0]["keys"] == ["sphere", "colour"]
+
+
+def test_quick_and_figures_reach_the_script(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--quick", "--json", str(tmp_path / "v.json"), "--figure", str(tmp_path / "new" / "figures")]) == 0
+    assert json.loads((tmp_path / "v.json").read_text())["rows"][0]["error"] == 0.5
+    assert (tmp_path / "new" / "figures" / "balls.png").stat().st_size > 1000
+    assert "balls" in capsys.readouterr().out
+
+
+def test_a_row_outside_its_limit_fails(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "floors.py").write_text(BAD)
+    assert main(["validate", "--json", str(tmp_path / "v.json")]) == 1
+    said = capsys.readouterr().out
+    assert "FAILED  a floor: flat: -70 dB, limit -80" in said
+    assert "FAILED  a wall: straight: nan dB, limit 1" in said
+    assert "FAILED: 1 of 3 judged" in said
+    found = json.loads((tmp_path / "v.json").read_text())
+    assert found["passed"] is False
+    assert found["rows"][-1]["error"] is None  # JSON has no NaN
+    assert found["rows"][-1]["key"] == "floors"  # the script's name where it names no key
+
+
+def test_a_script_that_breaks_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (folder / "zz.py").write_text(BROKEN)
+    assert main(["validate"]) == 1
+    assert "FAILED  zz ended with status 1 and left no rows: RuntimeError: the judge is ill" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(("only", "keys"), [("sphere", ["sphere"]), ("colour", ["colour"]), ("balls", ["sphere", "colour"])])
+def test_only_takes_a_key_or_a_script(folder: Path, tmp_path: Path, only: str, keys: list[str]) -> None:
+    (folder / "floors.py").write_text(BAD)
+    assert main(["validate", "--only", only, "--json", str(tmp_path / "v.json")]) == 0
+    assert [row["key"] for row in json.loads((tmp_path / "v.json").read_text())["rows"]] == keys
+
+
+def test_an_unknown_claim_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--only", "moon"]) == 2
+    said = capsys.readouterr()
+    assert said.err == "rtradar: --only moon: no such claim; allowed keys: colour, sphere; or a script: balls\n"
+    assert said.out == ""
+
+
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "--json", "/nowhere/v.json"]) == 2
+    said = capsys.readouterr()
+    assert said.err.count("\n") == 1
+    assert said.out == ""
+
+
+def test_the_table_of_a_readme_is_replaced(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    readme = tmp_path / "README.md"
+    readme.write_text(f"before\n{validate.BEGIN}\nold\n{validate.END}\nafter\n")
+    assert main(["validate", "--readme", str(readme)]) == 0
+    text = readme.read_text()
+    assert text.startswith(f"before\n{validate.BEGIN}\n")
+    assert text.endswith(f"{validate.END}\nafter\n")
+    assert "| `sphere` | 1 | a ball: round | 0.25 m | 1 m | `balls.py` |" in text
+    assert "old" not in text
+    assert "colour" not in text  # not judged
+    assert main(["validate", "--readme", str(readme)]) == 0
+    assert readme.read_text() == text
+
+
+@pytest.mark.parametrize("content", ["no markers", f"{validate.END} {validate.BEGIN}", validate.BEGIN])
+def test_a_readme_without_its_place_is_refused(content: str, folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text(content)
+    with pytest.raises(InputError, match="must hold"):
+        validate.validate(readme=tmp_path / "README.md")
+    assert (tmp_path / "README.md").read_text() == content
+
+
+def test_a_readme_is_not_written_from_a_part(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "README.md").write_text(f"{validate.BEGIN}{validate.END}")
+    with pytest.raises(InputError, match="leave out"):
+        validate.validate(readme=tmp_path / "README.md", quick=True)
+
+
+@pytest.mark.parametrize(
+    ("error", "tolerance", "share"),
+    [
+        (0.05, 0.1, 0.5),
+        (-3.0, 0.1, 0.0),
+        (-100.0, -80.0, 0.8),
+        (-40.0, -80.0, 2.0),
+        (1.0, -80.0, float("inf")),
+        (0.0, 0.0, 0.0),
+        (1e-9, 0.0, float("inf")),
+        (float("nan"), 1.0, float("inf")),
+    ],
+)
+def test_how_much_of_a_limit_is_used(error: float, tolerance: float, share: float) -> None:
+    assert validate.used_up(error, tolerance) == share
+
+
+def test_the_claims_of_this_checkout_have_their_scripts() -> None:
+    found = validate.claims(validate.validation_folder())
+    keys = {key for claim in found for key in claim.keys}
+    promised = {"sphere", "ellipsoid", "plate", "path", "point", "doppler", "edge", "cfar", "if-sum", "body", "backends"}
+    assert promised <= keys
+    assert "rows" not in {claim.name for claim in found}
