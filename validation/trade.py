@@ -1,9 +1,9 @@
 """The trade of speed for accuracy: every rung against `reference` on four activities, and what each costs.
 
 Error is that of the received spectrum H(f, t) at the four corner channels of the y-line (first and last Tx and Rx), at the
-first, middle and last frequency of the sweep, in 34 TDM cycles evenly over one frame of 100 ms (every fourth at 12 GHz):
-rms |H - Href| over rms |Href|, and the power of the frame in decibels. Cost is the time of echoes and IF samples of that whole frame, all
-channels, over that of `analytic` in the same run, after one frame of warm-up.
+first, middle and last frequency of the sweep, in 34 TDM cycles evenly over one frame of 100 ms (every fourth at 12 GHz): rms
+|H - Href| over rms |Href|, and the power of the frame in decibels. Cost is the time of echoes and IF samples of that whole
+frame, all channels, over that of `analytic` in the same run, after one frame of warm-up.
 
     python validation/trade.py [--quick] [--json FILE]
 """
