@@ -14,22 +14,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.scatter.facets import Facets
+from rtradar.scatter.triangle_share import positive_share
 from rtradar.trace.clearance import clearance
 from rtradar.trace.facet_visibility import FacetTracer
-
-
-@njit(cache=True, error_model="numpy")
-def _positive_share(a, b, c):  # type: ignore[no-untyped-def]
-    """Share of a triangle on which the linear function with these values at its corners is positive."""
-    low, high = min(a, min(b, c)), max(a, max(b, c))
-    if low >= 0:
-        return 1.0
-    if high <= 0:
-        return 0.0
-    middle = a + b + c - low - high
-    if middle <= 0:
-        return high * high / ((high - low) * (high - middle))
-    return 1 - low * low / ((low - high) * (low - middle))
 
 
 @njit(cache=True, error_model="numpy")
@@ -54,7 +41,7 @@ def _shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices, fa
                     if hider >= 0:
                         outside = clearance(antennas[a], corner, centres[hider], frames[hider], semi_axes[hider])
                         value[k] = min(value[k], outside)
-            out[a, n, f] = _positive_share(value[0], value[1], value[2])
+            out[a, n, f] = positive_share(value[0], value[1], value[2])
 
 
 class FacetShadows:

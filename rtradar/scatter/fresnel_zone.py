@@ -21,6 +21,8 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from rtradar.scatter.triangle_share import positive_share
+
 RIM = 7.0
 """Where the window ends at the latest, sqrt(k dL): 7.8 wavelengths of excess path."""
 
@@ -165,20 +167,6 @@ def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untype
 
 
 @njit(cache=True, error_model="numpy")
-def _open_triangle(a, b, c):  # type: ignore[no-untyped-def]
-    """Share of a triangle where a linear function is positive, from its values at the corners."""
-    low, high = min(a, min(b, c)), max(a, max(b, c))
-    if low >= 0:
-        return 1.0
-    if high <= 0:
-        return 0.0
-    middle = a + b + c - low - high
-    if middle <= 0:
-        return high * high / ((high - low) * (high - middle))
-    return 1 - low * low / ((high - low) * (middle - low))
-
-
-@njit(cache=True, error_model="numpy")
 def _open_share(a, b, c, d):  # type: ignore[no-untyped-def]
     """Share of a cell where a function is positive, from its values a, b and c, d at the ends of two opposite sides.
 
@@ -188,7 +176,7 @@ def _open_share(a, b, c, d):  # type: ignore[no-untyped-def]
         return 1.0
     if max(max(a, b), max(c, d)) <= 0:
         return 0.0
-    return (_open_triangle(a, b, c) + _open_triangle(d, b, c) + _open_triangle(a, b, d) + _open_triangle(a, c, d)) / 4
+    return (positive_share(a, b, c) + positive_share(d, b, c) + positive_share(a, b, d) + positive_share(a, c, d)) / 4
 
 
 @njit(cache=True, error_model="numpy")
@@ -267,7 +255,7 @@ def _zone_share(  # type: ignore[no-untyped-def]
         side, normal_up, normal_side = stretch @ step, back.T @ pole, back.T @ step
         for a in range(n_antennas):
             # The innermost cell has three corners.
-            share[a, 0] = _open_triangle(clear[m, a, 0], clear[m, a, 1], clear[after, a, 1])
+            share[a, 0] = positive_share(clear[m, a, 0], clear[m, a, 1], clear[after, a, 1])
             for j in range(1, _CELLS):
                 share[a, j] = _open_share(clear[m, a, j], clear[m, a, j + 1], clear[after, a, j], clear[after, a, j + 1])
             way = antennas[a] - centre

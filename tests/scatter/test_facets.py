@@ -13,9 +13,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.facet_integral import facet_integral
 from rtradar.scatter.facet_scattering import facet_scattering
-from rtradar.scatter.facet_shadows import _positive_share
 from rtradar.scatter.facets import ellipsoid_facets, mesh_facets, subdivisions_for
 from rtradar.scatter.polarization import copolar
+from rtradar.scatter.triangle_share import positive_share
 from rtradar.trace.clearance import clearance
 
 Array = NDArray[np.float64]
@@ -94,7 +94,7 @@ def test_positive_share_of_a_linear_function(a: float, b: float, c: float) -> No
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     # 20 000 draws of a share have a standard deviation of at most 0.0036.
-    assert _positive_share(a, b, c) == pytest.approx(np.mean(a + (b - a) * u + (c - a) * v >= 0), abs=0.02)
+    assert positive_share(a, b, c) == pytest.approx(np.mean(a + (b - a) * u + (c - a) * v >= 0), abs=0.02)
 
 
 @given(seeds)
