@@ -21,7 +21,7 @@ SPATIAL_UNITS = ("m", "m", "m")
 """Their units."""
 
 SHOWN_DB = 40.0
-"""Below the strongest point lie most of those that are of no body: in a walk of 3 s, 4 in 5 of them, and 1 in 5 of the others."""
+"""Farther below the strongest point lie most of those that are of no body."""
 
 
 @dataclass(frozen=True)

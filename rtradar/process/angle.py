@@ -212,8 +212,7 @@ def refine(
     return sines[index] + shift * (sines[1] - sines[0]), np.exp(middle - 0.25 * (left - right) * shift)
 
 
-# By hand, for a product of this size costs BLAS up to 16 ms where other work holds the cores its threads wait for; this 1 to
-# 2 ms for all cells of a window.
+# By hand: for products of this size the threads of BLAS wait for each other longer than they work.
 @numba.njit(cache=True, nogil=True, fastmath=True)
 def _power(values, still, chosen, channels, weights, runs, power):  # type: ignore[no-untyped-def]
     """Fill the chosen rows of power (cell, sine) from values (cell, offset, channel) turned by still (cell, channel)."""

@@ -1,9 +1,9 @@
 """The posed body as a Mitsuba scene.
 
 Every part is an instance of one unit sphere of triangles, moved, turned and stretched by its ``to_world``: a new pose
-costs 21 matrices and the small upper tree of the ray tracer, where new vertices cost a full rebuild (3 ms against 22 ms
-for 21 x 1280 triangles on the machine it was tried on). Mitsuba's own ``sphere`` is not used, for it is silently wrong
-under a stretch that is not uniform, nor its ``ellipsoids``, which cull back faces.
+costs 21 matrices and the small upper tree of the ray tracer, where new vertices cost a full rebuild. Mitsuba's own
+``sphere`` is not used, for it is silently wrong under a stretch that is not uniform, nor its ``ellipsoids``, which cull
+back faces.
 """
 
 from __future__ import annotations
