@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
+import subprocess
+import sys
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+import rtradar
 from rtradar.errors import InputError
-from rtradar.scene import Scene
+from rtradar.radar import Radar
+from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.scene.scene import scenes_folder
 
 
@@ -42,10 +48,10 @@ def test_a_file(tmp_path: Path) -> None:
     assert Scene.load(write(tmp_path, "")).name == "attic"
 
 
-@pytest.mark.parametrize("name", ["ballroom", "", "free-space.tml", "Free-Space", "no/such/place"])
+@pytest.mark.parametrize("name", ["ballroom", "", "free-space.tml", "Free-Space", "no/such/place", "nul\0l"])
 def test_unknown_name(name: str) -> None:
     message = refusal(name)
-    assert f"scene '{name}' is unknown" in message
+    assert f"scene {name!r} is unknown" in message
     assert "free-space" in message
 
 
@@ -65,7 +71,7 @@ def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
     assert "attic.toml' is not TOML: " in refusal(write(tmp_path, text))
 
 
-@pytest.mark.parametrize(("text", "key"), [('colour = "red"', "colour"), ("[walls]\nnorth = 3", "walls")])
+@pytest.mark.parametrize(("text", "key"), [('colour = "red"', "colour"), ("[lights]\nnorth = 3", "lights")])
 def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
     message = refusal(write(tmp_path, text))
     assert f"unknown key '{key}'" in message
@@ -78,3 +84,89 @@ def test_values_are_strings(tmp_path: Path, key: str, value: str) -> None:
     message = refusal(write(tmp_path, f"{key} = {value}"))
     assert f"{key} = " in message
     assert "string" in message
+
+
+WALL = Wall(
+    name="screen",
+    corner_m=(-3.0, 0.0, 0.0),
+    edge_u_m=(0.0, 0.0, 2.5),
+    edge_v_m=(0.0, 4.0, 0.0),
+    material=material("plasterboard"),
+    thickness_m=0.0125,
+)
+CHAIR = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, 2.0, 0.0))
+
+
+def test_it_is_the_scene_of_the_package() -> None:
+    assert rtradar.Scene is Scene
+
+
+def test_a_scene_is_a_value() -> None:
+    scene = Scene(name="x", walls=(WALL,), furniture=(CHAIR,))
+    assert scene == Scene(name="x", walls=(WALL,), furniture=(CHAIR,))
+    assert len({scene, Scene(name="x", walls=(WALL,), furniture=(CHAIR,)), Scene()}) == 2
+    assert [made.name for made in scene.materials] == ["plasterboard", "wood"]
+
+
+@pytest.mark.parametrize(
+    "fields",
+    [
+        {"name": 3},
+        {"description": None},
+        {"walls": (WALL, WALL)},
+        {"walls": ("wall",)},
+        {"furniture": (CHAIR, CHAIR)},
+        {"furniture": (WALL,)},
+        {"radar_position_m": (1, 2)},
+        {"radar_position_m": (1, 2, float("nan"))},
+        {"person_position_m": (0, 0, 0)},
+        {"heading_deg": "90"},
+        {"heading_deg": float("inf")},
+    ],
+)
+def test_a_scene_without_meaning(fields: dict[str, Any]) -> None:
+    with pytest.raises(InputError) as caught:
+        Scene(**fields)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_radar_stands_where_the_scene_says() -> None:
+    radar = Radar.preset("paper-12ghz")
+    assert Scene(walls=(WALL,), furniture=(CHAIR,)).place(radar) is radar
+    placed = Scene(radar_position_m=(-2, 0, 1.5)).place(radar)
+    assert placed.position_m == (-2.0, 0.0, 1.5)
+    assert placed.bandwidth_hz == radar.bandwidth_hz
+
+
+@pytest.mark.parametrize(
+    ("fields", "reason"),
+    [
+        # The front of the screen looks along -x, so its slab is at -3 to -2.9875 m.
+        ({"walls": (WALL,), "radar_position_m": (-2.995, 1.0, 1.0)}, "antennas inside wall 'screen'"),
+        ({"furniture": (CHAIR,), "radar_position_m": (1.0, 2.0, 1.3)}, "'chair' is 0."),
+        ({"furniture": (CHAIR,), "radar_position_m": (0.5, 2.0, 0.5)}, "0.3 m or more are needed"),
+    ],
+)
+def test_places_that_the_radar_cannot_have(fields: dict[str, Any], reason: str) -> None:
+    with pytest.raises(InputError) as caught:
+        Scene(name="x", **fields).place(Radar.preset("paper-12ghz"))
+    assert reason in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_materials_must_be_known_over_the_whole_sweep() -> None:
+    brick = Scene(name="x", walls=(dataclasses.replace(WALL, material=material("brick")),))
+    brick.place(Radar.preset("paper-12ghz"))
+    with pytest.raises(InputError, match="scene 'x', screen: material 'brick' at 77 GHz"):
+        brick.place(Radar.preset("paper-77ghz"))
+    # 38 to 42 GHz: known where it begins, not where it ends.
+    with pytest.raises(InputError, match="'brick' at 42 GHz"):
+        brick.place(dataclasses.replace(Radar.preset("paper-12ghz"), start_frequency_hz=38e9))
+
+
+def test_meshes_are_read_by_a_library_that_loads_when_the_first_one_is() -> None:
+    code = (
+        "import sys, rtradar, rtradar.scene; rtradar.Scene.load('free-space'); assert 'trimesh' not in sys.modules; "
+        "rtradar.Scene.load('bedroom'); assert 'trimesh' in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

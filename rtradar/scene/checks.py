@@ -1,0 +1,58 @@
+"""Checks of single values from scene files and from Python, each with its one line of complaint."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from rtradar.errors import InputError
+
+Vector = tuple[float, float, float]
+
+
+def shown(value: object) -> str:
+    """A value as messages show it: one line, not too long."""
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # an integer of very many digits, a table nested very deep
+        text = f"a {type(value).__name__}"
+    text = " ".join(text.split())
+    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def check_number(where: str, key: str, value: object, least: float, most: float) -> float:
+    """A finite number from ``least`` to ``most``, as a float."""
+    number = _number(value)
+    if number is None or not least <= number <= most:
+        raise InputError(f"{where}: {key} = {shown(value)}; it must be a number from {least:g} to {most:g}")
+    return number
+
+
+def check_vector(where: str, key: str, value: object, size: int, most: float = 1000.0) -> tuple[float, ...]:
+    """So many finite numbers, none larger than ``most`` in size, as a tuple of floats."""
+    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and len(value) == size:
+        numbers = [number for number in map(_number, value) if number is not None and abs(number) <= most]
+        if len(numbers) == size:
+            return tuple(numbers)
+    raise InputError(f"{where}: {key} = {shown(value)}; it must be {size} numbers from {-most:g} to {most:g}")
+
+
+def check_text(where: str, key: str, value: object) -> str:
+    """One line of text, not empty."""
+    if isinstance(value, str) and value.strip() and value.isprintable():
+        return value
+    raise InputError(f"{where}: {key} = {shown(value)}; it must be a string of one line, not empty")
+
+
+def _number(value: object) -> float | None:
+    """A finite number as a float, None for anything else."""
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        return None
+    try:
+        number = float(value)
+    except OverflowError:  # an integer that no float can hold
+        return None
+    return number if math.isfinite(number) else None

@@ -1,0 +1,131 @@
+"""Reflection by a half-space, and reflection and transmission by a slab of one material.
+
+ITU-R P.2040-3: the half-space of its eqs. (31a, b), and its slab of a single layer. Time goes with
+exp(+j omega t). TE is the field across the plane of incidence; TM lies in it. The unit vectors of TM are e_TE x k, each
+wave with its own direction k, so that a perfect conductor has -1 for TE and +1 for TM, and at normal incidence both turn
+the field round.
+"""
+
+from __future__ import annotations
+
+from math import pi
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+
+Polarization = Literal["te", "tm"]
+
+
+def reflection(eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization) -> NDArray[np.complex128]:
+    """Fresnel reflection of a plane wave in air by a half-space.
+
+    Parameters
+    ----------
+    eta : (...) complex
+        Relative permittivity, its imaginary part not positive; infinite for a perfect conductor.
+    cos_incidence : (...) float
+        Cosine between the wave and the normal, 0 to 1. Broadcasts with ``eta``.
+    polarization : {"te", "tm"}
+        Electric field across the plane of incidence, or in it.
+
+    Returns
+    -------
+    (...) complex128
+        Reflected over incident field, at the surface.
+
+    Raises
+    ------
+    InputError
+        Where a cosine, a permittivity or the polarisation has no meaning.
+    """
+    eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
+    return np.where(conducts, _perfect(polarization), _interface(eta, cosine, _inner(eta, cosine), polarization))
+
+
+def slab(
+    eta: ArrayLike, thickness_m: ArrayLike, frequency_hz: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Reflection and transmission of a plane wave by a slab with air on both sides, all bounces inside it summed.
+
+    Parameters
+    ----------
+    eta : (...) complex
+        Relative permittivity, its imaginary part not positive; infinite for a perfect conductor.
+    thickness_m : (...) float
+        [m], positive.
+    frequency_hz : (...) float
+        [Hz]
+    cos_incidence : (...) float
+        Cosine between the wave and the normal, 0 to 1. All of these broadcast.
+    polarization : {"te", "tm"}
+        Electric field across the plane of incidence, or in it.
+
+    Returns
+    -------
+    reflection : (...) complex128
+        Reflected over incident field, at the face that the wave meets.
+    transmission : (...) complex128
+        Field behind the slab over the incident one, between points opposite each other on its faces. In place of the same
+        thickness of air, as a straight path from one antenna to the other has it, it is
+        ``transmission * exp(+1j * k * thickness_m * cos_incidence)``.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning.
+    """
+    eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
+    thickness, frequency = np.asarray(thickness_m, dtype=np.float64), np.asarray(frequency_hz, dtype=np.float64)
+    for key, values in (("thickness_m", thickness), ("frequency_hz", frequency)):
+        if not np.all((values > 0) & np.isfinite(values)):
+            raise InputError(f"slab: {key} must be positive and finite")
+    inner = _inner(eta, cosine)
+    face = _interface(eta, cosine, inner, polarization)
+    through = np.exp(-2j * pi * frequency / SPEED_OF_LIGHT_MPS * thickness * inner)
+    loop = 1 - (face * through) ** 2
+    # At exactly grazing incidence a lossless slab of whole half waves has 0 / 0: it is a window, as at other angles.
+    window = loop == 0
+    loop = np.where(window, 1.0, loop)
+    reflected = np.where(window, 0.0, face * (1 - through**2) / loop)
+    transmitted = np.where(window, through, (1 - face**2) * through / loop)
+    return np.where(conducts, _perfect(polarization), reflected), np.where(conducts, 0.0, transmitted)
+
+
+def _checked(
+    eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
+) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.bool_]]:
+    if polarization not in ("te", "tm"):
+        raise InputError(f"polarization = {polarization!r}; allowed: te, tm")
+    cosine = np.asarray(cos_incidence, dtype=np.float64)
+    # Cosines come from dot products of unit vectors, which rounding may leave a little above 1.
+    if not np.all((cosine >= 0) & (cosine <= 1 + 1e-12)):
+        raise InputError("cos_incidence must be from 0 to 1: take the side of the wall that the wave meets")
+    values = np.asarray(eta, dtype=np.complex128)
+    conducts = np.isinf(values)
+    values = np.where(conducts, 1.0, values)
+    if not np.all((values.imag <= 0) & (np.abs(values) > 0)):
+        raise InputError("eta must not be 0 nor have a positive imaginary part: exp(+j omega t) is meant")
+    return values, np.minimum(cosine, 1.0), conducts
+
+
+def _inner(eta: NDArray[np.complex128], cosine: NDArray[np.float64]) -> NDArray[np.complex128]:
+    """Normal component of the wave number inside, over that of air: sqrt(eta - sin^2), decaying."""
+    root = np.sqrt((eta - 1) + cosine**2)
+    return np.where(root.imag > 0, -root, root)
+
+
+def _interface(
+    eta: NDArray[np.complex128], cosine: NDArray[np.float64], inner: NDArray[np.complex128], polarization: Polarization
+) -> NDArray[np.complex128]:
+    outer = cosine if polarization == "te" else eta * cosine
+    total = outer + inner
+    # Both are 0 only for air at grazing incidence, which reflects nothing.
+    return np.where(total == 0, 0.0, (outer - inner) / np.where(total == 0, 1.0, total))
+
+
+def _perfect(polarization: Polarization) -> float:
+    return -1.0 if polarization == "te" else 1.0
