@@ -5,6 +5,8 @@ from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevatio
 from rtradar.process.cells import cell_spectra
 from rtradar.process.cfar import ca_cfar, os_cfar
 from rtradar.process.cfar_law import ca_scale, os_scale
+from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
+from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum, range_time
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram
@@ -12,8 +14,11 @@ from rtradar.process.steering import measures_angle
 from rtradar.process.windows import SlidingWindows
 
 __all__ = [
+    "CLUTTER_REMOVALS",
     "SPECTROGRAM_CYCLES",
     "AngleSpectra",
+    "ClutterMap",
+    "ClutterRemoval",
     "RangeDoppler",
     "SlidingSpectrogram",
     "SlidingWindows",
@@ -24,6 +29,8 @@ __all__ = [
     "ca_cfar",
     "ca_scale",
     "cell_spectra",
+    "clutter_map_scale",
+    "clutter_removal",
     "measures_angle",
     "os_cfar",
     "os_scale",

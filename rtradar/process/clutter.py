@@ -1,0 +1,249 @@
+"""Removal of what stands still from range spectra, before Doppler.
+
+A still echo has the same range spectrum in every TDM cycle, each Tx, Rx and range bin by itself; whatever is constant there
+from cycle to cycle is taken out. T is the cycle, f the Doppler frequency:
+
+``none``
+    Nothing is taken out.
+``mean``
+    The mean over each processing window. Doppler bins -1, 0 and 1 of a Hann window change, the others keep their values, for
+    a constant has no part in them. A slow echo goes with the clutter: of one of d bins of Doppler the share sinc(d) is taken
+    for standing still. That is all of a person who stands still in that window, and of the highest peak more than half below
+    0.6 bins (0.06 m/s for the paper's radar at 12 GHz, 0.011 m/s at 77 GHz). A fast echo loses nothing, but leaves up to
+    1 / (pi d) of its amplitude in the bins about zero, a ghost that no still thing made: -23 dB at 5.5 bins, -34 dB at 20.5.
+``exponential``
+    A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is taken from the next. It starts
+    as the first chirp and is the mean of all of them until 1 / a cycles are there: one chirp alone would leave its noise in
+    every range bin at zero Doppler for as long. Gain |2 sin(pi f T)| / |1 - (1 - a) exp(-j 2 pi f T)|: half the power at
+    f = 1 / (2 pi time constant), all of it well above; white noise comes out 2 / (2 - a) as strong. Who stands still fades
+    with the time constant, and leaves a hole that fades likewise, at zero Doppler.
+``mti``
+    A canceller of two or three pulses of the same Tx: x[n] - x[n-1], or x[n] - 2 x[n-1] + x[n-2], over sqrt(2) or sqrt(6), so
+    that white noise keeps its mean power. Gain |2 sin(pi f T)| / sqrt(2), or |2 sin(pi f T)|^2 / sqrt(6): blind at zero and
+    at multiples of 1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar at 12 GHz). Noise
+    takes on the same colour. The first one or two cycles come out as zeros.
+
+``mean`` works window by window, the other two on the stream. All of them are linear, and treat all channels alike, so that
+directions stay.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
+
+_TIME_CONSTANT_S = 1.0
+_PULSES = 2
+
+
+class ClutterRemoval:
+    """What `clutter_removal` gives: every block of the stream passes `block`, and every window made of them `window`.
+
+    This one removes nothing.
+
+    Parameters
+    ----------
+    radar : Radar
+        Gives the schedule and the shape.
+    """
+
+    def __init__(self, radar: Radar) -> None:
+        self._radar = radar
+        self._next: int | None = None  # chirp that the next block must begin with
+
+    def block(self, spectra: ArrayLike, first_chirp: int) -> NDArray[np.complexfloating]:
+        """Range spectra of the next chirps without what stands still, for a method that works on the stream.
+
+        The values do not depend on how the stream is cut into blocks, to the last bit.
+
+        Parameters
+        ----------
+        spectra : (chirp, rx, range) complex
+            From `range_spectrum`: whole TDM cycles, those that follow the last call's. Not written to.
+        first_chirp : int
+            Number of the first of them in the capture.
+
+        Returns
+        -------
+        (chirp, rx, range) complex64 or complex128
+            As precise as ``spectra``; ``spectra`` themselves where the method works by windows.
+
+        Raises
+        ------
+        InputError
+            Where the shape does not fit the radar, the block does not hold whole cycles or does not follow the last one.
+        """
+        chirps, radar = _complex(spectra, "spectra"), self._radar
+        if chirps.ndim != 3 or chirps.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
+            raise InputError(
+                f"clutter removal: spectra have shape {chirps.shape}; radar '{radar.name}' needs "
+                f"(chirp, rx, range) = (any, {radar.n_rx}, {radar.samples_per_chirp})"
+            )
+        if first_chirp % radar.n_tx or len(chirps) % radar.n_tx:
+            raise InputError(
+                f"clutter removal: {len(chirps)} chirps from chirp {first_chirp} on are not whole TDM cycles; "
+                f"begin with a multiple of {radar.n_tx}, and take a multiple of it"
+            )
+        if self._next not in (None, first_chirp):
+            raise InputError(
+                f"clutter removal: the block begins with chirp {first_chirp}, the last one ended before {self._next}; "
+                "give the chirps without a gap, or begin anew with another removal"
+            )
+        self._next = first_chirp + len(chirps)
+        cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])
+        return self._stream(cycles).reshape(chirps.shape)
+
+    def window(self, cycles: ArrayLike) -> NDArray[np.complexfloating]:
+        """Range spectra of one window without what stands still, for a method that works by windows.
+
+        Parameters
+        ----------
+        cycles : (cycle, ...) complex
+            Such as the ``cube (cycle, tx, rx, range)`` of `SlidingWindows`, made of what `block` gave. Not written to.
+
+        Returns
+        -------
+        (cycle, ...) complex64 or complex128
+            As precise as ``cycles``; ``cycles`` themselves where the method works on the stream.
+
+        Raises
+        ------
+        InputError
+            Where there is nothing to average.
+        """
+        values = _complex(cycles, "cycles")
+        if values.ndim < 1 or len(values) < 1:
+            raise InputError(f"clutter removal: cycles have shape {values.shape}; a window needs at least one cycle")
+        return self._window(values)
+
+    def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        """``cycles (cycle, tx, rx, range)``, the next of the stream."""
+        return cycles
+
+    def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        return cycles
+
+
+class _Mean(ClutterRemoval):
+    def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        # Summed in double: the mean of equal values is that value, and nothing of them is left.
+        mean = cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
+        return np.subtract(cycles, mean)
+
+
+class _Exponential(ClutterRemoval):
+    def __init__(self, radar: Radar, time_constant_s: float) -> None:
+        super().__init__(radar)
+        self._share = -math.expm1(-radar.cycle_duration_s / time_constant_s)
+        self._count = 0  # cycles in the background
+        shape = (radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+        self._background = np.zeros(shape, np.complex128)  # double, for it takes steps of 1e-3 and less
+
+    def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        out = np.empty_like(cycles)
+        for cycle, left in zip(cycles, out, strict=True):
+            if self._count == 0:
+                self._background[...] = cycle
+            self._count += 1
+            step = cycle - self._background
+            left[...] = step
+            parts = step.view(np.float64)
+            parts *= max(self._share, 1 / self._count)
+            self._background += step
+        return out
+
+
+class _Mti(ClutterRemoval):
+    def __init__(self, radar: Radar, pulses: int) -> None:
+        super().__init__(radar)
+        self._order = pulses - 1
+        self._gain = 1 / math.sqrt(math.comb(2 * self._order, self._order))  # the squares of the weights sum to this number
+        self._held = np.empty((0, radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex64)  # the last cycles, as received
+
+    def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        out = np.zeros_like(cycles)
+        known = np.concatenate([self._held, cycles])
+        self._held = known[-self._order :].copy()  # a view would keep the whole block
+        for _ in range(self._order):
+            known = known[1:] - known[:-1]
+        # From cycle to cycle little changes, so differences of differences lose nothing to rounding.
+        out[len(out) - len(known) :] = known * known.real.dtype.type(self._gain)
+        return out
+
+
+def clutter_removal(
+    method: str, radar: Radar, *, time_constant_s: float | None = None, pulses: int | None = None
+) -> ClutterRemoval:
+    """Remove what stands still from a stream of range spectra and from its windows; memory does not grow with the stream.
+
+    Whoever processes a stream calls both steps, whatever the method::
+
+        removal = clutter_removal("mean", radar)
+        for first_chirp, spectra in blocks:
+            for _, start, cube in windows.push(removal.block(spectra, first_chirp)):
+                power = power_map(removal.window(cube), radar)
+
+    Parameters
+    ----------
+    method : {"none", "mean", "exponential", "mti"}
+        As told at the head of this module.
+    radar : Radar
+        Gives the schedule and the shape.
+    time_constant_s : float, optional
+        Of ``exponential`` [s]; 1 s if left out.
+    pulses : {2, 3}, optional
+        Of ``mti``; 2 if left out.
+
+    Returns
+    -------
+    ClutterRemoval
+        For one stream; another stream needs another.
+
+    Raises
+    ------
+    InputError
+        Where there is no such method, a setting has no meaning or belongs to another method, or ``mean`` has only one cycle
+        to average.
+    """
+    if method not in CLUTTER_REMOVALS:
+        raise InputError(f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}")
+    for name, value, owner in (("time_constant_s", time_constant_s, "exponential"), ("pulses", pulses, "mti")):
+        if value is not None and method != owner:
+            raise InputError(f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'")
+    if method == "mean":
+        if radar.cycles_per_frame < 2:
+            raise InputError(
+                f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and its mean is all of it; "
+                "lengthen the frame or choose 'exponential' or 'mti'"
+            )
+        return _Mean(radar)
+    if method == "exponential":
+        return _Exponential(radar, check_time_constant(_TIME_CONSTANT_S if time_constant_s is None else time_constant_s))
+    if method == "mti":
+        if pulses not in (None, 2, 3):
+            raise InputError(f"clutter removal 'mti': pulses = {pulses!r}; allowed: 2, 3")
+        return _Mti(radar, _PULSES if pulses is None else int(pulses))
+    return ClutterRemoval(radar)
+
+
+def check_time_constant(time_constant_s: float) -> float:
+    """The time constant as a float; InputError unless it is positive and finite."""
+    if isinstance(time_constant_s, bool) or not isinstance(time_constant_s, int | float | np.integer | np.floating):
+        raise InputError(f"time_constant_s = {time_constant_s!r}; it must be a number of seconds")
+    if not 0 < time_constant_s < math.inf:
+        raise InputError(f"time_constant_s = {time_constant_s!r}; it must be positive and finite [s]")
+    return float(time_constant_s)
+
+
+def _complex(values: ArrayLike, name: str) -> NDArray[np.complexfloating]:
+    array = np.asarray(values)
+    if array.dtype.kind not in "fc":
+        raise InputError(f"clutter removal: {name} are of type {array.dtype}; they must be complex numbers")
+    return array.astype(np.result_type(array.dtype, np.complex64), copy=False)
