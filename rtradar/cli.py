@@ -87,7 +87,13 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--fidelity",
         default="specular",
-        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays or reference (default: specular)",
+        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays, reference or auto (default: specular)",
+    )
+    run.add_argument(
+        "--tolerance-db", type=_number, metavar="X", help="of auto: error of a frame's power that will do [dB] (default: 0.5)"
+    )
+    run.add_argument(
+        "--tolerance-complex", type=_number, metavar="X", help="of auto: rms error of the field that will do, over its rms"
     )
     run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
     _add_capture(run)
@@ -151,7 +157,9 @@ def _run(options: argparse.Namespace) -> int:
     capture = _capture(options)
     from rtradar.pipeline import run
 
-    result = run(**capture, fidelity=options.fidelity, save_if=options.save_if)
+    dials = {name: getattr(options, name) for name in ("tolerance_db", "tolerance_complex")}
+    dials = {name: value for name, value in dials.items() if value is not None}
+    result = run(**capture, fidelity=options.fidelity, save_if=options.save_if, dials=dials)
     if options.json is not None:
         _write_json(options.json, result.summary)
     said = result.summary

@@ -195,12 +195,15 @@ def _pictures(pictures: Mapping[str, Path]) -> str:
 def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
     parameters = dict(summary.get("parameters", {}))
     settings = parameters.pop("radar", {})
-    own = ("parameters", "limits", "stages", "versions", "part_power_m2")
+    own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled")
+    modelled = summary.get("modelled", {})
+    ways = {**modelled.get("ways", {}), **modelled.get("why", {})}
     power = summary.get("part_power_m2", {})
     total = sum(power.values()) or 1.0
     sections = (
         ("Derived limits of the radar", limits_table(radar)),
         ("Time of each stage", stages_table(summary.get("stages", {}))),
+        ("How parts were modelled, of all parts and time", table((name, f"{value:.1%}") for name, value in ways.items())),
         ("Parameters", mapping_table(parameters)),
         ("Radar", mapping_table(settings)),
         ("Capture", mapping_table({key: value for key, value in summary.items() if key not in own})),

@@ -12,6 +12,7 @@ closed form.
 from __future__ import annotations
 
 from collections import OrderedDict
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -104,10 +105,21 @@ class ZoneShares:
         Where shares are wanted [Hz].
     shadow_rays : int
         Points on each part that are traced.
+    wanted : callable, optional
+        ``wanted(time)``: of which parts (part,) bool shares are wanted 20 ms before or after a time [s]; 1 is given for
+        the others. None: of all.
     """
 
-    def __init__(self, radar: Radar, body: Body, tracer: BodyTracer, frequency: NDArray[np.float64], shadow_rays: int) -> None:
-        self._radar, self._body, self._tracer, self._shadow_rays = radar, body, tracer, shadow_rays
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        tracer: BodyTracer,
+        frequency: NDArray[np.float64],
+        shadow_rays: int,
+        wanted: Callable[[float], NDArray[np.bool_]] | None = None,
+    ) -> None:
+        self._radar, self._body, self._tracer, self._shadow_rays, self._wanted = radar, body, tracer, shadow_rays, wanted
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, _TX_NODES, _RX_NODES)
         self._step = anchor_step(radar)
@@ -136,12 +148,15 @@ class ZoneShares:
     def hiders(self, time: float) -> NDArray[np.bool_]:
         """Which parts rays meet before others at one time [s], for any antenna: (part, part), hidden first."""
         centres, frames, semi_axes = self._body.at(np.array([time]))
-        self._tracer.pose(centres[0], frames[0])
-        parts = np.arange(len(semi_axes))
-        tx, rx, points, k = self._zones(centres, frames, semi_axes)
-        rays = zone_rays(tx, rx, centres[0], frames[0], semi_axes, points[0], k, self._shadow_rays)
-        antennas = np.broadcast_to(self._nodes.antennas, (len(parts), *self._nodes.antennas.shape))
-        return hiding_parts(self._tracer, antennas, rays, parts, len(parts))
+        found = np.zeros((len(semi_axes),) * 2, dtype=bool)
+        parts = np.arange(len(semi_axes)) if self._wanted is None else np.flatnonzero(self._wanted(time))
+        if len(parts):
+            self._tracer.pose(centres[0], frames[0])
+            tx, rx, points, k = (array[parts] for array in self._zones(centres, frames, semi_axes))
+            rays = zone_rays(tx, rx, centres[0, parts], frames[0, parts], semi_axes[parts], points[:, 0], k, self._shadow_rays)
+            antennas = np.broadcast_to(self._nodes.antennas, (len(parts), *self._nodes.antennas.shape))
+            found[parts] = hiding_parts(self._tracer, antennas, rays, parts, len(semi_axes))
+        return found
 
     def shares(self, times: NDArray[np.float64], hiders: NDArray[np.bool_]) -> NDArray[np.complex128]:
         """Shares (time, frequency, pair, part) at these times (time,) [s] behind ``hiders (part, part)``."""
@@ -154,7 +169,7 @@ class ZoneShares:
             shares = zone_shares(
                 tx[part],
                 rx[part],
-                points[pose, part],
+                points[part, pose],
                 part,
                 pose,
                 (centres, frames, semi_axes),
@@ -170,12 +185,12 @@ class ZoneShares:
     def _zones(
         self, centres: NDArray[np.float64], frames: NDArray[np.float64], semi_axes: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Of every part: the middle of the array twice (part, 3), mirror points (time, part, 3), wavenumber (part,)."""
+        """Of every part: the middle of the array twice (part, 3), mirror points (part, time, 3), wavenumber (part,)."""
         times, parts = centres.shape[:2]
         tx, rx = self._radar.tx.mean(axis=0), self._radar.rx.mean(axis=0)
         _, _, points = mirror(np.tile(tx, (times, 1)), np.tile(rx, (times, 1, 1)), centres, frames, semi_axes, points=True)
         k = np.full(parts, 2 * np.pi * self._radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
-        return np.tile(tx, (parts, 1)), np.tile(rx, (parts, 1)), points[:, 0], k
+        return np.tile(tx, (parts, 1)), np.tile(rx, (parts, 1)), np.moveaxis(points[:, 0], 0, 1), k
 
     def _time(self, chirp: float) -> float:
         # Past the end of the recording the body rests in its last pose; before the capture nothing moved.

@@ -29,8 +29,9 @@ RUNGS: dict[str, _Home] = {
     "physical-optics": _Home("physical_optics", "PhysicalOptics", {}, traces=True),
     "rays": _Home("rays", "Rays", {}, traces=True),
     "reference": _Home("reference", "Reference", {}, traces=True),
+    "auto": _Home("auto", "Auto", {}, traces=True),
 }
-"""Every rung, cheapest first."""
+"""Every rung, cheapest first, and the one that chooses among them."""
 
 _COMMON = ("self", "radar", "body", "variant", "spreading")
 

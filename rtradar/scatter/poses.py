@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,15 @@ class Rung(Protocol):
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending."""
+        ...
+
+
+@runtime_checkable
+class Accountable(Protocol):
+    """What can say, for ``summary.json``, which of its choices it made and why."""
+
+    def account(self) -> dict[str, Any]:
+        """What was modelled how so far, ready for JSON."""
         ...
 
 

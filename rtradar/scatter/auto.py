@@ -1,0 +1,261 @@
+"""The rung `auto`: each part at each time by the cheapest way that keeps the whole within a tolerance."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
+from rtradar.scatter.fresnel import SHADOW_RAYS, sweep_nodes
+from rtradar.scatter.fresnel_anchors import ZoneShares
+from rtradar.scatter.mirror import mirror
+from rtradar.scatter.occlusion import MirrorVisibility
+from rtradar.scatter.physical_optics import PhysicalOptics
+from rtradar.scatter.plan import choose
+from rtradar.scatter.poses import ChirpPoses, Rung, chirp_poses
+from rtradar.scatter.reference import Reference
+from rtradar.trace.backend import select, use
+from rtradar.trace.body_tracer import BodyTracer
+
+_INSTANTS_S = 25e-3
+"""Between the instants at which ways are chosen; a limb at 5 m/s goes 12 cm."""
+
+_INSTANTS_AT_ONCE = 32
+
+_MARGIN = 0.7
+"""Of a complex tolerance that forecasts may use: they do not know the array's far ends, nor the time between instants."""
+
+_LEAST_COMPLEX = 1e-3
+
+
+class Planned(NamedTuple):
+    """Some instants: ``chosen (time, part)`` ways, ``told`` what they were chosen by."""
+
+    chosen: NDArray[np.int64]
+    told: Forecast
+
+
+class Auto:
+    """`auto`: only what the tolerance requires of each part is modelled; where the way changes, echoes are faded over.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    variant : {"auto", "llvm", "scalar", "cuda"}
+        Mitsuba's backend; nothing is loaded as long as nothing has to be traced.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    tolerance_db : float
+        Largest error of the power of a frame [dB].
+    tolerance_complex : float, optional
+        Largest rms error of the received field over its rms, as a share; None: only the power matters.
+
+    Raises
+    ------
+    InputError
+        Where a tolerance is out of range.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        tolerance_db: float = 0.5,
+        tolerance_complex: float | None = None,
+    ) -> None:
+        if not (math.isfinite(tolerance_db) and tolerance_db > 0):
+            raise InputError(f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db)")
+        if tolerance_complex is not None and not (math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX):
+            raise InputError(
+                f"auto: tolerance_complex = {tolerance_complex}; it must be at least {_LEAST_COMPLEX}, a share of the rms field "
+                "(--tolerance-complex)"
+            )
+        self._radar, self._body, self._variant, self._spreading = radar, body, variant, spreading
+        # A decibel down is a smaller share than one up.
+        self._power_share = 1 - 10 ** (-tolerance_db / 10)
+        self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
+        self._step = max(1, round(_INSTANTS_S / radar.chirp_duration_s))
+        self._planned: dict[int, Planned] = {}
+        self._tools: dict[str, Any] = {}
+        self.variant: str | None = None
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps: one for each part and way of modelling it that these chirps have."""
+        chirps = np.asarray(chirps, dtype=np.int64)
+        at = chirp_poses(self._radar, self._body, chirps)
+        weights, cut = self._weights(chirps)
+        found = []
+        for way in range(ANALYTIC, len(WAYS)):
+            parts = np.flatnonzero((weights[way] > 0).any(axis=0))
+            if len(parts):
+                found.append((self._by(way, at, chirps, parts, cut), weights[way][:, parts]))
+        if not found:
+            # Nobody is seen: one part stands for all, with nothing to return.
+            found.append((self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1))))
+        frequency = max((echoes.frequency for echoes, _ in found), key=len)
+        amplitudes = [_at_nodes(echoes, frequency) * weight[:, None] for echoes, weight in found]
+        return Echoes(
+            length=np.concatenate([echoes.length for echoes, _ in found], axis=2),
+            amplitude=np.concatenate(amplitudes, axis=3),
+            frequency=frequency,
+            tx=at.tx_index,
+            part=np.concatenate([echoes.part for echoes, _ in found]),
+            bounces=np.concatenate([echoes.bounces for echoes, _ in found]),
+        )
+
+    def account(self) -> dict[str, Any]:
+        """What was modelled how, and why, as shares of part and time so far: ``ways``, ``parts`` and ``why``, for JSON."""
+        chosen = np.concatenate([planned.chosen for planned in self._planned.values()])
+        told = [planned.told for planned in self._planned.values()]
+        hidden, in_view = (np.concatenate([getattr(one, name) for one in told]) for name in ("hidden", "in_view"))
+        # Of what the next cheaper way leaves wrong, is most due to curvature?
+        cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
+        wrong, optics = (
+            np.take_along_axis(np.concatenate([getattr(one, name) for one in told]), cheaper, axis=1)[:, 0]
+            for name in ("wrong", "optics")
+        )
+        curved = optics > wrong
+        higher = chosen > ANALYTIC
+        why = {
+            "left out: hidden": chosen == LEFT_OUT,
+            "analytic: enough": chosen == ANALYTIC,
+            "higher: hidden": higher & hidden,
+            "higher: cut by an edge": higher & ~hidden & ~in_view,
+            "higher: in full view, curvature": higher & in_view & curved,
+            "higher: in full view, near field": higher & in_view & ~curved,
+        }
+        names = self._body.part_names
+        return {
+            "ways": {name: float((chosen == way).mean()) for way, name in enumerate(WAYS)},
+            "why": {reason: float(where.mean()) for reason, where in why.items()},
+            "parts": {
+                names[part]: {name: float((chosen[:, part] == way).mean()) for way, name in enumerate(WAYS)}
+                for part in range(len(names))
+            },
+        }
+
+    def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Weights (way, chirp, part), which sum to 1 or, left out, to less; and parts that others cut there (part,)."""
+        parts = np.arange(len(self._body.part_names))
+        interval = chirps // self._step
+        share = (chirps - interval * self._step) / self._step
+        share = (share**2 * (3 - 2 * share))[:, None]
+        rows = np.arange(len(chirps))[:, None]
+        weights = np.zeros((len(WAYS), len(chirps), len(parts)))
+        cut = np.zeros(len(parts), dtype=bool)
+        for end, weight in ((interval, 1 - share), (interval + 1, share)):
+            ways = np.empty((len(chirps), len(parts)), dtype=np.int64)
+            for instant in np.unique(end):
+                planned, row = self._plan(int(instant))
+                ways[end == instant] = planned.chosen[row]
+                cut |= ~planned.told.in_view[row]
+            np.add.at(weights, (ways, rows, parts), np.broadcast_to(weight, ways.shape))
+        weights[LEFT_OUT] = 0
+        return weights, cut
+
+    def _at_edges(self, time: float) -> NDArray[np.bool_]:
+        """Parts (part,) that go by `fresnel` within one instant of a time [s]."""
+        before = int(time / self._radar.chirp_duration_s) // self._step
+        instants = (self._plan(max(0, before + i)) for i in (-1, 0, 1, 2))
+        return np.asarray(np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0))
+
+    def _plan(self, instant: int) -> tuple[Planned, int]:
+        """The chunk of instants that holds this one, and its row."""
+        chunk, row = divmod(instant, _INSTANTS_AT_ONCE)
+        if chunk not in self._planned:
+            # One more on either side, for what a part needs there it is given here, too.
+            instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
+            times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_duration_s
+            poses = self._body.at(np.minimum(times, self._body.duration_s))
+            told = forecast(self._radar, poses, spreading=self._spreading)
+            chosen = choose(told, self._power_share, self._complex_share)
+            inner = {name: array[1:-1] for name, array in told._asdict().items()}
+            self._planned[chunk] = Planned(chosen[1:-1], Forecast(**inner))
+        return self._planned[chunk], row
+
+    def _by(
+        self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]
+    ) -> Echoes:
+        if way >= PHYSICAL_OPTICS:
+            echoes = self._facets(WAYS[way]).echoes(chirps)
+            return Echoes(
+                length=echoes.length[..., parts],
+                amplitude=echoes.amplitude[..., parts],
+                frequency=echoes.frequency,
+                tx=echoes.tx,
+                part=echoes.part[parts],
+                bounces=echoes.bounces[parts],
+            )
+        poses = (at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
+        frequency = np.array([self._radar.centre_frequency_hz])
+        if way == ANALYTIC:
+            length, amplitude = far_field_echo(*poses, spreading=self._spreading)
+            values = amplitude.astype(np.complex128)[None]
+        else:
+            length, amplitude, _ = mirror(*poses, polarization=self._radar.polarization, spreading=self._spreading)
+            values = amplitude.astype(np.complex128)[None]
+            if cut[parts].any() and way == SPECULAR:
+                values = values * self._mirror_points.at(chirps)[0][..., parts]
+            elif way == FRESNEL and cut[parts].any():
+                frequency = sweep_nodes(self._radar)
+                values = values * self._zones.at(chirps)[..., parts].conj()
+        return Echoes(
+            length=length,
+            amplitude=values,
+            frequency=frequency,
+            tx=at.tx_index,
+            part=parts,
+            bounces=np.ones(len(parts), dtype=np.int64),
+        )
+
+    def _tracer(self) -> BodyTracer:
+        backend = select(self._variant)
+        self.variant = backend.kind
+        return BodyTracer(use(backend), self._body.semi_axes)
+
+    @property
+    def _mirror_points(self) -> MirrorVisibility:
+        if "mirror points" not in self._tools:
+            self._tools["mirror points"] = MirrorVisibility(self._radar, self._body, self._tracer())
+        tool: MirrorVisibility = self._tools["mirror points"]
+        return tool
+
+    @property
+    def _zones(self) -> ZoneShares:
+        if "zones" not in self._tools:
+            of = (self._radar, self._body, self._tracer(), sweep_nodes(self._radar), SHADOW_RAYS)
+            self._tools["zones"] = ZoneShares(*of, wanted=self._at_edges)
+        tool: ZoneShares = self._tools["zones"]
+        return tool
+
+    def _facets(self, name: str) -> Rung:
+        if name not in self._tools:
+            kind = PhysicalOptics if name == WAYS[PHYSICAL_OPTICS] else Reference
+            self._tools[name] = kind(self._radar, self._body, variant=self._variant, spreading=self._spreading)
+            self.variant = self._tools[name].variant
+        rung: Rung = self._tools[name]
+        return rung
+
+
+def _at_nodes(echoes: Echoes, frequency: NDArray[np.float64]) -> NDArray[np.complexfloating]:
+    """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through their own nodes."""
+    if len(echoes.frequency) == 1:
+        return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
+    if np.array_equal(echoes.frequency, frequency):
+        return echoes.amplitude
+    middle, half = frequency.mean(), np.ptp(frequency) / 2
+    own = np.vander((echoes.frequency - middle) / half, increasing=True)
+    asked = np.vander((frequency - middle) / half, len(echoes.frequency), increasing=True)
+    return np.asarray(np.tensordot(asked @ np.linalg.inv(own), echoes.amplitude, axes=1))

@@ -1,0 +1,218 @@
+"""The rung that chooses: what it tells beforehand, what it chooses, and what it hands on."""
+
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.body.body import Poses
+from rtradar.errors import InputError
+from rtradar.motion import place
+from rtradar.radar import Radar
+from rtradar.scatter import build_rung
+from rtradar.scatter.auto import Auto
+from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, REFERENCE, SPECULAR, WAYS, Forecast, forecast
+from rtradar.scatter.plan import choose
+from rtradar.trace.backend import Backend
+
+Array = NDArray[np.float64]
+RADAR = rt.Radar.preset("paper-12ghz")
+SPHERE = np.full((2, 3), 0.2)
+
+
+def two_spheres(aside: float) -> Poses:
+    """A sphere at the origin, and another of the same size 1 m before it, this far beside the line to the radar."""
+    ahead = np.asarray(RADAR.position_m) / np.linalg.norm(RADAR.position_m)
+    across = np.array([-ahead[1], ahead[0], 0]) / np.hypot(ahead[0], ahead[1])
+    centres = np.array([[np.zeros(3), ahead + aside * across]])
+    return Poses(centres, np.broadcast_to(np.eye(3), (1, 2, 3, 3)), SPHERE)
+
+
+def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() -> None:
+    told = forecast(RADAR, two_spheres(0.0))
+    assert told.hidden.tolist() == [[True, False]]
+    assert told.in_view.tolist() == [[False, True]]
+    assert told.true[0, 0] == 0
+    assert told.power[0, SPECULAR, 0] == 0
+    assert told.power[0, ANALYTIC, 0] > 0
+
+
+def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
+    told = forecast(RADAR, two_spheres(1.0))
+    assert told.in_view.all()
+    # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the mirror point, by both ways.
+    distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
+    assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
+    assert told.true[0, 0] == pytest.approx(np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02)
+    assert told.wrong[0, SPECULAR, 0] == 0
+
+
+def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_mirror_point_errs_by_half() -> None:
+    # Seen from 4.2 m, the edge of a sphere of 0.2 m that is 1 m nearer touches the line to the middle of the far one.
+    distance = np.linalg.norm(np.asarray(RADAR.position_m))
+    # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a right triangle.
+    near = distance - 1.0
+    told = forecast(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
+    free = told.power[0, FRESNEL, 0] / told.true[0, 0] * (np.pi * 0.2**2 / ((distance - 0.2) ** 2 * distance**2))
+    # A curved edge leaves a little more or less than the straight one's half of the field.
+    assert np.sqrt(told.true[0, 0] / free) == pytest.approx(0.5, abs=0.1)
+    assert np.sqrt(told.wrong[0, SPECULAR, 0] / free) == pytest.approx(0.5, abs=0.1)
+    assert told.wrong[0, FRESNEL, 0] < 0.01 * free
+
+
+def forecast_of(wrong: list[list[float]], true: list[float], hidden: list[bool] | None = None) -> Forecast:
+    """One instant: ``wrong`` a part, without reference; powers are off by nothing."""
+    squares = np.zeros((1, len(WAYS), len(true)))
+    for part, row in enumerate(wrong):
+        squares[0, : len(row), part] = row
+    power = np.repeat(np.array(true)[None, None], len(WAYS), axis=1)
+    return Forecast(
+        true=np.array([true]),
+        power=power,
+        wrong=squares,
+        optics=np.zeros_like(squares),
+        in_view=np.ones((1, len(true)), dtype=bool),
+        hidden=np.array([hidden or [False] * len(true)]),
+    )
+
+
+def test_the_cheapest_way_that_will_do_is_chosen_for_each_part() -> None:
+    #                        left out, analytic, specular, fresnel, physical-optics
+    told = forecast_of([[1, 1e-6, 1e-6, 1e-6, 1e-6], [1, 0.5, 1e-6, 1e-6, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1, 1])
+    assert choose(told, 10.0, 0.1).tolist() == [[ANALYTIC, SPECULAR, FRESNEL]]
+    assert choose(told, 10.0, 1.0).tolist() == [[ANALYTIC, ANALYTIC, ANALYTIC]]
+
+
+def test_what_needs_facets_brings_the_edges_along_and_nothing_less_than_all_is_the_reference() -> None:
+    told = forecast_of([[1, 0.5, 0.5, 0.5, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1])
+    assert choose(told, 10.0, 0.1).tolist() == [[PHYSICAL_OPTICS, PHYSICAL_OPTICS]]
+    told = forecast_of([[1, 0.5, 0.5, 0.5, 0.5]], [1])
+    assert choose(told, 10.0, 0.1).tolist() == [[REFERENCE]]
+
+
+def test_only_what_is_hidden_is_left_out_and_not_where_it_is_seen_next() -> None:
+    told = forecast_of([[1e-6, 1e-6], [1e-6, 1e-6]], [1, 1], [True, False])
+    assert choose(told, 10.0, None).tolist() == [[LEFT_OUT, ANALYTIC]]
+    seen = told._replace(hidden=np.array([[False, False]]))
+    both = Forecast(*(np.concatenate([np.asarray(a), np.asarray(a), np.asarray(b)]) for a, b in zip(told, seen, strict=True)))
+    assert choose(both, 10.0, None)[:, 0].tolist() == [LEFT_OUT, ANALYTIC, ANALYTIC]
+
+
+@settings(max_examples=40)
+@given(st.integers(0, 2**32 - 1), st.floats(0.001, 0.5), st.floats(0.001, 0.5))
+def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(seed: int, power_share: float, complex_share: float) -> None:
+    rng = np.random.default_rng(seed)
+    true = rng.random((5, 6))
+    scale = np.array([1, 0.3, 0.1, 0.03, 0.01, 0])[:, None]
+    told = Forecast(
+        true=true,
+        power=true[:, None] * (1 + scale * rng.normal(size=(5, len(WAYS), 6))),
+        wrong=true[:, None] * (scale * rng.random((5, len(WAYS), 6))) ** 2,
+        optics=np.zeros((5, len(WAYS), 6)),
+        in_view=np.zeros((5, 6), dtype=bool),
+        hidden=rng.random((5, 6)) < 0.1,
+    )
+    chosen = choose(told, power_share, complex_share)[:, None]
+    whole = true.sum(axis=1)
+    wrong = np.take_along_axis(told.wrong, chosen, axis=1).sum(axis=(1, 2))
+    power = np.take_along_axis(told.power, chosen, axis=1).sum(axis=(1, 2))
+    assert (wrong <= complex_share**2 * whole * (1 + 1e-9)).all()
+    assert (np.abs(power - whole) <= power_share * whole * (1 + 1e-9)).all()
+    assert (told.hidden | (chosen[:, 0] > LEFT_OUT)).all()
+
+
+@dataclass(frozen=True)
+class Passing:
+    """A large sphere that passes before a small one, at 2 m/s."""
+
+    duration_s: float = 0.4
+    part_names: tuple[str, ...] = ("target", "curtain")
+    semi_axes: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "semi_axes", np.array([[0.1, 0.1, 0.1], [0.25, 0.25, 0.25]]))
+
+    def at(self, times: Array) -> Poses:
+        y = 2.0 * (np.asarray(times) - 0.1)
+        centres = np.zeros((len(y), 2, 3))
+        centres[:, 1, 0], centres[:, 1, 1] = -0.5, y
+        return Poses(centres, np.broadcast_to(np.eye(3), (len(y), 2, 3, 3)), self.semi_axes)
+
+
+def passing_radar() -> Radar:
+    return Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=1e-3, position_m=(-4.0, 0.0, 0.0))
+
+
+def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic_and_nothing_is_traced() -> None:
+    body = Body.from_motion(place(rt.synthetic_motion("jumping_jack", seed=0, duration_s=0.5)))
+    rung = build_rung("auto", RADAR, body, tolerance_db=10.0)
+    chirps = np.arange(0, 48)
+    ours, theirs = rung.echoes(chirps), build_rung("analytic", RADAR, body).echoes(chirps)
+    np.testing.assert_array_equal(ours.part, theirs.part)
+    np.testing.assert_array_equal(ours.length, theirs.length)
+    np.testing.assert_allclose(ours.amplitude, theirs.amplitude, rtol=1e-12)
+    assert rung.variant is None
+
+
+def test_a_hidden_part_has_no_echo_and_fades_in_smoothly(backend: Backend) -> None:
+    rung = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
+    assert rung.echoes(np.array([100])).part.tolist() == [1]
+    strength = [np.abs(rung.echoes(np.array([chirp])).amplitude[0, 0, 0]) for chirp in range(100, 400)]
+    parts = [rung.echoes(np.array([chirp])).part for chirp in range(100, 400)]
+    target = np.array([power[part == 0].sum() for power, part in zip(strength, parts, strict=True)])
+    assert target[0] == 0
+    assert target[-1] == pytest.approx(np.sqrt(np.pi) * 0.1 / 3.9**2, rel=0.05)
+    # The edge passes in some 40 ms: from one millisecond to the next never more than a tenth.
+    assert np.abs(np.diff(target)).max() < 0.1 * target[-1]
+    assert rung.variant == backend.kind
+
+
+def test_the_account_says_all_and_adds_up(backend: Backend) -> None:
+    rung = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
+    rung.echoes(np.arange(0, 400, 10))
+    account = rung.account()
+    assert sum(account["ways"].values()) == pytest.approx(1)
+    assert sum(account["why"].values()) == pytest.approx(1)
+    assert account["ways"]["left-out"] == account["why"]["left out: hidden"] > 0
+    assert account["why"]["higher: cut by an edge"] > 0
+    assert account["parts"]["curtain"]["left-out"] == 0
+    for ways in account["parts"].values():
+        assert sum(ways.values()) == pytest.approx(1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("share", [0.2, 0.1, 0.05])
+def test_a_complex_tolerance_is_met_by_a_kick(share: float) -> None:
+    body = Body.from_motion(place(rt.synthetic_motion("kick", seed=0, duration_s=0.8)))
+    chirps = (np.linspace(3600, 8000, 12).astype(np.int64)[:, None] // 12 * 12 + np.array([0, 5])).ravel()
+    found, truth = (
+        _field(rung, chirps)
+        for rung in (build_rung("auto", RADAR, body, tolerance_complex=share), build_rung("reference", RADAR, body))
+    )
+    assert np.sqrt((np.abs(found - truth) ** 2).mean() / (np.abs(truth) ** 2).mean()) < share
+
+
+def _field(rung: object, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
+    """Received field (chirp, rx) at the middle of the sweep."""
+    echoes = rung.echoes(chirps)  # type: ignore[attr-defined]
+    at, value = RADAR.centre_frequency_hz, 0j
+    for node, frequency in enumerate(echoes.frequency):
+        others = np.delete(echoes.frequency, node)
+        value = value + echoes.amplitude[node] * np.prod((at - others) / (frequency - others))
+    return (np.conj(value) * np.exp(-2j * np.pi * at * echoes.length / 299_792_458.0)).sum(axis=-1)
+
+
+def test_bad_tolerances_are_refused_in_one_line() -> None:
+    for dials, word in itertools.chain(
+        (({"tolerance_db": value}, "tolerance_db") for value in (0.0, -1.0, float("nan"), float("inf"))),
+        (({"tolerance_complex": value}, "tolerance_complex") for value in (0.0, -0.1, float("nan"))),
+    ):
+        with pytest.raises(InputError, match=word) as caught:
+            Auto(passing_radar(), Passing(), **dials)  # type: ignore[arg-type]
+        assert "\n" not in str(caught.value)
