@@ -1,8 +1,6 @@
-"""Peak memory and seconds a stage of whole runs, each in a process of its own: 3 s and 12 s, both rungs.
+"""Peak memory and seconds a stage of whole runs, each in a process of its own: a short one and a long one.
 
-Memory is to be below 3 GB at 77 GHz and not to grow with the recording. At 12 GHz the larger of two small numbers is what the
-C library keeps of freed memory, which settles only after some seconds of tracing, so there growth is reported. Seconds are
-reported too: they are of this machine.
+Memory is to be below 3 GB at 77 GHz and not to grow with the recording. Seconds are reported: they are of this machine.
 
 python validation/memory.py [--quick] [--json FILE]
 """
@@ -20,9 +18,9 @@ from rows import Row, judged, main, reported
 
 LIMIT_MB = 3000.0
 
-# Peaks of one and the same run differ by this much from process to process: how far threads get ahead of each other, and
-# what the allocator has given back by then. Four times the length, were it held, would be gigabytes of IF samples.
-REPEATABILITY = 0.02
+# The recording itself is in memory twice, as given and placed: 0.18 MB a second, 1.6 MB of some 400 from 3 s to 12 s. Peaks of
+# one and the same run differ by 0.1 % from process to process. Were the IF samples held, it would be gigabytes.
+GROWTH = 1.01
 
 
 def summary(folder: str, radar: str, fidelity: str, duration_s: float) -> dict[str, Any]:
@@ -35,10 +33,11 @@ def summary(folder: str, radar: str, fidelity: str, duration_s: float) -> dict[s
 
 def measure(quick: bool) -> list[Row]:
     rows = []
+    short_s, long_s = (1.5, 3.0) if quick else (3.0, 12.0)
     for radar in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
-        for fidelity in ("analytic", "specular"):
+        for fidelity in ("specular",) if quick else ("analytic", "specular"):
             peak = {}
-            for duration_s in (3.0, 12.0):
+            for duration_s in (short_s, long_s):
                 with tempfile.TemporaryDirectory() as folder:
                     found = summary(folder, radar, fidelity, duration_s)
                 peak[duration_s] = found["peak_memory_mb"]
@@ -48,8 +47,8 @@ def measure(quick: bool) -> list[Row]:
                 rows.append(reported(claim, "real-time factor", "1", found["real_time_factor"]))
                 for stage, seconds in found["stages"].items():
                     rows.append(reported(claim, f"stage {stage}", "s", seconds))
-            growth = (f"{radar}, {fidelity}", "peak memory, 12 s over 3 s", "1", peak[12.0] / peak[3.0])
-            rows.append(judged(*growth, 1 + REPEATABILITY) if radar == "paper-77ghz" else reported(*growth))
+            growth = f"peak memory, {long_s:g} s over {short_s:g} s"
+            rows.append(judged(f"{radar}, {fidelity}", growth, "1", peak[long_s] / peak[short_s], GROWTH))
     return rows
 
 

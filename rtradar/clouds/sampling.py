@@ -14,6 +14,8 @@ _WITH_REPLACEMENT = 1
 class UniformSample:
     """Rows of a stream, every subset of them equally likely: each row gets a random key, those with the least keys stay.
 
+    All the memory it ever takes it takes at once.
+
     Parameters
     ----------
     n_rows : int
@@ -41,23 +43,24 @@ class UniformSample:
         self._n_rows = int(n_rows)
         self._seed = int(seed)
         self._random = np.random.default_rng(self._seed)
-        self._keys = np.zeros(0)
-        self._rows = np.zeros((0, columns))
+        self._keys = np.full(self._n_rows, np.inf)  # of places that no row has taken yet
+        self._rows = np.full((self._n_rows, columns), np.nan)
         self.n_seen = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
         """Take the next rows, (row, column) float64."""
         keys = np.concatenate([self._keys, self._random.random(len(rows))])
-        both = np.concatenate([self._rows, rows])
-        if len(keys) > self._n_rows:
-            kept = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
-            keys, both = keys[kept], both[kept]
-        self._keys, self._rows = keys, both
+        least = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
+        is_new = least >= self._n_rows
+        free = np.ones(self._n_rows, dtype=bool)
+        free[least[~is_new]] = False
+        self._keys[free] = keys[least[is_new]]
+        self._rows[free] = rows[least[is_new] - self._n_rows]
         self.n_seen += len(rows)
 
     def rows(self) -> NDArray[np.float64]:
         """The sample, at most ``n_rows``, in random order: any first part of it is a sample too."""
-        return np.asarray(self._rows[np.argsort(self._keys)])
+        return np.asarray(self._rows[np.argsort(self._keys)[: self.n_seen]])
 
     def filled(self) -> NDArray[np.float64]:
         """Exactly ``n_rows``: drawn with replacement where fewer were seen; none where none was."""

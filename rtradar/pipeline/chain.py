@@ -21,17 +21,18 @@ from tqdm import tqdm
 
 from rtradar.body import Body
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
+from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.survey import Survey, survey
-from rtradar.pipeline.timing import Stages, forget_peak_memory, peak_memory_mb
+from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low, peak_memory_mb
 from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.scatter import Rung, build_rung
+from rtradar.scatter import Accountable, Rung, build_rung
 from rtradar.scene import Scene
 from rtradar.signal import Noise, synthesize
 
@@ -127,12 +128,12 @@ def run(
     """
     began = time.perf_counter()
     stages = Stages()
+    keep_memory_low()
     forget_peak_memory()
     scene = scene or Scene()
     _check(snr_db, pfa, seed)
     with stages.time("motion"):
-        placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg)
-        body = Body.from_motion(placed)
+        body = Body.from_motion(place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg))
     n_cycles = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
     n_chirps = n_cycles * radar.n_tx
     windows = radar.window_starts(n_chirps)
@@ -152,6 +153,7 @@ def run(
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = Noise.for_snr(surveyed.power, snr_db, seed) if noise_power_m2 is None else Noise(noise_power_m2, seed)
     title = f"{motion.name}, {radar.name}, {fidelity}"
+    give_back_memory()  # what compiling and the pass over the whole recording took
     with all_or_nothing(Path(out)) as folder:
         products = Products(folder / "maps.h5", radar, pfa=pfa, seed=seed, stages=stages, title=title)
         try:
@@ -213,6 +215,7 @@ def run(
             "part_power_m2": surveyed.part_power,
             "noise_power_m2": noise.power,
             "limits": _limits(surveyed, [str(warning.message) for warning in caught]),
+            **({"modelled": rung.account()} if isinstance(rung, Accountable) else {}),
         }
         with stages.time("report"):
             write_report(
@@ -232,22 +235,36 @@ def run(
 def _stream(
     radar: Radar, rung: Rung, noise: Noise, products: Products, stages: Stages, n_chirps: int, kept: Any, title: str
 ) -> None:
-    """Echoes, IF samples, noise and range spectra, a hop of the windows at a time."""
+    """Echoes a hop of the windows at a time, and from them IF samples, noise and range spectra by smaller pieces."""
     block = math.ceil(radar.frame_hop_s / radar.cycle_duration_s) * radar.n_tx
-    for first in tqdm(range(0, n_chirps, block), desc=title, unit="block", disable=None):
-        chirps = np.arange(first, min(first + block, n_chirps))
-        with stages.time("scatter"):
-            echoes = rung.echoes(chirps)
+    piece = products.piece if kept is None else block  # which is a chunk of the array
+
+    def spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
         with stages.time("signal"):
-            samples = synthesize(echoes, radar, radar.chirp_times(len(chirps), first), dtype=np.complex64)
+            samples = synthesize(echoes, radar, radar.chirp_times(len(echoes.tx), first), dtype=np.complex64)
         with stages.time("noise"):
             noise.add(samples, radar, first)
         if kept is not None:
             with stages.time("write"):
                 kept[first : first + len(samples)] = samples
         with stages.time("range"):
-            spectra = range_spectrum(samples, radar)
-        products.take(spectra, first)
+            return range_spectrum(samples, radar)
+
+    def take(chirps: NDArray[np.int64]) -> None:
+        with stages.time("scatter"):
+            echoes = rung.echoes(chirps)
+        for begin in range(0, len(chirps), piece):
+            products.take(spectra(_chirps_of(echoes, begin, begin + piece), int(chirps[begin])), int(chirps[begin]))
+
+    # In functions, for what a loop leaves bound would still be held while the next block is made.
+    for first in tqdm(range(0, n_chirps, block), desc=title, unit="block", disable=None):
+        take(np.arange(first, min(first + block, n_chirps)))
+
+
+def _chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
+    """Those of some chirps of the block."""
+    chirps = slice(begin, end)
+    return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
 
 
 def _check(snr_db: float, pfa: float, seed: int) -> None:

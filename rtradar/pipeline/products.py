@@ -32,6 +32,12 @@ CLOUD_POINTS = 3000
 SPATIAL_POINTS = 30_000
 """Most points in the spatial cloud: about 3 s of a walk at 12 GHz; of more a uniform sample, so that memory does not grow."""
 
+_RANGE_TIME_S = 5e-3
+"""Step of the range-time map."""
+
+_PIECE_BYTES = 8e6
+"""IF samples at once: some of it stays in a processor's cache, and threads still have enough to share."""
+
 
 class Clouds(NamedTuple):
     """``rdt``: the range-Doppler-time cloud; ``spatial``: points in the room; ``n_spatial``: points it was sampled from."""
@@ -57,6 +63,11 @@ class Products:
         Where the time goes.
     title : str
         Of the file.
+
+    Attributes
+    ----------
+    piece : int
+        Chirps to take at once, so that memory stays low.
     """
 
     def __init__(self, path: Path, radar: Radar, *, pfa: float, seed: int, stages: Stages, title: str) -> None:
@@ -73,12 +84,18 @@ class Products:
         self._angle_names = [name for name, there in lines.items() if there]
         axes |= {name: angle_grid(radar) for name in self._angle_names}
         self._store = MapStore(path, axes, {"title": title})
+        step = max(1, round(_RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
+        step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
+        self.piece = step * max(1, int(_PIECE_BYTES / step_bytes))
 
     def take(self, spectra: NDArray[np.complex64], first: int) -> None:
-        """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles."""
+        """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles.
+
+        A block that is cut after any multiple of ``piece`` chirps gives the same as the whole.
+        """
         radar, stages, store = self._radar, self._stages, self._store
         with stages.time("range"):
-            power, times = range_time(spectra, radar, first_chirp=first)
+            power, times = range_time(spectra, radar, first_chirp=first, step_s=_RANGE_TIME_S)
             store.extend("slow_time", times, range_time=power)
         with stages.time("spectrogram"):
             columns = self._spectrogram.push(spectra)

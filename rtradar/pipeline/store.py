@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,6 +32,9 @@ _MAPS = {
     "range_azimuth": (("time", "range", "azimuth"), np.float32, "m2", "power summed over detected cells"),
     "range_elevation": (("time", "range", "elevation"), np.float32, "m2", "power summed over detected cells"),
 }
+
+_STEPS_A_CHUNK = 64
+"""Steps of time that are written to the file together, of maps with few numbers a step."""
 
 _SPARSE = ("detections", "range_azimuth", "range_elevation")
 """Mostly zeros, which cost nothing once packed."""
@@ -69,13 +73,16 @@ class MapStore:
             if any(axis_name not in fixed for axis_name in axes[1:]):
                 continue
             shape = tuple(len(fixed[axis_name]) for axis_name in axes[1:])
+            steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
             packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if name in _SPARSE else {}
             data = self._file.create_dataset(
                 name,
                 shape=(0, *shape),
                 maxshape=(None, *shape),
                 dtype=kind,
-                chunks=(1 if len(shape) > 1 else 64, *shape),
+                chunks=(steps, *shape),
+                # HDF5 would keep up to 8 MB of what is written of each map. Only a chunk that is not yet full is worth it.
+                rdcc_nbytes=0 if steps == 1 else steps * math.prod(shape) * np.dtype(kind).itemsize,
                 **packed,
             )
             data.attrs["units"], data.attrs["long_name"] = unit, meaning

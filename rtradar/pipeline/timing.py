@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ctypes
+import platform
 import resource
 import sys
 import time
@@ -28,6 +30,35 @@ class Stages:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
+
+
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h of the GNU C library
+_HEAP_BYTES = 1 << 24
+
+
+def keep_memory_low() -> None:
+    """Ask the GNU C library for one heap, and to give back at once what large arrays took; elsewhere nothing happens.
+
+    Each thread that starts may else get a heap of its own, which keeps what was freed in it, and the size from which an array
+    is given back to the system grows with what was freed before. Then memory depends on how threads fell in with each
+    other, and creeps for seconds. Smaller arrays stay in the heap: the blocks of a run use the same memory again, and the
+    system need not clear new pages for each. Holds for the process, for good.
+    """
+    library = _gnu_c_library()
+    if library is not None:
+        for option, value in ((_M_ARENA_MAX, 1), (_M_MMAP_THRESHOLD, _HEAP_BYTES), (_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)):
+            library.mallopt(option, value)
+
+
+def give_back_memory() -> None:
+    """Let the GNU C library give back all that is free in its heap; elsewhere nothing happens. Takes milliseconds."""
+    library = _gnu_c_library()
+    if library is not None:
+        library.malloc_trim(0)
+
+
+def _gnu_c_library() -> ctypes.CDLL | None:
+    return ctypes.CDLL(None) if platform.libc_ver()[0] == "glibc" else None
 
 
 def forget_peak_memory() -> None:

@@ -8,7 +8,7 @@ than 10 ms for a limb at 1 m/s. A jump would smear a line over all velocities th
 
 from __future__ import annotations
 
-from collections import OrderedDict
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses
 from rtradar.trace.body_tracer import BodyTracer
 
 _KEPT_ANCHORS = 2048
-"""Anchors remembered, so that the pass that measures power and the pass that makes the signal trace once (a few MB)."""
+"""Anchors remembered, so that the pass that measures power and the pass that makes the signal trace once: 20 s, 1.5 MB."""
 
 
 class Anchor(NamedTuple):
@@ -85,6 +85,34 @@ def _traced_starts(tracer: BodyTracer, at: ChirpPoses) -> NDArray[np.float64]:
     return np.where(counts[:, None] > 0, np.nansum(local, axis=0) / np.maximum(counts, 1)[:, None], np.nan)
 
 
+class _KeptAnchors:
+    """Anchors by their chirp, visibility a bit each, in memory that is all taken at once.
+
+    A recording is gone through twice, from its start. So the first that come stay; later ones pass through the last two places,
+    for an instant needs the anchors on both sides of it.
+    """
+
+    def __init__(self, shape: tuple[int, int, int]) -> None:
+        self._shape = shape
+        self._visible = np.full((_KEPT_ANCHORS, -(-math.prod(shape) // 8)), 0, dtype=np.uint8)
+        self._start = np.full((_KEPT_ANCHORS, shape[2], 3), np.nan)
+        self._places: dict[int, int] = {}  # in the order of coming
+
+    def get(self, chirp: int) -> Anchor | None:
+        place = self._places.get(chirp)
+        if place is None:
+            return None
+        bits = np.unpackbits(self._visible[place], count=math.prod(self._shape))
+        return Anchor(bits.view(np.bool_).reshape(self._shape), self._start[place].copy())
+
+    def put(self, chirp: int, anchor: Anchor) -> None:
+        place = len(self._places)
+        if place == _KEPT_ANCHORS:
+            place = self._places.pop(list(self._places)[-2])
+        self._visible[place], self._start[place] = np.packbits(anchor.visible), anchor.start
+        self._places[chirp] = place
+
+
 class MirrorVisibility:
     """Visibility of the mirror points of a moving body over a capture.
 
@@ -99,26 +127,25 @@ class MirrorVisibility:
     def __init__(self, radar: Radar, body: Body, tracer: BodyTracer) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
         self._step = anchor_step(radar)
-        self._anchors: OrderedDict[int, Anchor] = OrderedDict()
+        self._kept = _KeptAnchors((radar.n_tx, radar.n_rx, len(body.part_names)))
 
     def _anchor(self, chirp: int) -> Anchor:
-        if chirp in self._anchors:
-            self._anchors.move_to_end(chirp)
-        else:
-            every_tx = chirp_poses(self._radar, self._body, np.array([chirp]))
-            n_tx = self._radar.n_tx
-            at = ChirpPoses(
-                np.arange(n_tx),
-                self._radar.tx,
-                self._radar.rx[self._radar.rx_of_tx],
-                np.repeat(every_tx.centres, n_tx, axis=0),
-                np.repeat(every_tx.frames, n_tx, axis=0),
-                every_tx.semi_axes,
-            )
-            self._anchors[chirp] = trace_anchor(self._tracer, at)
-            if len(self._anchors) > _KEPT_ANCHORS:
-                self._anchors.popitem(last=False)
-        return self._anchors[chirp]
+        kept = self._kept.get(chirp)
+        if kept is not None:
+            return kept
+        every_tx = chirp_poses(self._radar, self._body, np.array([chirp]))
+        n_tx = self._radar.n_tx
+        at = ChirpPoses(
+            np.arange(n_tx),
+            self._radar.tx,
+            self._radar.rx[self._radar.rx_of_tx],
+            np.repeat(every_tx.centres, n_tx, axis=0),
+            np.repeat(every_tx.frames, n_tx, axis=0),
+            every_tx.semi_axes,
+        )
+        anchor = trace_anchor(self._tracer, at)
+        self._kept.put(chirp, anchor)
+        return anchor
 
     def at(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Visibility and starting points at these chirps.

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_rung, occlusion
 from rtradar.scatter.occlusion import MirrorVisibility, trace_anchor, unobstructed
 from rtradar.scatter.poses import ChirpPoses, anchor_step
 from rtradar.trace.backend import Backend, use
@@ -132,3 +132,25 @@ def test_past_the_end_the_last_pose_stays(backend: Backend) -> None:
     rung = build_rung("specular", radar, body, variant=backend.kind)  # type: ignore[arg-type]
     echoes = rung.echoes(np.arange(90, 130))
     np.testing.assert_array_equal(echoes.length[12::2], np.broadcast_to(echoes.length[12], (14, 2, 2)))
+
+
+def test_anchors_are_the_same_where_only_a_few_are_remembered(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+    radar, body = small_radar(), Curtain(3.0)
+    whole = weights(backend, radar, body, np.arange(150, 260))
+    monkeypatch.setattr(occlusion, "_KEPT_ANCHORS", 4)
+    traced = []
+
+    def counted(tracer: BodyTracer, at: ChirpPoses) -> occlusion.Anchor:
+        traced.append(at.centres[0, 1, 1])
+        return trace_anchor(tracer, at)
+
+    monkeypatch.setattr(occlusion, "trace_anchor", counted)
+    few = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
+    anchors = np.arange(150, 261, 10)
+    few.at(anchors)
+    assert len(traced) == len({*traced}) == 12
+    # Cut inside intervals: each needs the anchors on both sides of it, which must still be there.
+    pieces = [few.at(block)[0] for block in np.split(np.arange(150, 260), [13, 14, 57, 88])]
+    np.testing.assert_array_equal(np.concatenate(pieces), whole)
+    # The first two stayed; each of the others is traced once more.
+    assert len(traced) == 12 + 10
