@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
 
 PIECES = 8
 """Parts of the interval between two anchors where it is divided the most: 1.25 ms of 10 ms."""
@@ -24,16 +24,28 @@ _KEPT_ANCHORS = 2048
 
 
 class Sample(NamedTuple):
-    """The envelope in one pose: ``ratio (node, pair, part)`` complex, ``strength (pair, part)`` [m] of what it multiplies."""
+    """The envelope in one pose: ``ratio (node, pair, part)`` complex, ``strength (pair, part)`` [m] of what it multiplies.
+
+    ``others`` is the power of parts that are not asked about [m^2].
+    """
 
     ratio: NDArray[np.complex128]
     strength: NDArray[np.float64]
+    others: float = 0.0
 
 
 class _Interval(NamedTuple):
     """``ratio (place, node, pair, part)`` at the 9 places of one interval, ``known (place, part)``."""
 
     ratio: NDArray[np.complex128]
+    known: NDArray[np.bool_]
+
+
+class Course(NamedTuple):
+    """The envelope over one interval: ``ratio`` and ``slope (place, node, pair, part)``, where ``known (place, part)``."""
+
+    ratio: NDArray[np.complex128]
+    slope: NDArray[np.complex128]
     known: NDArray[np.bool_]
 
 
@@ -64,28 +76,13 @@ class Envelope:
                 self._anchors.popitem(last=False)
         return self._anchors[index]
 
-    def between(self, index: int, share: NDArray[np.float64]) -> NDArray[np.complex128]:
-        """Ratio (time, node, pair, part) at these shares (time,), 0 to 1, of the way from an anchor to the next."""
-        before = self._interval(index - 1) if index > 0 else None
+    def course(self, index: int) -> Course:
+        """From one anchor to the next: a cubic from place to place, its slopes those of the parabola through three."""
         here, after = self._interval(index), self._interval(index + 1)
-        out = np.empty((len(share), *here.ratio.shape[1:]), dtype=np.complex128)
-        patterns, group = np.unique(here.known, axis=1, return_inverse=True)
-        for number in range(patterns.shape[1]):
-            parts = np.flatnonzero(group.ravel() == number)
-            places = np.flatnonzero(patterns[:, number])
-            ratio = here.ratio[:, :, :, parts]
-            slope = np.empty((len(places), *ratio.shape[1:]), dtype=np.complex128)
-            for i in range(1, len(places) - 1):
-                slope[i] = _slope(ratio, places[i - 1], places[i], places[i + 1])
-            for column, part in enumerate(parts.tolist()):
-                # At both ends the neighbour on the other side belongs to the next interval, where this part has its own.
-                left = _neighbour(before, part, last=True) if before is not None else None
-                right = _neighbour(after, part, last=False)
-                own = ratio[:, :, :, column]
-                slope[0, :, :, column] = _slope_at(own, left, places[0], places[1], left_side=True)
-                slope[-1, :, :, column] = _slope_at(own, right, places[-1], places[-2], left_side=False)
-            out[..., parts] = CubicHermiteSpline(places / PIECES, ratio[places], slope * PIECES)(share)
-        return out
+        before = self._interval(index - 1) if index > 0 else here
+        slope = np.empty_like(here.ratio)
+        _find_slopes(index > 0, before.ratio, before.known, here.ratio, here.known, after.ratio, after.known, slope)
+        return Course(here.ratio, slope, here.known)
 
     def _interval(self, index: int) -> _Interval:
         if index in self._intervals:
@@ -137,39 +134,56 @@ def _bend(
 
 def whole_echo(sample: Sample) -> float:
     """Root of the power of all parts, the mean over frequencies and pairs [m]."""
-    return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean()))
+    return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean() + sample.others))
 
 
-def _slope(ratio: NDArray[np.complex128], left: int, here: int, right: int) -> NDArray[np.complex128]:
-    """Slope at the middle one of three places, of the parabola through them."""
-    return _parabola(ratio[left], here - left, ratio[here], right - here, ratio[right])
+@njit(cache=True, error_model="numpy")
+def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, known_after, slope):  # type: ignore[no-untyped-def]
+    """Slopes per place (place, node, pair, part) where a part is known; at the very start that of a straight line."""
+    nodes, pairs, parts = ratio.shape[1:]
+    for part in range(parts):
+        left = -1
+        for place in range(PIECES + 1):
+            if not known[place, part]:
+                continue
+            right = place + 1
+            while right <= PIECES and not known[right, part]:
+                right += 1
+            # At both ends the neighbour on the other side belongs to the next interval, where this part has its own.
+            beyond = PIECES - 1 if left < 0 else 1
+            while left < 0 and not known_before[beyond, part]:
+                beyond -= 1
+            while right > PIECES and not known_after[beyond, part]:
+                beyond += 1
+            gap = place - left if left >= 0 else PIECES - beyond
+            next_gap = right - place if right <= PIECES else beyond
+            for node in range(nodes):
+                for pair in range(pairs):
+                    value = ratio[place, node, pair, part]
+                    last = ratio[left, node, pair, part] if left >= 0 else ratio_before[beyond, node, pair, part]
+                    following = ratio[right, node, pair, part] if right <= PIECES else ratio_after[beyond, node, pair, part]
+                    rise, next_rise = (value - last) / gap, (following - value) / next_gap
+                    if left < 0 and not inside:
+                        rise = next_rise
+                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (gap + next_gap)
+            left = place
 
 
-def _parabola(
-    before: NDArray[np.complex128],
-    gap_before: int,
-    here: NDArray[np.complex128],
-    gap_after: int,
-    after: NDArray[np.complex128],
-) -> NDArray[np.complex128]:
-    rise, next_rise = (here - before) / gap_before, (after - here) / gap_after
-    return np.asarray((rise * gap_after + next_rise * gap_before) / (gap_before + gap_after))
+@njit(cache=True, error_model="numpy")
+def stretch(known, place):  # type: ignore[no-untyped-def]
+    """The known places (place,) on either side of one in 0 to `PIECES`."""
+    left = min(int(place), PIECES - 1)
+    right = left + 1
+    while not known[left]:
+        left -= 1
+    while not known[right]:
+        right += 1
+    return left, right
 
 
-def _neighbour(interval: _Interval, part: int, *, last: bool) -> tuple[int, NDArray[np.complex128]]:
-    """How far from the shared anchor the nearest place of the part in the neighbouring interval is, and its ratio there."""
-    places = np.flatnonzero(interval.known[:, part])
-    place = places[-2] if last else places[1]
-    return int(PIECES - place if last else place), interval.ratio[place, :, :, part]
-
-
-def _slope_at(
-    own: NDArray[np.complex128], beyond: tuple[int, NDArray[np.complex128]] | None, end: int, inner: int, *, left_side: bool
-) -> NDArray[np.complex128]:
-    """Slope at an end of an interval, from its own next place and the one beyond; without the latter a straight line's."""
-    if beyond is None:
-        return np.asarray((own[inner] - own[end]) / (inner - end))
-    gap, ratio = beyond
-    if left_side:
-        return _parabola(ratio, gap, own[end], inner - end, own[inner])
-    return _parabola(own[inner], end - inner, own[end], gap, ratio)
+@njit(cache=True, error_model="numpy")
+def hermite(place, left, right):  # type: ignore[no-untyped-def]
+    """Weights of the values at two places and of the slopes there in the cubic between them."""
+    step = right - left
+    t = (place - left) / step
+    return (1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t), step * t * (1 - t) ** 2, step * t * t * (t - 1)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.facet_integral import facet_integral
-from rtradar.scatter.facet_shadows import FacetShadows
+from rtradar.scatter.facet_shadows import FacetShadows, Shares
 from rtradar.scatter.facets import body_facets, ellipsoid_facets, subdivisions_for
 from rtradar.scatter.polarization import copolar
 from rtradar.trace.backend import select, use
@@ -20,6 +23,23 @@ def frequency_nodes(radar: Radar, count: int) -> NDArray[np.float64]:
     """Frequencies of the sweep (node,) [Hz], Chebyshev's: the polynomial through them serves all of it best."""
     angles = np.pi * (2 * np.arange(count)[::-1] + 1) / (2 * count)
     return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * np.cos(angles))
+
+
+def chosen_parts(rung: str, body: Body, parts: Sequence[int] | None) -> NDArray[np.int64]:
+    """Numbers of the parts (n,) that a rung is asked for; all where ``parts`` is None.
+
+    Raises
+    ------
+    InputError
+        Where one of them is not a part of the body, or named twice.
+    """
+    count = len(body.part_names)
+    if parts is None:
+        return np.arange(count)
+    chosen = np.array(parts, dtype=np.int64)
+    if chosen.ndim != 1 or not ((chosen >= 0) & (chosen < count)).all() or len(np.unique(chosen)) < len(chosen):
+        raise InputError(f"{rung}: parts = {list(parts)}; these must be numbers from 0 to {count - 1}, each once")
+    return chosen
 
 
 class FacetBody:
@@ -63,8 +83,8 @@ class FacetBody:
         frames: NDArray[np.float64],
         antennas: NDArray[np.float64],
         parts: NDArray[np.int64],
-    ) -> NDArray[np.float32]:
-        """Shares of facets (antenna, n, facet) of these parts that antennas (antenna, 3) see, in one pose."""
+    ) -> Shares:
+        """Shares of facets of these parts (n,) that antennas (antenna, 3) see, in one pose."""
         return self._shadows.shares(centres, frames, antennas, parts)
 
     def amplitude(
@@ -74,7 +94,7 @@ class FacetBody:
         antennas: NDArray[np.float64],
         pairs: NDArray[np.integer],
         length: NDArray[np.float64],
-        seen: NDArray[np.float32],
+        seen: Shares,
         index: NDArray[np.integer],
         parts: NDArray[np.int64],
     ) -> NDArray[np.complex128]:
@@ -90,10 +110,10 @@ class FacetBody:
             Tx and Rx, among the antennas of a pose.
         length : (pose, pair, n) float64
             Carriers [m].
-        seen : (view, n, facet) float32
-            From `seen`.
+        seen : Shares
+            From `seen`, for some antennas and these parts.
         index : (pose, antenna) int
-            Which view is that antenna's.
+            Which of those antennas each is.
         parts : (n,) int64
             Which parts.
 
@@ -105,18 +125,17 @@ class FacetBody:
         poses, n = len(centres), len(parts)
         chosen = centres[:, parts]
         local = np.einsum("tpji,tpaj->tpai", frames[:, parts], antennas[:, None] - chosen[:, :, None])
-        row = index[:, None, :] * n + np.arange(n)[None, :, None]
         field = facet_integral(
             self._facets,
             np.tile(parts, poses),
             local.reshape(poses * n, *local.shape[2:]),
-            row.reshape(poses * n, -1),
-            seen.reshape(-1, seen.shape[2]),
+            np.swapaxes(seen.row[index], 1, 2).reshape(poses * n, index.shape[1]),
+            seen.share,
             pairs,
-            np.swapaxes(length, 1, 2).reshape(poses * n, -1),
+            np.swapaxes(length, 1, 2).reshape(poses * n, len(pairs)),
             np.broadcast_to(2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS, (poses * n, len(self.frequency))),
             spreading=self._spreading,
         )
-        field = np.moveaxis(field.reshape(poses, n, len(pairs), -1), (3, 0, 2, 1), (0, 1, 2, 3))
+        field = np.moveaxis(field.reshape(poses, n, len(pairs), len(self.frequency)), (3, 0, 2, 1), (0, 1, 2, 3))
         to_tx, to_rx = (antennas[:, pairs[:, side], None] - chosen[:, None] for side in (0, 1))
         return np.asarray(np.conj(field) * copolar(to_tx, to_rx, self._radar.polarization), dtype=np.complex128)

@@ -28,109 +28,155 @@ _SERIES = 4.0
 _FAST = {"reassoc", "contract", "nsz", "arcp"}
 
 
+_LEAST = 1e-4
+"""Least spread of the phases over a facet in the formula for large ones: what is less is taken for it, 1e-9 of a facet."""
+
+
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _sum_small(count, mean, u, v, strength, k):  # type: ignore[no-untyped-def]
-    """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), of facets with small deviations; vector code."""
+def _phasor(angle):  # type: ignore[no-untyped-def]
+    """Cosine and sine by Taylor's series of half the angle, within 1e-11: branch-free, and so in vector lanes."""
+    turns = angle * (0.5 / math.pi)
+    half = math.pi * (turns - np.floor(turns + 0.5))
+    x = half * half
+    sine = -1 / 1307674368000 * x + 1 / 6227020800
+    sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x * sine))))))
+    cosine = 1 / 20922789888000 * x - 1 / 87178291200
+    cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * cosine))
+    cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
+    return 1 - 2 * sine * sine, 2 * sine * cosine
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _sine(angle):  # type: ignore[no-untyped-def]
+    """Sine of an angle from 0 on, within 1e-12 of itself where it is small."""
+    halves = np.floor(angle * (1 / math.pi) + 0.5)
+    rest = angle - halves * math.pi
+    x = rest * rest
+    sine = 1 / 362880 + x * (-1 / 39916800 + x * (1 / 6227020800 + x * (-1 / 1307674368000 + x / 355687428096000)))
+    sine = rest * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
+    return sine * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
+    """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), of facets with small deviations."""
     real, imaginary = 0.0, 0.0
-    for i in range(count):
+    for i in range(len(mean)):
         a, b = -k * u[i], -k * v[i]
         p = a * a + a * b + b * b
         q = -a * b * (a + b)
-        size = strength[i] if p <= _SERIES else 0.0
         square = q * q
         mean_re = 1 + p * (-1 / 12 + p * (1 / 360 + p * (-1 / 20160 + p * (1 / 1814400 - p / 239500800))))
         mean_re += square * (-1 / 20160 + p * (3 / 1814400 - p * 6 / 239500800))
         mean_im = -1 / 60 + p * (1 / 1260 + p * (-1 / 60480 + p * (4 / 19958400 - p * 5 / 3113510400)))
         mean_im = q * (mean_im + square * (1 / 19958400 - p * 4 / 3113510400))
-        # Sine and cosine by Taylor's series of half the angle, within 1e-11: branch-free, and so in vector lanes.
-        turns = -k * mean[i] * (0.5 / math.pi)
-        half = math.pi * (turns - math.floor(turns + 0.5))
-        x = half * half
-        sine = -1 / 1307674368000 * x + 1 / 6227020800
-        sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x * sine))))))
-        cosine = 1 / 20922789888000 * x - 1 / 87178291200
-        cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * cosine))
-        cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
-        turn_re, turn_im = 1 - 2 * sine * sine, 2 * sine * cosine
-        real += size * (turn_re * mean_re - turn_im * mean_im)
-        imaginary += size * (turn_re * mean_im + turn_im * mean_re)
+        turn_re, turn_im = _phasor(-k * mean[i])
+        real += strength[i] * (turn_re * mean_re - turn_im * mean_im)
+        imaginary += strength[i] * (turn_re * mean_im + turn_im * mean_re)
+    return complex(real, imaginary)
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
+    """The same for any deviations, by differences.
+
+    Between phases x and y the difference of exp is exp(j (x + y) / 2) sin(h) / h, h = (y - x) / 2; of the two that meet at
+    the middle one of the three phases the difference again, over the largest spread, is the mean.
+    """
+    real, imaginary = 0.0, 0.0
+    for i in range(len(mean)):
+        a, b = -k * u[i], -k * v[i]
+        c = -a - b
+        low, high = min(-_LEAST, min(a, min(b, c))), max(_LEAST, max(a, max(b, c)))
+        middle = -low - high
+        above, below = max(0.5 * (high - middle), 1e-30), max(0.5 * (middle - low), 1e-30)
+        size = 2 * strength[i] / (above * below * (high - low))
+        upper, lower = size * _sine(above) * below, size * _sine(below) * above
+        turn = -k * mean[i]
+        upper_re, upper_im = _phasor(turn - 0.5 * low)
+        lower_re, lower_im = _phasor(turn - 0.5 * high)
+        real += upper * upper_im - lower * lower_im
+        imaginary -= upper * upper_re - lower * lower_re
     return complex(real, imaginary)
 
 
 @njit(cache=True, error_model="numpy")
-def _chord(x, y):  # type: ignore[no-untyped-def]
-    """Divided difference of exp between j x and j y: exp(j (x + y) / 2) sinc."""
-    half = 0.5 * (y - x)
-    size = 1 - half * half / 6 if abs(half) < 1e-4 else math.sin(half) / half
-    middle = 0.5 * (x + y)
-    return complex(size * math.cos(middle), size * math.sin(middle))
-
-
-@njit(cache=True, error_model="numpy")
-def _sum_large(count, mean, u, v, strength, k):  # type: ignore[no-untyped-def]
-    """The same for the facets whose deviations are large."""
-    total = 0j
-    for i in range(count):
-        a, b = -k * u[i], -k * v[i]
-        if a * a + a * b + b * b <= _SERIES:
-            continue
-        c = -a - b
-        low, high = min(a, min(b, c)), max(a, max(b, c))
-        middle = -low - high
-        difference = (_chord(middle, high) - _chord(low, middle)) / complex(0.0, high - low)
-        turn = -k * mean[i]
-        total += 2 * strength[i] * difference * complex(math.cos(turn), math.sin(turn))
-    return total
+def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):  # type: ignore[no-untyped-def]
+    """Facets that any of the antennas may light, by the ball round them all; their count."""
+    count_antennas = len(antennas)
+    x, y, z = antennas[:, 0].mean(), antennas[:, 1].mean(), antennas[:, 2].mean()
+    spread = 0.0
+    for antenna in antennas:
+        spread = max(spread, math.sqrt((antenna[0] - x) ** 2 + (antenna[1] - y) ** 2 + (antenna[2] - z) ** 2))
+    farthest = math.sqrt(x * x + y * y + z * z) + spread + size
+    count = 0
+    for f in range(len(planes)):
+        height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z - planes[f]
+        if both or height > -spread - bend[f] * farthest:
+            for antenna in range(count_antennas):
+                if seen[row[antenna], f] > 0:
+                    chosen[count] = f
+                    count += 1
+                    break
+    return count
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _see(antenna, vertices, faces, normals, excess, facing):  # type: ignore[no-untyped-def]
-    """Path from the antenna to each vertex less that to the origin, and n.s of each facet."""
-    x, y, z = antenna[0], antenna[1], antenna[2]
-    distance = math.sqrt(x * x + y * y + z * z)
-    for i in range(vertices.shape[0]):
-        p, q, r = vertices[i, 0], vertices[i, 1], vertices[i, 2]
-        away = math.sqrt((p - x) ** 2 + (q - y) ** 2 + (r - z) ** 2)
+def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
+    """Path from the antenna to each vertex less that to the origin, which is returned."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    distance = math.sqrt(a * a + b * b + c * c)
+    for i in range(len(x)):
+        p, q, r = x[i], y[i], z[i]
+        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
         # |T - p| - |T| without the loss of digits of a far antenna.
-        excess[i] = (p * (p - 2 * x) + q * (q - 2 * y) + r * (r - 2 * z)) / (away + distance)
-    for f in range(faces.shape[0]):
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        height = (
-            normals[f, 0] * (x - vertices[i, 0]) + normals[f, 1] * (y - vertices[i, 1]) + normals[f, 2] * (z - vertices[i, 2])
-        )
-        facing[f] = height / (distance + (excess[i] + excess[j] + excess[k]) / 3)
+        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
     return distance
 
 
 @njit(cache=True, error_model="numpy", fastmath=_FAST)
-def _collect(faces, areas, bend, both, tx, rx, facing_t, facing_r, seen_t, seen_r, far_t, far_r, carrier, spreading, lit):  # type: ignore[no-untyped-def]
-    """Rows of ``lit``: mean path, two deviations from it, strength, of the facets that both antennas light; their count."""
-    count = 0
-    for f in range(faces.shape[0]):
-        low, high = min(facing_t[f], facing_r[f]), max(facing_t[f], facing_r[f])
-        if both and high < 0:
-            low, high = -high, -low
-        h = bend[f]
-        if low <= -h:
-            continue
-        seen = min(seen_t[f], seen_r[f])
-        if seen <= 0:
-            continue
+def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):  # type: ignore[no-untyped-def]
+    """Rows of ``view`` for the chosen facets: mean path, two deviations from it, n.s, and the share that is seen."""
+    for i in range(len(chosen)):
+        f = chosen[i]
+        first, second, third = excess[faces[f, 0]], excess[faces[f, 1]], excess[faces[f, 2]]
+        mean = (first + second + third) / 3
+        height = normals[f, 0] * antenna[0] + normals[f, 1] * antenna[1] + normals[f, 2] * antenna[2] - planes[f]
+        view[0, i] = mean
+        view[1, i] = first - mean
+        view[2, i] = second - mean
+        view[3, i] = height / (distance + mean)
+        view[4, i] = seen[f]
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST)
+def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u, v, strength):  # type: ignore[no-untyped-def]
+    """Mean path, two deviations from it and strength of facets under two views."""
+    tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
+    rx_mean, rx_u, rx_v, rx_facing, rx_seen = rx[0], rx[1], rx[2], rx[3], rx[4]
+    for i in range(len(mean)):
+        low, high = min(tx_facing[i], rx_facing[i]), max(tx_facing[i], rx_facing[i])
+        behind = both and high < 0
+        low, high = (-high, -low) if behind else (low, high)
         # The part that falls to 0 at the terminator by itself, and the one between Tx and Rx, which has to be led there.
-        share = min(1.0, (low + h) / (2 * h)) if h > 0 else 1.0
-        obliquity = max(low, 0.0) + share * (high - low) / 2
-        i, j, k = faces[f, 0], faces[f, 1], faces[f, 2]
-        tx_mean, rx_mean = (tx[i] + tx[j] + tx[k]) / 3, (rx[i] + rx[j] + rx[k]) / 3
-        strength = obliquity * seen * areas[f]
+        h = max(bend[i], 1e-300)
+        share = min(1.0, max(0.0, (low + h) / (2 * h)))
+        size = (max(low, 0.0) + share * (high - low) / 2) * min(tx_seen[i], rx_seen[i]) * areas[i]
         if spreading:
-            strength /= (far_t + tx_mean) * (far_r + rx_mean)
-        mean = tx_mean + rx_mean
-        lit[0, count] = mean - carrier
-        lit[1, count] = tx[i] + rx[i] - mean
-        lit[2, count] = tx[j] + rx[j] - mean
-        lit[3, count] = strength
-        count += 1
-    return count
+            size /= (far_t + tx_mean[i]) * (far_r + rx_mean[i])
+        mean[i] = tx_mean[i] + rx_mean[i] - carrier
+        u[i], v[i] = tx_u[i] + rx_u[i], tx_v[i] + rx_v[i]
+        strength[i] = size
+
+
+@njit(cache=True, error_model="numpy", fastmath=_FAST | {"nnan"})
+def _largest(u, v):  # type: ignore[no-untyped-def]
+    """The largest p, for k = 1. Apart, for only without regard to NaN does a maximum run in vector lanes."""
+    largest = 0.0
+    for i in range(len(u)):
+        p = u[i] * u[i] + u[i] * v[i] + v[i] * v[i]
+        largest = p if p > largest else largest
+    return largest
 
 
 def _integrate(vertices, faces, normals, areas, bend, both, part, antennas, row, seen, pairs, carrier, k, spreading, out):  # type: ignore[no-untyped-def]
@@ -138,41 +184,44 @@ def _integrate(vertices, faces, normals, areas, bend, both, part, antennas, row,
     n_vertices, n_facets = vertices.shape[1], faces.shape[0]
     for task in prange(tasks):
         own = part[task]
-        excess, facing = np.empty((count_antennas, n_vertices)), np.empty((count_antennas, n_facets))
-        far = np.empty(count_antennas)
-        lit = np.empty((4, n_facets))
+        # Coordinate by coordinate: loops over vertices run in vector lanes.
+        x, y, z = vertices[own, :, 0].copy(), vertices[own, :, 1].copy(), vertices[own, :, 2].copy()
+        planes = np.empty(n_facets)
+        size = 0.0
+        for i in range(n_vertices):
+            size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
+        for f in range(n_facets):
+            i = faces[f, 0]
+            planes[f] = normals[own, f, 0] * x[i] + normals[own, f, 1] * y[i] + normals[own, f, 2] * z[i]
+        room = np.empty(n_facets, dtype=np.int64)
+        count = _may_be_lit(antennas[task], planes, normals[own], bend[own], both, math.sqrt(size), seen, row[task], room)
+        chosen = room[:count]
+        excess, far = np.empty(n_vertices), np.empty(count_antennas)
+        view = np.empty((count_antennas, 5, count))
         for antenna in range(count_antennas):
-            far[antenna] = _see(antennas[task, antenna], vertices[own], faces, normals[own], excess[antenna], facing[antenna])
+            place = antennas[task, antenna]
+            far[antenna] = _excess(place, x, y, z, excess)
+            _see(place, far[antenna], excess, faces, planes, normals[own], chosen, seen[row[task, antenna]], view[antenna])
+        own_areas, own_bend = areas[own][chosen], bend[own][chosen]
+        mean, u, v, strength = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
         for pair in range(pairs.shape[0]):
             t, r = pairs[pair, 0], pairs[pair, 1]
-            seen_t, seen_r = seen[row[task, t]], seen[row[task, r]]
-            count = _collect(
-                faces,
-                areas[own],
-                bend[own],
-                both,
-                excess[t],
-                excess[r],
-                facing[t],
-                facing[r],
-                seen_t,
-                seen_r,
-                far[t],
-                far[r],
-                carrier[task, pair] - far[t] - far[r],
-                spreading,
-                lit,
-            )
+            offset = carrier[task, pair] - far[t] - far[r]
+            _light(view[t], view[r], own_areas, own_bend, both, far[t], far[r], offset, spreading, mean, u, v, strength)
+            largest = _largest(u, v)
             for node in range(k.shape[1]):
-                total = _sum_small(count, lit[0], lit[1], lit[2], lit[3], k[task, node])
-                total += _sum_large(count, lit[0], lit[1], lit[2], lit[3], k[task, node])
-                out[task, pair, node] = total * complex(0.0, k[task, node] / math.sqrt(math.pi))
+                wave = k[task, node]
+                if largest * wave**2 <= _SERIES:
+                    total = _sum_small(mean, u, v, strength, wave)
+                else:
+                    total = _sum_large(mean, u, v, strength, wave)
+                out[task, pair, node] = total * complex(0.0, wave / math.sqrt(math.pi))
 
 
 _integrate_parallel = njit(cache=True, error_model="numpy", parallel=True)(_integrate)
 _integrate_serial = njit(cache=True, error_model="numpy")(_integrate)
 _PARALLEL_SHARES = 4_000_000
-"""Below this many facets times pairs times frequencies waking threads costs as much as the work: some 20 ms."""
+"""Below this many facets times pairs times frequencies waking threads costs as much as the work: some 12 ms."""
 
 
 def facet_integral(

@@ -117,14 +117,14 @@ def _ellipsoids(
     seen = shadows.shares(target.centres, target.frames, antennas, parts)
     to_antennas = np.stack([tx, rx], axis=1)[:, None] - target.centres[:, None]
     local = np.einsum("pji,npaj->npai", target.frames, to_antennas)
-    row = view.reshape(2, n).T[:, None, :] * len(parts) + parts[None, :, None]
+    row = np.moveaxis(seen.row[view.reshape(2, n)], (0, 1, 2), (2, 0, 1))
     path = np.linalg.norm(tx, axis=1) + np.linalg.norm(rx, axis=1)
     field = facet_integral(
         surface,
         np.tile(parts, n),
         local.reshape(-1, 2, 3),
         row.reshape(-1, 2),
-        seen.reshape(-1, seen.shape[2]),
+        seen.share,
         np.array([[0, 1]]),
         np.repeat(path, len(parts))[:, None],
         np.repeat(wavenumber, len(parts))[:, None],

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.body import Body
@@ -13,8 +15,8 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.envelope import Envelope, Sample, whole_echo
-from rtradar.scatter.facet_body import FacetBody
+from rtradar.scatter.envelope import PIECES, Envelope, Sample, hermite, stretch, whole_echo
+from rtradar.scatter.facet_body import FacetBody, chosen_parts
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
 
@@ -22,6 +24,43 @@ _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: of parts whose echo is alike all over it, and of the others."""
 
 _MOST_FREQUENCIES = 9
+
+
+@njit(cache=True, error_model="numpy")
+def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):  # type: ignore[no-untyped-def]
+    """Amplitude (node, chirp, rx, part) at these chirps, which stand at these shares of the way from anchor to anchor."""
+    nodes, pairs, parts = ratio.shape[1:]
+    receivers = weights.shape[1]
+    for i in range(len(chirps)):
+        chirp, place = chirps[i], share[i] * PIECES
+        ends, cubic = np.empty((2, parts), dtype=np.int64), np.empty((4, parts))
+        for part in range(parts):
+            left, right = stretch(known[:, part], place)
+            ends[0, part], ends[1, part] = left, right
+            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite(place, left, right)
+        own = weights[tx[chirp]]
+        value = np.empty(parts, dtype=np.complex128)
+        amplitude[:, chirp] = 0
+        for pair in range(pairs):
+            # Where nodes stand at antennas a transmitter needs but a few of the pairs.
+            used = False
+            for receiver in range(receivers):
+                used |= own[receiver, pair] != 0
+            if not used:
+                continue
+            for node in range(nodes):
+                for part in range(parts):
+                    left, right = ends[0, part], ends[1, part]
+                    value[part] = (
+                        cubic[0, part] * ratio[left, node, pair, part]
+                        + cubic[1, part] * ratio[right, node, pair, part]
+                        + cubic[2, part] * slope[left, node, pair, part]
+                        + cubic[3, part] * slope[right, node, pair, part]
+                    )
+                for receiver in range(receivers):
+                    weight, out = own[receiver, pair], amplitude[node, chirp, receiver]
+                    for part in range(parts):
+                        out[part] += weight * value[part] * strength[chirp, receiver, part]
 
 
 class PhysicalOptics:
@@ -45,6 +84,8 @@ class PhysicalOptics:
         Change of a part's echo over the array, over the same, above which it is computed at more places of the array.
     frequencies : int
         Over the sweep. Three leave 3 % where a part is half hidden at 12 GHz, five 1.5 %, and a longer synthesis of the IF.
+    parts : sequence of int, optional
+        Whose echoes are wanted, by number; None: of all. The others still hide them, and nothing else is found of them.
 
     Raises
     ------
@@ -64,6 +105,7 @@ class PhysicalOptics:
         tolerance: float = 0.05,
         unevenness: float = 0.02,
         frequencies: int = 3,
+        parts: Sequence[int] | None = None,
     ) -> None:
         if frequencies not in range(1, _MOST_FREQUENCIES + 1):
             raise InputError(
@@ -80,13 +122,19 @@ class PhysicalOptics:
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_duration_s))
-        self._envelope = Envelope(self._sample, len(body.part_names), tolerance)
+        self._parts = chosen_parts("physical-optics", body, parts)
+        self._others = np.setdiff1d(np.arange(len(body.part_names)), self._parts)
+        self._envelope = Envelope(self._sample, len(self._parts), tolerance)
 
-    def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
+    def _sample(self, place: float, columns: NDArray[np.int64], whole: float | None) -> Sample:
         """Envelope at the fine nodes: computed there where it differs over the array, else spread from the coarse ones."""
         time = min((place * self._step + 0.5) * self._radar.chirp_duration_s, self._body.duration_s)
-        pose = self._body.at([time])
+        pose, parts = self._body.at([time]), self._parts[columns]
         coarse = self._at_nodes(pose, self._coarse, parts)
+        if whole is None and len(self._others):
+            # Of the rest of the body what its mirror points return: enough to tell by what an echo counts as small.
+            rest = self._mirrored(pose, self._coarse, self._others)[1]
+            coarse = coarse._replace(others=float((rest**2).sum(axis=1).mean()))
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse) if whole is None else whole
@@ -94,9 +142,12 @@ class PhysicalOptics:
         if uneven.any():
             fine = self._at_nodes(pose, self._fine, parts[uneven])
             ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
-        return Sample(ratio, strength)
+        return Sample(ratio, strength, coarse.others)
 
-    def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
+    def _mirrored(
+        self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Path length and amplitude of the mirror points (pair, part) [m]."""
         antennas, pairs = nodes.antennas, nodes.pairs
         centres, frames = (np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames))
         length, strength, _ = mirror(
@@ -108,17 +159,21 @@ class PhysicalOptics:
             polarization=self._radar.polarization,
             spreading=self._spreading,
         )
+        return length[:, 0], strength[:, 0]
+
+    def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
+        antennas, pairs = nodes.antennas, nodes.pairs
+        length, mirrored = self._mirrored(pose, nodes, parts)
         amplitude = self._surface.amplitude(
             pose.centres,
             pose.frames,
             antennas[None],
             pairs,
-            length[None, :, 0],
+            length[None],
             self._surface.seen(pose.centres[0], pose.frames[0], antennas, parts),
             np.arange(len(antennas))[None],
             parts,
         )[:, 0]
-        mirrored = strength[:, 0]
         # Without a mirror point there is next to nothing to see either: antennas on opposite sides.
         ratio = np.where(mirrored != 0, amplitude / np.where(mirrored != 0, mirrored, 1.0), 0.0)
         return Sample(ratio, np.abs(mirrored))
@@ -127,25 +182,32 @@ class PhysicalOptics:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength, _ = mirror(*at[1:], polarization=self._radar.polarization, spreading=self._spreading)
-        parts = np.arange(length.shape[2])
+        length, strength, _ = mirror(
+            at.tx,
+            at.rx,
+            at.centres[:, self._parts],
+            at.frames[:, self._parts],
+            at.semi_axes[self._parts],
+            polarization=self._radar.polarization,
+            spreading=self._spreading,
+        )
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals = chirps // self._step
         for interval in np.unique(intervals):
             inside = np.flatnonzero(intervals == interval)
             share = chirps[inside] / self._step - interval
             if (share == 0).all():
-                ratio = self._envelope.anchor(int(interval)).ratio[None]
-            else:
-                ratio = self._envelope.between(int(interval), share)
-            weights = self._fine.weights[at.tx_index[inside]]
-            over_array = weights.astype(np.complex128)[:, None] @ ratio
-            amplitude[:, inside] = np.swapaxes(over_array, 0, 1) * strength[inside]
+                # Power is measured at anchors, where nothing is asked of what comes after.
+                over_array = self._fine.weights[at.tx_index[inside]] @ self._envelope.anchor(int(interval)).ratio[:, None]
+                amplitude[:, inside] = over_array * strength[inside]
+                continue
+            course = self._envelope.course(int(interval))
+            _fill(inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude)
         return Echoes(
             length=length,
             amplitude=amplitude,
             frequency=self._surface.frequency,
             tx=at.tx_index,
-            part=parts,
-            bounces=np.ones(len(parts), dtype=np.int64),
+            part=self._parts,
+            bounces=np.ones(len(self._parts), dtype=np.int64),
         )

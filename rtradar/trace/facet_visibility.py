@@ -1,8 +1,9 @@
 """Ask Mitsuba, for every vertex of every part that faces an antenna, which other part stands before it.
 
-Float32 decides visibility only. Vertices with no other part near their line of sight need no ray. Rays start where they
-enter the ball round the body, from the antenna toward the vertex: so that what is met first is the part that hides, and
-a vertex's own part, which a convex body's facing side never hides from, comes last and does not count.
+Float32 decides visibility only. A line of sight that passes an ellipsoid by more than a hundredth of its semi-axes, or goes
+through it deeper than that, needs no ray: no triangle stands out or in as far. What is left lies along outlines, where
+triangles decide. A ray is brought to the axes in which the part that it may meet is the unit sphere: the same triangles
+for every part, so there is nothing to pose, and each ray starts two radii before what it may meet.
 """
 
 from __future__ import annotations
@@ -14,36 +15,26 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rtradar.trace.body_tracer import BodyTracer
+from rtradar.body.meshes import unit_sphere
+from rtradar.trace.body_tracer import SUBDIVISIONS
+from rtradar.trace.outlines import VIEWS, may_hide, outlines
 
 _NEAR = 0.01
-"""Lines of sight that pass a part by more than this share of its semi-axes are not traced: no triangle stands out as far."""
-
-
-@njit(cache=True, error_model="numpy")
-def _may_hide(antenna, part, other, centres, reach):  # type: ignore[no-untyped-def]
-    """Whether the ball round one part comes near any line from the antenna to the ball round another."""
-    along, span, square = 0.0, 0.0, 0.0
-    for i in range(3):
-        way, start = centres[part, i] - antenna[i], antenna[i] - centres[other, i]
-        along += way * start
-        span += way * way
-        square += start * start
-    nearest = min(1.0, max(0.0, -along / span))
-    return square + nearest * (2 * along + nearest * span) < (reach[part] + reach[other]) ** 2
-
-
-@njit(cache=True, error_model="numpy")
-def _world(point, centre, frame, out):  # type: ignore[no-untyped-def]
-    for i in range(3):
-        out[i] = centre[i] + frame[i, 0] * point[0] + frame[i, 1] * point[1] + frame[i, 2] * point[2]
+"""Lines of sight are traced that pass a part, outside or inside of its outline, by less than this share of its semi-axes."""
 
 
 @njit(cache=True, error_model="numpy", fastmath=True)
-def _narrow(gap, x, y, z, start, turn, shift):  # type: ignore[no-untyped-def]
-    """Lower ``gap`` below 0 where the way to a vertex comes near the unit ball that a hider is in its own axes."""
+def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: ignore[no-untyped-def]
+    """What a hider, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
+
+    ``first`` becomes its number where it certainly hides a vertex, and does so before ``entry``, the share of the way at
+    which what hides it was met. ``nearest`` is the share at which the way comes nearest to the hider's middle, where that
+    is near its outline; else -1.
+    """
     s0, s1, s2 = start[0], start[1], start[2]
     square = s0 * s0 + s1 * s1 + s2 * s2
+    outside, inside = (1 + _NEAR) ** 2, (1 - _NEAR) ** 2
+    count = 0
     for vertex in range(len(x)):
         w0 = turn[0, 0] * x[vertex] + turn[0, 1] * y[vertex] + turn[0, 2] * z[vertex] + (shift[0] - s0)
         w1 = turn[1, 0] * x[vertex] + turn[1, 1] * y[vertex] + turn[1, 2] * z[vertex] + (shift[1] - s1)
@@ -52,108 +43,174 @@ def _narrow(gap, x, y, z, start, turn, shift):  # type: ignore[no-untyped-def]
         back = -(s0 * w0 + s1 * w1 + s2 * w2)
         # Least square of the distance along the way, times its span: no division.
         least = square * span - back * back if back < span else (square - 2 * back + span) * span
-        gap[vertex] = min(gap[vertex], least - (1 + _NEAR) ** 2 * span)
+        hides, near = least < inside * span, least < outside * span
+        met = (back - math.sqrt(max(back * back - span * (square - 1), 0.0))) / span
+        before = hides and met < entry[vertex]
+        first[vertex] = hider if before else first[vertex]
+        entry[vertex] = met if before else entry[vertex]
+        doubt = near and not hides
+        nearest[vertex] = min(back / span, 1.0) if doubt else -1.0
+        count += doubt
+    return count
 
 
 @njit(cache=True, error_model="numpy")
-def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, wanted):  # type: ignore[no-untyped-def]
-    """Mark the vertices that face an antenna and have another part near their line of sight; count them."""
-    every = len(centres)
-    counts = np.zeros((len(parts), len(antennas)), dtype=np.int64)
-    reach = np.empty(every)
-    for part in range(every):
-        reach[part] = max(semi_axes[part, 0], max(semi_axes[part, 1], semi_axes[part, 2])) * (1 + _NEAR)
-    for task in range(len(parts) * len(antennas)):
-        n, a = task // len(antennas), task % len(antennas)
-        part = parts[n]
-        turn, shift, start = np.empty((every, 3, 3)), np.empty((every, 3)), np.empty((every, 3))
-        found = 0
-        for other in range(every):
-            if other != part and _may_hide(antennas[a], part, other, centres, reach):
-                # From the axes of this part to those of the other, in which it is the unit ball.
-                for i in range(3):
-                    shift[found, i], start[found, i] = 0.0, 0.0
+def _before(part, other, antenna, centres, frames, semi_axes, turn, shift, start):  # type: ignore[no-untyped-def]
+    """From the axes of a part to those of another in which it is the unit ball; and the antenna in these."""
+    for i in range(3):
+        shift[i], start[i] = 0.0, 0.0
+        for j in range(3):
+            shift[i] += frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
+            start[i] += frames[other, j, i] * (antenna[j] - centres[other, j]) / semi_axes[other, i]
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += frames[other, k, i] * frames[part, k, j] / semi_axes[other, i]
+
+
+@njit(cache=True, error_model="numpy")
+def _facing(local, vertices, axes, margin, chosen, begin):  # type: ignore[no-untyped-def]
+    """Vertices that face an antenna, or not away by more than the margin; their count.
+
+    A vertex that faces away is seen through its own part: only what is met before the share ``begin`` of the way, where
+    that is met, counts as hiding it.
+    """
+    count = 0
+    s0, s1, s2 = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
+    outside = s0 * local[0] ** 2 + s1 * local[1] ** 2 + s2 * local[2] ** 2 - 1
+    for vertex in range(len(vertices)):
+        x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
+        n0, n1, n2 = s0 * x, s1 * y, s2 * z
+        a0, a1, a2 = local[0] - x, local[1] - y, local[2] - z
+        along = n0 * a0 + n1 * a1 + n2 * a2
+        begin[count] = 1.0
+        if along < 0:
+            size = (n0 * n0 + n1 * n1 + n2 * n2) * (a0 * a0 + a1 * a1 + a2 * a2)
+            if along * along > margin * margin * size:
+                continue
+            span = s0 * a0 * a0 + s1 * a1 * a1 + s2 * a2 * a2
+            back = s0 * local[0] * a0 + s1 * local[1] * a1 + s2 * local[2] * a2
+            # Vertices stand out a little: from behind the edge some are seen past their own part.
+            chord = back * back - span * outside
+            if chord > 0:
+                begin[count] = (back - math.sqrt(chord)) / span
+        chosen[count] = vertex
+        count += 1
+    return count
+
+
+@njit(cache=True, error_model="numpy")
+def _grown(array):  # type: ignore[no-untyped-def]
+    out = np.empty((*array.shape[:-1], 2 * array.shape[-1]), dtype=array.dtype)
+    out[..., : array.shape[-1]] = array
+    return out
+
+
+@njit(cache=True, error_model="numpy")
+def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidden):  # type: ignore[no-untyped-def]
+    """Name what certainly hides a vertex, and the rays that have to be followed for others.
+
+    Of each ray: where it starts, which way it goes and how far, in axes in which what it may meet is the unit ball (7,);
+    the place in ``hidden`` that it answers for, and what hides it if the ray meets anything (2,).
+    """
+    every, n_vertices = len(centres), vertices.shape[1]
+    turn, shift, start, local, way = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    low, high, near, far = np.empty((every, VIEWS)), np.empty((every, VIEWS)), np.empty(every), np.empty(every)
+    chosen, hiders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
+    begin, places = np.empty(n_vertices), np.empty((3, n_vertices))
+    rays, whose, count = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64), 0
+    for a in range(len(antennas)):
+        outlines(antennas[a], centres, frames, semi_axes * (1 + _NEAR), low, high, near, far)
+        for n in range(len(parts)):
+            part = parts[n]
+            found = 0
+            for other in range(every):
+                if other != part and may_hide(part, other, low, high, near, far):
+                    hiders[found] = other
+                    found += 1
+            if found == 0:
+                continue
+            for i in range(3):
+                local[i] = 0.0
+                for j in range(3):
+                    local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
+            facing = _facing(local, vertices[part], semi_axes[part], margin, chosen, begin)
+            # Hider by hider and coordinate by coordinate: these loops run in vector lanes.
+            x, y, z = places[0, :facing], places[1, :facing], places[2, :facing]
+            for i in range(facing):
+                vertex = chosen[i]
+                x[i], y[i], z[i] = vertices[part, vertex, 0], vertices[part, vertex, 1], vertices[part, vertex, 2]
+            entry, first, nearest = np.full(facing, np.inf), np.full(facing, -1.0), np.empty(facing)
+            before, slot = count, (a * len(parts) + n) * n_vertices
+            for k in range(found):
+                _before(part, hiders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
+                if _pass(x, y, z, start, turn, shift, float(hiders[k]), entry, first, nearest) == 0:
+                    continue
+                for i in range(facing):
+                    if nearest[i] < 0 or nearest[i] > begin[i]:
+                        continue
+                    if count == rays.shape[1]:
+                        rays, whose = _grown(rays), _grown(whose)
+                    span = 0.0
                     for j in range(3):
-                        shift[found, i] += frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
-                        start[found, i] += frames[other, j, i] * (antennas[a, j] - centres[other, j]) / semi_axes[other, i]
-                        turn[found, i, j] = 0.0
-                        for k in range(3):
-                            turn[found, i, j] += frames[other, k, i] * frames[part, k, j] / semi_axes[other, i]
-                found += 1
-        local = np.empty(3)
-        for i in range(3):
-            local[i] = 0.0
-            for j in range(3):
-                local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
-        # Hider by hider and coordinate by coordinate: these loops run in vector lanes.
-        x, y, z = vertices[part, :, 0].copy(), vertices[part, :, 1].copy(), vertices[part, :, 2].copy()
-        gap = np.ones(len(x))
-        for k in range(found):
-            _narrow(gap, x, y, z, start[k], turn[k], shift[k])
-        wanted[n, a] = False
-        for vertex in range(len(x)):
-            if gap[vertex] >= 0:
-                continue
-            along, normal, distance = 0.0, 0.0, 0.0
-            for i in range(3):
-                away, slope = local[i] - vertices[part, vertex, i], vertices[part, vertex, i] / semi_axes[part, i] ** 2
-                along += slope * away
-                normal += slope * slope
-                distance += away * away
-            if along >= 0 or along * along <= margin * margin * normal * distance:
-                wanted[n, a, vertex] = True
-                counts[n, a] += 1
-    return counts
+                        way[j] = turn[j, 0] * x[i] + turn[j, 1] * y[i] + turn[j, 2] * z[i] + shift[j] - start[j]
+                        span += way[j] * way[j]
+                    distance = math.sqrt(span)
+                    ahead = max(nearest[i] - 2 / distance, 0.0)
+                    for j in range(3):
+                        rays[j, count], rays[3 + j, count] = start[j] + ahead * way[j], way[j] / distance
+                    rays[6, count] = (1 - ahead) * distance
+                    whose[0, count], whose[1, count] = i, hiders[k]
+                    count += 1
+            # What certainly hides a vertex needs no rays to what stands behind it.
+            kept = before
+            for ray in range(before, count):
+                i = whose[0, ray]
+                rays[:, kept], whose[0, kept], whose[1, kept] = rays[:, ray], slot + chosen[i], whose[1, ray]
+                kept += entry[i] >= begin[i]
+            count = kept
+            for i in range(facing):
+                if entry[i] < begin[i]:
+                    hidden[a, n, chosen[i]] = int(first[i])
+    return rays[:, :count], whose[:, :count]
 
 
-@njit(cache=True, error_model="numpy")
-def _aim(antennas, parts, centres, frames, vertices, wanted, middle, ball, firsts, starts, ways, slot, reach):  # type: ignore[no-untyped-def]
-    """Rays to the vertices that are wanted, from where they enter the ball; where each answer belongs."""
-    for task in range(len(parts) * len(antennas)):
-        n, a = task // len(antennas), task % len(antennas)
-        part = parts[n]
-        point = np.empty(3)
-        ray = firsts[n, a]
-        for vertex in range(vertices.shape[1]):
-            if not wanted[n, a, vertex]:
-                continue
-            _world(vertices[part, vertex], centres[part], frames[part], point)
-            distance, along, square = 0.0, 0.0, 0.0
-            for i in range(3):
-                way, start = point[i] - antennas[a, i], antennas[a, i] - middle[i]
-                distance += way * way
-                along -= start * way
-                square += start * start
-            distance = math.sqrt(distance)
-            along /= distance
-            ahead = max(along - math.sqrt(max(ball * ball - square + along * along, 0.0)), 0.0)
-            for i in range(3):
-                ways[i, ray] = (point[i] - antennas[a, i]) / distance
-                starts[i, ray] = antennas[a, i] - middle[i] + ahead * (point[i] - antennas[a, i]) / distance
-            reach[ray] = distance - ahead
-            slot[ray] = (a * len(parts) + n) * vertices.shape[1] + vertex
-            ray += 1
+class FacetTracer:
+    """A body that tells which part hides which vertex.
 
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    semi_axes : (part, 3) float64
+        [m].
+    """
 
-class FacetTracer(BodyTracer):
-    """A body in a Mitsuba scene that tells which part hides which vertex; made and posed as a `BodyTracer` is."""
-
-    _posed: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-
-    def pose(self, centres: NDArray[np.float64], frames: NDArray[np.float64]) -> None:
-        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes; nothing to do where it stands so."""
-        if self._posed is not None and np.array_equal(centres, self._posed[0]) and np.array_equal(frames, self._posed[1]):
-            return
-        self._posed = (np.array(centres), np.array(frames))
-        super().pose(centres, frames)
+    def __init__(self, mi: Any, semi_axes: NDArray[np.float64]) -> None:
+        self._mi = mi
+        self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
+        vertices, faces = unit_sphere(SUBDIVISIONS)
+        mesh = mi.Mesh("unit_sphere", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+        parameters = mi.traverse(mesh)
+        parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
+        parameters["faces"] = np.ravel(faces).astype(np.uint32)
+        parameters.update()
+        self._scene = mi.load_dict({"type": "scene", "unit_sphere": mesh})
 
     def occluders(
-        self, antennas: NDArray[np.float64], parts: NDArray[np.int64], vertices: NDArray[np.float64], margin: float
+        self,
+        centres: NDArray[np.float64],
+        frames: NDArray[np.float64],
+        antennas: NDArray[np.float64],
+        parts: NDArray[np.int64],
+        vertices: NDArray[np.float64],
+        margin: float,
     ) -> NDArray[np.int16]:
         """Part that stands before each vertex, as each antenna sees it.
 
         Parameters
         ----------
+        centres, frames : (part, 3), (part, 3, 3) float64
+            Pose of the body, world [m].
         antennas : (antenna, 3) float64
             World [m].
         parts : (n,) int64
@@ -166,37 +223,35 @@ class FacetTracer(BodyTracer):
         Returns
         -------
         (antenna, n, vertex) int16
-            Part that is met first, where it is another and nearer than the vertex; else -1.
+            Another part that hides it, nearer to the antenna than its own part on the same line; else -1.
         """
-        if self._posed is None:
-            raise RuntimeError("FacetTracer: pose the body before asking what hides it")
-        posed = (np.ascontiguousarray(antennas, dtype=np.float64), np.asarray(parts, dtype=np.int64), *self._posed)
         hidden = np.full((len(antennas), len(parts), vertices.shape[1]), -1, dtype=np.int16)
-        wanted = np.empty((len(parts), len(antennas), vertices.shape[1]), dtype=np.bool_)
-        counts = _choose(*posed, self._semi_axes, vertices, float(margin), wanted)
-        rays = int(counts.sum())
-        if rays == 0:
-            # Dr.Jit takes the process down over arrays without entries.
-            return hidden
-        firsts = (np.cumsum(counts) - counts.ravel()).reshape(counts.shape)
-        starts, ways = np.empty((3, rays), dtype=np.float32), np.empty((3, rays), dtype=np.float32)
-        slot, reach = np.empty(rays, dtype=np.int64), np.empty(rays, dtype=np.float32)
-        _aim(*posed, vertices, wanted, self._centre, self._ball, firsts, starts, ways, slot, reach)
-        met, distance = self._first_parts(starts, ways)
-        own = np.repeat(np.asarray(parts), counts.sum(axis=1))
-        before = (met != own) & (met >= 0) & (distance < reach * np.float32(1 - 1e-6))
-        hidden.ravel()[slot[before]] = met[before]
+        rays, (slot, hider) = _choose(
+            np.ascontiguousarray(antennas, dtype=np.float64),
+            np.ascontiguousarray(parts, dtype=np.int64),
+            np.ascontiguousarray(centres, dtype=np.float64),
+            np.ascontiguousarray(frames, dtype=np.float64),
+            self._semi_axes,
+            vertices,
+            float(margin),
+            hidden,
+        )
+        # Dr.Jit takes the process down over arrays without entries.
+        if len(slot):
+            met = self._met(rays)
+            hidden.ravel()[slot[met]] = hider[met]
         return hidden
 
-    def _first_parts(self, starts: NDArray[np.float32], ways: NDArray[np.float32]) -> tuple[Any, Any]:
-        if self._scalar:
-            part, distance, _, _ = self._trace_scalar(starts.T.astype(np.float64), ways.T.astype(np.float64))
-            return part, distance
-        import drjit as dr
-
+    def _met(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Which of the rays (7, ray) meet the unit sphere of triangles."""
         mi = self._mi
-        found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(starts), mi.Vector3f(ways)), coherent=True)
-        instance = dr.reinterpret_array(mi.UInt32, found.instance)
-        dr.eval(found.t, instance)
-        distance = found.t.numpy()
-        return np.where(np.isfinite(distance), self._part_of[instance.numpy()], -1), distance
+        if mi.variant().startswith("scalar"):
+            found = []
+            for x, y, z, *way, reach in rays.T.tolist():
+                ray = mi.Ray3f(mi.Point3f(x, y, z), mi.Vector3f(*way))
+                ray.maxt = reach
+                found.append(bool(self._scene.ray_test(ray)))
+            return np.array(found)
+        ray = mi.Ray3f(mi.Point3f(np.ascontiguousarray(rays[:3])), mi.Vector3f(np.ascontiguousarray(rays[3:6])))
+        ray.maxt = mi.Float(np.ascontiguousarray(rays[6]))
+        return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())

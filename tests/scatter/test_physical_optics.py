@@ -16,7 +16,7 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.array_nodes import array_nodes, spread_nodes
-from rtradar.scatter.envelope import PIECES, Envelope, Sample
+from rtradar.scatter.envelope import PIECES, Envelope, Sample, hermite, stretch
 from rtradar.scatter.facet_scattering import facet_scattering
 from rtradar.scatter.physical_optics import PhysicalOptics
 from rtradar.scatter.reference import Reference
@@ -44,6 +44,21 @@ class Passing:
         centres = np.stack([np.broadcast_to([0.0, 0.05, 1.0], sphere.shape), sphere], axis=1)
         frames = np.stack([turn, np.broadcast_to(np.eye(3), turn.shape)], axis=1)
         return Poses(centres, frames, self.semi_axes)
+
+
+@dataclass(frozen=True)
+class Alone(Passing):
+    """The limb without the sphere."""
+
+    part_names: tuple[str, ...] = ("limb",)
+
+    @property
+    def semi_axes(self) -> Array:
+        return super().semi_axes[:1]
+
+    def at(self, times: Array) -> Poses:
+        both = super().at(times)
+        return Poses(both.centres[:, :1], both.frames[:, :1], self.semi_axes)
 
 
 def small_radar(**changes: object) -> rt.Radar:
@@ -149,6 +164,29 @@ def test_dials_out_of_range_are_refused(dial: str) -> None:
         PhysicalOptics(small_radar(), Passing(), **{dial: -1})  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("rung", [PhysicalOptics, Reference])
+def test_some_parts_are_what_they_are_among_all(rung: type[PhysicalOptics] | type[Reference]) -> None:
+    radar, body, chirps = small_radar(), Passing(), np.arange(10, 190, 7)
+    whole = rung(radar, body, facets=320).echoes(chirps)  # type: ignore[arg-type]
+    one = rung(radar, body, facets=320, parts=[0]).echoes(chirps)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(one.part, [0])
+    np.testing.assert_array_equal(one.length, whole.length[..., :1])
+    # What counts as small is told from the mirror point of the other part instead of its echo: anchors may differ.
+    np.testing.assert_allclose(one.amplitude, whole.amplitude[..., :1], atol=2e-3 * np.abs(whole.amplitude).max())
+    # It is hidden as before.
+    alone = rung(radar, Alone(), facets=320).echoes(chirps)  # type: ignore[arg-type]
+    assert np.abs(one.amplitude - alone.amplitude).max() > 0.3 * np.abs(alone.amplitude).max()
+    none = rung(radar, body, facets=320, parts=[]).echoes(chirps)  # type: ignore[arg-type]
+    assert none.length.shape == (len(chirps), 2, 0)
+
+
+@pytest.mark.parametrize("rung", [PhysicalOptics, Reference])
+@pytest.mark.parametrize("parts", [[2], [-1], [0, 0]])
+def test_parts_that_are_none_are_refused(rung: type[PhysicalOptics] | type[Reference], parts: list[int]) -> None:
+    with pytest.raises(InputError, match=r"parts = .*numbers from 0 to 1"):
+        rung(small_radar(), Passing(), facets=320, parts=parts)  # type: ignore[arg-type]
+
+
 # -- the array --------------------------------------------------------------------------------------------------------
 
 
@@ -193,16 +231,29 @@ def envelope_of(law: Callable[[float], complex], tolerance: float = 0.05) -> tup
     return Envelope(sample, 2, tolerance), asked
 
 
+def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex128]:
+    """Ratio (time, part) at these shares of the way from an anchor to the next."""
+    ratio, slope, known = envelope.course(index)
+    out = np.empty((len(share), 2), dtype=np.complex128)
+    for row, place in enumerate(share * PIECES):
+        for part in range(2):
+            left, right = stretch(known[:, part], place)
+            values = ratio[left], ratio[right], slope[left], slope[right]
+            weights = hermite(place, left, right)
+            out[row, part] = sum(weight * value[0, 0, part] for weight, value in zip(weights, values, strict=True))
+    return out
+
+
 def test_a_slow_envelope_is_interpolated_from_the_anchors_alone() -> None:
     def law(t: float) -> complex:
         return complex(np.exp(0.3j * t))
 
     envelope, asked = envelope_of(law, tolerance=0.1)
     share = np.linspace(0, 1, 50, endpoint=False)
-    got = envelope.between(4, share)[:, 0, 0]
+    got = between(envelope, 4, share)
     # A cubic through slopes by neighbours: (0.3)^3 / 6 / 4 at the most.
     np.testing.assert_allclose(got[:, 0], [law(4 + s) for s in share], atol=1.5e-3)
-    np.testing.assert_array_equal(got[:, 1], 1)
+    np.testing.assert_allclose(got[:, 1], 1, rtol=1e-15)
     assert all(place == round(place) for place in asked)
 
 
@@ -214,7 +265,7 @@ def test_where_it_bends_anchors_come_closer_and_the_error_falls() -> None:
     errors = []
     for tolerance in (10.0, 0.05):
         envelope, asked = envelope_of(law, tolerance)
-        errors.append(np.abs(envelope.between(4, share)[:, 0, 0, 0] - [law(4 + s) for s in share]).max())
+        errors.append(np.abs(between(envelope, 4, share)[:, 0] - [law(4 + s) for s in share]).max())
     assert {4 + 3 / PIECES, 4 + 4 / PIECES} <= set(asked)
     assert errors[0] > 0.3
     assert errors[1] < 0.05
@@ -229,8 +280,8 @@ def test_an_envelope_has_one_value_and_one_slope_at_an_anchor(seed: int) -> None
 
     envelope, _ = envelope_of(law)
     step = 1e-5
-    before = envelope.between(3, np.array([1 - step, 1.0]))[:, 0, 0, 0]
-    after = envelope.between(4, np.array([0.0, step]))[:, 0, 0, 0]
+    before = between(envelope, 3, np.array([1 - step, 1.0]))[:, 0]
+    after = between(envelope, 4, np.array([0.0, step]))[:, 0]
     np.testing.assert_allclose(before[1], after[0], atol=1e-12)
     # Slopes reach tens an interval; the second derivative times the step is what they may differ by.
     np.testing.assert_allclose(before[1] - before[0], after[1] - after[0], atol=1e-6)

@@ -1,0 +1,68 @@
+"""Outlines of ellipsoids as an antenna sees them: which part may stand before which, before any line of sight is looked at."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+VIEWS = 8
+"""Directions across the line of sight in which two outlines are compared."""
+
+
+@njit(cache=True, error_model="numpy")
+def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type: ignore[no-untyped-def]
+    """How parts stand before an antenna: from where to where (part, view) across the view, and along it (part,).
+
+    Across: the slopes x.d / x.w of the planes through the antenna that touch the ellipsoid, w the way to the middle of the
+    body and d a direction across it; infinite where a part reaches beside the antenna.
+    """
+    way = np.zeros(3)
+    for i in range(3):
+        way[i] = centres[:, i].mean() - antenna[i]
+    way /= math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+    side = np.zeros(3)
+    side[np.argmin(np.abs(way))] = 1.0
+    first = np.cross(way, side)
+    first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
+    second = np.cross(way, first)
+    for part in range(len(centres)):
+        place = centres[part] - antenna
+        along = 0.0
+        w = np.zeros(3)
+        for i in range(3):
+            along += place[i] * way[i]
+            for j in range(3):
+                w[i] += semi_axes[part, i] * frames[part, j, i] * way[j]
+        ww = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+        near[part], far[part] = along - math.sqrt(ww), along + math.sqrt(ww)
+        for view in range(VIEWS):
+            cosine, sine = math.cos(math.pi * view / VIEWS), math.sin(math.pi * view / VIEWS)
+            across, dd, dw = 0.0, 0.0, 0.0
+            for i in range(3):
+                d = 0.0
+                for j in range(3):
+                    d += semi_axes[part, i] * frames[part, j, i] * (cosine * first[j] + sine * second[j])
+                across += place[i] * (cosine * first[i] + sine * second[i])
+                dd += d * d
+                dw += d * w[i]
+            # A plane with normal d - t w touches where (across - t along)^2 = |d - t w|^2, in axes of the unit ball.
+            square = along * along - ww
+            if along <= 0 or square <= 0:
+                low[part, view], high[part, view] = -math.inf, math.inf
+                continue
+            middle = (across * along - dw) / square
+            half = math.sqrt(max(middle * middle - (across * across - dd) / square, 0.0))
+            low[part, view], high[part, view] = middle - half, middle + half
+
+
+@njit(cache=True, error_model="numpy")
+def may_hide(part, other, low, high, near, far):  # type: ignore[no-untyped-def]
+    """Whether one part may stand before another: it begins before that ends, and no view shows a gap between them."""
+    if near[other] >= far[part]:
+        return False
+    apart = False
+    for view in range(VIEWS):
+        apart |= low[other, view] > high[part, view] or high[other, view] < low[part, view]
+    return not apart
