@@ -30,8 +30,12 @@ from rtradar.errors import InputError
 BEGIN, END = "<!-- validation: begin -->", "<!-- validation: end -->"
 """What stands before and after the table in a README."""
 
+KEYS = ("sphere", "ellipsoid", "plate", "path", "point", "doppler", "edge", "body", "cfar", "if-sum", "backends")
+"""The main claims, in the order of the table; others come after them."""
+
 Row = dict[str, Any]
-"""A figure as a script writes it: key, claim, quantity, unit, reference, ours, error, tolerance, passed."""
+"""A figure as a script writes it: key, claim, quantity, unit, reference, ours, error, tolerance, passed; and the claim in
+words, ``says``, with the number of ``cases`` of which it is the worst."""
 
 
 @dataclass(frozen=True)
@@ -218,20 +222,42 @@ def _lines(outcome: Outcome) -> Iterator[str]:
 
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
-    """A table of the nearest to its limit of each key's judged rows, for a README."""
-    lines = ["| key | judged | nearest to its limit | error | limit | script |", "|---|---|---|---|---|---|"]
+    """A table for a README: a line for each thing that is claimed, with the worst of its judged rows."""
+    groups: dict[tuple[str, ...], list[Row]] = {}
     rows = [row | {"script": outcome.claim.script.name} for outcome in outcomes for row in outcome.rows]
-    for key, own in sorted(by_key(rows).items()):
-        row = worst(own)
-        if row is None:
-            continue
+    of_judged = [row for row in rows if row["tolerance"] is not None]
+    for row in of_judged:
+        group = (row["key"], row["script"], row.get("says") or row["quantity"], row["unit"], str(row["tolerance"]))
+        groups.setdefault(group, []).append(row)
+    # Sorting keeps the order of the scripts and of their rows.
+    places = {key: place for place, key in enumerate(KEYS)}
+    ordered = sorted(groups.values(), key=lambda own: (places.get(own[0]["key"], len(KEYS)), own[0]["key"]))
+    lines = ["| key | claim | worst | limit | cases | script |", "|---|---|---|---|---|---|"]
+    for own in ordered:
+        row = max(own, key=lambda row: (not row["passed"], used_up(row["error"], row["tolerance"])))
+        says = row.get("says") or (row["quantity"] if len(own) > 1 else f"{row['claim']}: {row['quantity']}")
         unit = f" {row['unit']}" if row["unit"] not in ("", "1") else ""
-        count = sum(other["tolerance"] is not None for other in own)
-        lines.append(
-            f"| `{key}` | {count} | {row['claim']}: {row['quantity']} | {row['error']:.2g}{unit} | {row['tolerance']:.3g}{unit} "
-            f"| `{row['script']}` |"
-        )
+        error = f"{_figure(row['error'])}{unit}"
+        error = error if row["passed"] else f"**{error}: FAILED**"
+        cases = sum(row.get("cases", 1) for row in own)
+        lines.append(f"| `{row['key']}` | {_cell(says)} | {error} | {row['tolerance']:.3g}{unit} | {cases} | `{row['script']}` |")
+    kept = sum(row["passed"] for row in of_judged)
+    lines += [
+        "",
+        f"{kept} of {len(of_judged)} judged figures are within their limits; {len(rows) - len(of_judged)} more are reported.",
+    ]
+    lines += [f"`{outcome.claim.script.name}` {_cell(outcome.trouble)}." for outcome in outcomes if outcome.trouble]
     return "\n".join(lines)
+
+
+def _figure(value: float) -> str:
+    """Two digits; three where a figure may be close to its limit."""
+    return f"{value:.0f}" if 100 <= abs(value) < 1e5 else format(value, ".3g" if abs(value) >= 0.1 else ".2g")
+
+
+def _cell(text: str) -> str:
+    """Text that a table does not take for more than one cell."""
+    return text.replace("|", "\\|")
 
 
 def write_readme(path: Path, text: str) -> None:

@@ -19,7 +19,8 @@ import sys
 from rows import Row, judged, main, reported
 def measure(quick):
     share = 0.5 if quick else 0.25
-    return [judged("a ball", "round", "m", share, 1.0, key="sphere"), reported("a ball", "red", "", 3.0, key="colour")]
+    round_ = judged("a ball", "round", "m", share, 1.0, key="sphere", says="balls are round", cases=3)
+    return [round_, reported("a ball", "red", "", 3.0, key="colour")]
 if __name__ == "__main__":
     sys.exit(main("Balls.", measure))
 """
@@ -121,11 +122,44 @@ def test_the_table_of_a_readme_is_replaced(folder: Path, tmp_path: Path, capsys:
     text = readme.read_text()
     assert text.startswith(f"before\n{validate.BEGIN}\n")
     assert text.endswith(f"{validate.END}\nafter\n")
-    assert "| `sphere` | 1 | a ball: round | 0.25 m | 1 m | `balls.py` |" in text
+    assert "| `sphere` | balls are round | 0.25 m | 1 m | 3 | `balls.py` |" in text
+    assert "1 of 1 judged figures are within their limits; 1 more are reported." in text
     assert "old" not in text
     assert "colour" not in text  # not judged
     assert main(["validate", "--readme", str(readme)]) == 0
     assert readme.read_text() == text
+
+
+def outcome(name: str, *rows: dict[str, object]) -> validate.Outcome:
+    """Of a script with these rows, that passed and have a limit of 2 m unless they say otherwise."""
+    usual = {"key": name, "claim": "a case", "quantity": "length", "unit": "m", "error": 1.0, "tolerance": 2.0, "passed": True}
+    return validate.Outcome(validate.Claim(Path(f"{name}.py"), (name,)), [usual | row for row in rows], 1.0, 1.0, "")
+
+
+def test_rows_that_say_the_same_are_one_line_with_the_worst_of_them() -> None:
+    says = {"says": "lengths |far| and near", "cases": 10}
+    table = validate.markdown([outcome("path", says, says | {"error": 1.5}, says | {"tolerance": 3.0})])
+    assert table.splitlines()[2:4] == [
+        "| `path` | lengths \\|far\\| and near | 1.5 m | 2 m | 20 | `path.py` |",
+        "| `path` | lengths \\|far\\| and near | 1 m | 3 m | 10 | `path.py` |",
+    ]
+
+
+def test_a_failure_stands_out_in_the_table() -> None:
+    wrong = {"error": 2.5, "passed": False}
+    table = validate.markdown([outcome("path", {"error": 1.9}, wrong)])
+    assert "| `path` | length | **2.5 m: FAILED** | 2 m | 2 | `path.py` |" in table
+    assert "1 of 2 judged figures" in table
+
+
+def test_the_main_claims_come_first_in_the_table() -> None:
+    table = validate.markdown([outcome(name, {}) for name in ("angle", "cfar", "path", "sphere")])
+    assert [line.split("`")[1] for line in table.splitlines()[2:6]] == ["sphere", "path", "cfar", "angle"]
+
+
+def test_a_script_that_did_not_finish_is_told_below_the_table() -> None:
+    claim = validate.Claim(Path("path.py"), ("path",))
+    assert "`path.py` left no rows." in validate.markdown([validate.Outcome(claim, [], 1.0, 1.0, "left no rows")])
 
 
 @pytest.mark.parametrize("content", ["no markers", f"{validate.END} {validate.BEGIN}", validate.BEGIN])
@@ -162,6 +196,5 @@ def test_how_much_of_a_limit_is_used(error: float, tolerance: float, share: floa
 def test_the_claims_of_this_checkout_have_their_scripts() -> None:
     found = validate.claims(validate.validation_folder())
     keys = {key for claim in found for key in claim.keys}
-    promised = {"sphere", "ellipsoid", "plate", "path", "point", "doppler", "edge", "cfar", "if-sum", "body", "backends"}
-    assert promised <= keys
+    assert set(validate.KEYS) <= keys
     assert "rows" not in {claim.name for claim in found}

@@ -123,12 +123,16 @@ def direction_rows(preset: str, direction: tuple[float, float], speed: float) ->
     x = samples_of(preset, place, speed)
     case = f"{preset}, azimuth {direction[0]:+.0f}, elevation {direction[1]:+.0f}, {speed:+.0f} m/s"
     for name, truth, found in zip(("azimuth", "elevation"), direction, angle(x, radar, RANGE_M, speed), strict=True):
-        yield judged(case, name, "deg", float(np.degrees(found)), TOLERANCE_DEG, reference=truth)
+        says = f"a point reads back: {name}, 4 m away, standing and at 3 m/s"
+        degrees = float(np.degrees(found))
+        yield judged(case, name, "deg", degrees, TOLERANCE_DEG, reference=truth, key="point", says=says)
     cloud = spatial_points(spectra_of(preset, x, speed, True, "taylor"), radar, 0.05)
     # Half a range bin and half a degree at 4 m; of several peaks all must lie there.
     off = np.linalg.norm(cloud.points - np.array(radar.position_m) - place, axis=1)
     limit = radar.range_bin_m / 2 + RANGE_M * np.radians(TOLERANCE_DEG)
-    yield judged(case, f"cloud: farthest of {len(off)} point(s)", "m", float(off.max()) if len(off) else np.nan, limit)
+    says = "a point reads back: farthest point of its spatial cloud"
+    farthest = float(off.max()) if len(off) else np.nan
+    yield judged(case, f"cloud: farthest of {len(off)} point(s)", "m", farthest, limit, key="point", says=says)
 
 
 def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
@@ -142,12 +146,16 @@ def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
     ours = decibels(figures[False, "uniform"][0] / figures[True, "uniform"][0])
     loss = decibels(flat[0] / sharp[0])
     if preset == "paper-12ghz":
-        yield judged(case, "far-field FFT against focusing, at most", "dB", ours, -3.5)
-        yield judged(case, "width at -3 dB, focused, at most", "deg", figures[True, "uniform"][1], 2.0)
+        says = "beam at 4 m, 12 GHz, broadside: what the far-field FFT loses to focusing, at least"
+        yield judged(case, "far-field FFT against focusing, at most", "dB", ours, -3.5, says=says)
+        says = "beam at 4 m, 12 GHz, broadside: width at -3 dB, focused, at most"
+        yield judged(case, "width at -3 dB, focused, at most", "deg", figures[True, "uniform"][1], 2.0, says=says)
     # 0.1 dB, 0.05 deg: the point lies a quarter of a range bin off the middle of its cell.
-    yield judged(case, "far-field FFT against focusing", "dB", ours, 0.1, reference=loss)
-    yield judged(case, "width at -3 dB, focused", "deg", figures[True, "uniform"][1], 0.05, reference=sharp[1])
-    yield judged(case, "width at -3 dB, far-field FFT", "deg", figures[False, "uniform"][1], 0.05, reference=flat[1])
+    says = "what the far-field FFT loses at 4 m against the phases of all 48 paths, summed"
+    yield judged(case, "far-field FFT against focusing", "dB", ours, 0.1, reference=loss, says=says)
+    for name, focus, expected in (("focused", True, sharp[1]), ("far-field FFT", False, flat[1])):
+        width, says = figures[focus, "uniform"][1], "width of the beam at -3 dB against the phases of all 48 paths, summed"
+        yield judged(case, f"width at -3 dB, {name}", "deg", width, 0.05, reference=expected, says=says)
     yield reported(case, "width at -3 dB, focused, Taylor taper of the cloud", "deg", figures[True, "taylor"][1])
 
 
@@ -172,7 +180,9 @@ def pair_rows(preset: str, apart_deg: float, taper: Taper) -> Iterator[Row]:
                 counts.append(len(spatial_points(seen, radar, 0.0).points))
     case = f"{preset}, two points {apart_deg:g} deg apart, {taper}"
     if taper == "uniform":  # the claim; in phase the gap fills most
-        yield judged(case, "dip between them, shallowest of 8 phases, at most", "dB", max(dips), -1.0)
+        says = "two points 3 degrees apart at 4 m: dip between them, at any phase"
+        quantity = "dip between them, shallowest of 8 phases, at most"
+        yield judged(case, quantity, "dB", max(dips), -1.0, says=says, cases=len(dips))
     else:
         yield reported(case, "dip between them, shallowest of 8 phases", "dB", max(dips))
         yield reported(case, "points in the cloud, fewest of 8 phases", "", min(counts))

@@ -246,6 +246,7 @@ def differences(
     judge: bool,
 ) -> Iterator[Row]:
     different, worst = 0, 0.0
+    versus = claim.partition(",")[0]
     for name, body in bodies.items():
         triangles = Triangles(body)
         apart = np.flatnonzero(ours[name] != others[name])
@@ -257,8 +258,14 @@ def differences(
     share = different / sum(len(parts) for parts in ours.values())
     # Asked for: one in ten thousand, and those within 10 um of an edge: float32 keeps 0.1 um of a metre, a few times over.
     quantity = "share of rays that meet another part"
-    yield judged(claim, quantity, "", share, MOST_DIFFERENT) if judge else reported(claim, quantity, "", share)
-    yield judged(claim, f"farthest from an edge of these {different}", "m", worst, NEAREST_EDGE_M)
+    rays = sum(len(parts) for parts in ours.values())
+    says = f"{versus}: share of rays that meet another part"
+    if judge:
+        yield judged(claim, quantity, "", share, MOST_DIFFERENT, says=says, cases=rays)
+    else:
+        yield reported(claim, quantity, "", share)
+    says = f"{versus}: how far those pass from an edge"
+    yield judged(claim, f"farthest from an edge of these {different}", "m", worst, NEAREST_EDGE_M, says=says, cases=different)
 
 
 if __name__ == "__main__":

@@ -148,8 +148,10 @@ def compared_rows(preset: str) -> Iterator[Row]:
         ratio = rungs["specular"]["part_power_m2"][part] / rungs["analytic"]["part_power_m2"][part]
         expected = float(decibels(factor[part]))
         quantity = f"{part}: specular over analytic, ref. near field"
-        yield judged(claim, quantity, "dB", float(decibels(ratio)), TOLERANCE_DB, reference=expected)
-    yield judged(claim, "parts that are hidden, of 21", "", len(hidden) - len(seen), len(hidden) - 1)
+        says = "`compare` of `analytic` with `specular`, standing: parts fully seen, echo power once near field is counted"
+        yield judged(claim, quantity, "dB", float(decibels(ratio)), TOLERANCE_DB, reference=expected, says=says)
+    says = "`compare` of `analytic` with `specular`, standing: parts that are hidden, of 21"
+    yield judged(claim, "parts that are hidden, of 21", "", len(hidden) - len(seen), len(hidden) - 1, says=says)
 
 
 def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row]:
@@ -167,9 +169,10 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     claim = f"{activity}, {preset}, {duration_s:g} s"
     error = decibels(specular[seen] / analytic[seen]) - decibels(near[seen] / far[seen])
     count = f"{seen.sum()} of {seen.size} parts and instants"
-    yield judged(
-        claim, f"fully seen, {count}: worst |dB| once near field is counted", "dB", float(abs(error).max()), TOLERANCE_DB
-    )
+    quantity = f"fully seen, {count}: worst |dB| once near field is counted"
+    says = "`analytic` against `specular`, four activities: the same of parts fully seen, at each instant"
+    worst = float(abs(error).max())
+    yield judged(claim, quantity, "dB", worst, TOLERANCE_DB, says=says, cases=int(seen.sum()))
     yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
     yield reported(claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean()))
     yield reported(claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min()))

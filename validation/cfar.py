@@ -167,7 +167,8 @@ def rate_rows(found: Rate) -> Iterator[Row]:
     claim = f"{found.cells} cells, {found.detector}, {found.looks} look{'s' if found.looks > 1 else ''}, {found.pfa:g} asked"
     counted = found.counted / found.pfa
     if found.cells == "independent":
-        yield judged(claim, f"counted over asked, {found.n_cells} cells", "", counted, MOST_OFF, reference=1.0)
+        says = "false alarms counted over those asked, independent cells, less 1"
+        yield judged(claim, f"counted over asked, {found.n_cells} cells", "", counted, MOST_OFF, reference=1.0, says=says)
     else:
         yield reported(claim, f"counted over asked, {found.alarms} alarms", "", counted)
     yield reported(claim, "one standard deviation of that", "", found.counted_error / found.pfa)

@@ -19,7 +19,7 @@ def measure(quick: bool) -> list[Row]:
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     rows = []
     for activity in ("walk",) if quick else ("walk", "jumping_jack"):
-        motion = rt.synthetic_motion(activity, seed=0, duration_s=3.0)
+        motion = rt.synthetic_motion(activity, seed=0, duration_s=1.0 if quick else 3.0)
         clouds = []
         for seed in (0, 1):
             with tempfile.TemporaryDirectory() as folder:

@@ -650,7 +650,8 @@ def measure(quick: bool) -> list[Row]:
         good, got = outcome(one)
         print(f"{one.name:62}  {one.expected:62}  {got}", flush=True)
         quantity = one.expected if good else f"{one.expected}; got: {got}"
-        rows.append(judged(one.name, quantity, "", 0.0 if good else 1.0, 0.0))
+        says = "extremes: not the right finite answer, nor a refusal, nor a warning (1: so)"
+        rows.append(judged(one.name, quantity, "", 0.0 if good else 1.0, 0.0, says=says))
     return rows
 
 

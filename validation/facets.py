@@ -61,14 +61,17 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
         worst = max(worst, float(np.abs(20 * np.log10(np.abs(ratio))).max()))
         complex_errors += list(ratio - 1)
     claim = "sphere of facets, ka 5 to 400"
-    yield judged(claim, f"worst |dB| to PO's closed form, {len(complex_errors)} cases", "dB", worst, 0.1, key="sphere")
+    cases, says = len(complex_errors), "a sphere of traced facets against physical optics' closed form, ka 5 to 400"
+    yield judged(claim, f"worst |dB| to PO's closed form, {cases} cases", "dB", worst, 0.1, key="sphere", says=says, cases=cases)
     yield reported(claim, "rms complex error", "", rms(np.array(complex_errors)), key="sphere")
     try:
         field(alone(np.full(3, 0.1)), FAR_M * directions(1, 0), FAR_M * directions(1, 0), 401 * SPEED_OF_LIGHT / (0.2 * np.pi))
         accepted = 1.0
     except InputError:
         accepted = 0.0
-    yield judged("sphere of facets, ka 401", "accepted without asking for its facets", "", accepted, 0.0, key="sphere")
+    says = "beyond ka 400 a sphere of facets is refused unless their number is given (1: it was not)"
+    quantity = "accepted without asking for its facets"
+    yield judged("sphere of facets, ka 401", quantity, "", accepted, 0.0, key="sphere", says=says)
 
 
 def plate_rows() -> Iterator[Row]:
@@ -81,12 +84,14 @@ def plate_rows() -> Iterator[Row]:
         ours = float(20 * np.log10(np.abs(field(plate, straight, straight, frequency))[0]))
         expected = float(10 * np.log10(4 * np.pi * 25.0**2 / wavelength**2))
         # The waves bend over it by 2 pi 2.5^2 / (lambda 1e6 m).
-        yield judged(claim, "cross-section to 4 pi A^2 / lambda^2", "dBsm", ours, 0.01, reference=expected, key="plate")
+        says = "square plate of 5 m at 1 and 3 GHz by facets against 4 pi A² / λ²"
+        yield judged(claim, "cross-section to 4 pi A^2 / lambda^2", "dB", ours, 0.01, reference=expected, key="plate", says=says)
         angle = np.radians(np.linspace(0.5, 30, 60))
         aslant = FAR_M * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
         lobes = 50 * np.sqrt(np.pi) / wavelength * np.cos(angle) * np.sinc(10 / wavelength * np.sin(angle))
         error = rms(np.abs(field(plate, aslant, aslant, frequency)) - np.abs(lobes)) / rms(lobes)
-        yield judged(claim, "lobes to 30 degrees, rms over rms", "", error, 1e-3, key="plate")
+        says = "square plate of 5 m by facets, lobes to 30 degrees against sinc: rms over rms"
+        yield judged(claim, "lobes to 30 degrees, rms over rms", "", error, 1e-3, key="plate", says=says, cases=len(angle))
 
 
 # -- quadrature -------------------------------------------------------------------------------------------------------
@@ -112,7 +117,9 @@ def ellipsoid_rows(quick: bool) -> Iterator[Row]:
             claim = f"ellipsoids of the body at 4 m, {frequency / 1e9:g} GHz, {name}"
             # 2 % is 0.17 dB; the quadrature has no polarisation, of which pairs 0.5 m apart lose 1 - cos(7 degrees).
             error = rms(np.array(errors)) / rms(np.array(fields))
-            yield judged(claim, f"{facets} facets: rms complex error to quadrature", "", error, 0.02, key="ellipsoid")
+            says = "parts of the body by facets at 4 m, 12 to 79 GHz, against physical optics by quadrature: rms complex error"
+            quantity = f"{facets} facets: rms complex error to quadrature"
+            yield judged(claim, quantity, "", error, 0.02, key="ellipsoid", says=says, cases=len(errors))
 
 
 def shadow_rows(quick: bool) -> Iterator[Row]:
@@ -128,9 +135,9 @@ def shadow_rows(quick: bool) -> Iterator[Row]:
             whole, front, free = (field(each, ANTENNA, ANTENNA, frequency, facets)[0] for each in (both, before, alone(TARGET)))
             errors.append((whole - front) / free - target.field(occluder, radius))
         claim = "thigh behind the edge of a sphere, 14 GHz"
-        yield judged(
-            claim, f"{facets} facets: rms error of the field over the free one", "", rms(np.array(errors)), 0.02, key="edge"
-        )
+        quantity = f"{facets} facets: rms error of the field over the free one"
+        says = "a thigh behind an edge by facets against a geometric shadow: rms error over the free field"
+        yield judged(claim, quantity, "", rms(np.array(errors)), 0.02, key="edge", says=says, cases=len(errors))
 
 
 # -- laws -------------------------------------------------------------------------------------------------------------
@@ -153,9 +160,9 @@ def law_rows() -> Iterator[Row]:
     }
     for name, there in others.items():
         # Float64 all through; where shadows are asked for in float32 none of these has any.
-        yield judged(
-            "laws", f"{name}: largest change over rms", "", float(np.abs(there - here).max()) / rms(here), 1e-8, key="ellipsoid"
-        )
+        change = float(np.abs(there - here).max()) / rms(here)
+        says = "facets: Tx and Rx swapped, all turned, parts added up: largest change"
+        yield judged("laws", f"{name}: largest change over rms", "", change, 1e-8, key="ellipsoid", says=says, cases=len(tx))
 
 
 def measure(quick: bool) -> list[Row]:

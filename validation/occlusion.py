@@ -164,7 +164,10 @@ def hidden_rows(quick: bool) -> Iterator[Row]:
             )
             worst = max(worst, float((np.abs(whole - before) / np.abs(free)).max() ** 2))
             cases += len(tx)
-    yield judged("straight behind another part", f"most of the free power, {cases} cases", "", worst, 1e-6)
+    says = "a part straight behind another by `specular`: most of its free power"
+    yield judged(
+        "straight behind another part", f"most of the free power, {cases} cases", "", worst, 1e-6, says=says, cases=cases
+    )
 
 
 def covered_rows(quick: bool) -> Iterator[Row]:
@@ -186,7 +189,8 @@ def covered_rows(quick: bool) -> Iterator[Row]:
                     quantity = f"{share:3.0%} covered: field over the free one"
                     yield Row(claim, quantity, "", abs(optics), abs(got), errors[-1], None, bool(np.isfinite(errors[-1])), "edge")
             # All or nothing where half the field is left is wrong by a half; physical optics swings a little past that.
-            yield judged(claim, "worst complex error", "", max(errors), 0.6)
+            says = "a part half behind an edge by `specular`, seen or not: worst complex error"
+            yield judged(claim, "worst complex error", "", max(errors), 0.6, says=says, cases=len(errors))
             yield reported(claim, "rms complex error where partly covered", "", float(np.sqrt(np.mean(np.square(crossing)))))
 
 

@@ -83,8 +83,10 @@ def case_rows(preset: str, place: str, speed: float) -> Iterator[Row]:
     claim = f"{preset}, {place}, {speed:+g} m/s"
     velocity = "alias" if abs(speed) > radar.max_velocity_mps else "velocity"
     tolerance = MOVING_TOLERANCE if speed else STANDING_TOLERANCE
-    yield judged(claim, "range", "bins", read_range, tolerance, reference=range_m / radar.range_bin_m, key="point")
-    yield judged(claim, velocity, "bins", read_velocity, VELOCITY_TOLERANCE, reference=seen, key="point")
+    says = f"a point reads back: range, {'moving' if speed else 'standing'}"
+    yield judged(claim, "range", "bins", read_range, tolerance, reference=range_m / radar.range_bin_m, key="point", says=says)
+    says = "a point reads back: velocity or its known alias, up to and beyond the unambiguous one"
+    yield judged(claim, velocity, "bins", read_velocity, VELOCITY_TOLERANCE, reference=seen, key="point", says=says)
     peak = np.unravel_index(power.argmax(), power.shape)
     yield reported(claim, "highest cell, range off", "bins", float(peak[0]) - range_m / radar.range_bin_m, key="point")
     off = nearest_turn(float(peak[1]) - cycles // 2 - seen, cycles)

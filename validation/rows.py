@@ -33,16 +33,28 @@ class Row:
     tolerance: float | None  # None: reported, not judged
     passed: bool
     key: str = field(default_factory=script_name)  # of the claim, as `rtradar validate --only` takes it
+    says: str = ""  # the claim in words; rows that say the same, with the same limit, are one line of the README's table
+    cases: int = 1  # of which this is the worst
 
 
 def judged(
-    claim: str, quantity: str, unit: str, ours: float, tolerance: float, *, reference: float | None = None, key: str = ""
+    claim: str,
+    quantity: str,
+    unit: str,
+    ours: float,
+    tolerance: float,
+    *,
+    reference: float | None = None,
+    key: str = "",
+    says: str = "",
+    cases: int = 1,
 ) -> Row:
     """A figure that must not exceed its tolerance: |ours - reference| where there is a reference, else ours."""
     error = float(abs(ours - reference) if reference is not None else ours)
     known = None if reference is None else float(reference)
     passed = math.isfinite(error) and error <= float(tolerance)
-    return Row(claim, quantity, unit, known, float(ours), error, float(tolerance), passed, key or script_name())
+    figures = (known, float(ours), error, float(tolerance))
+    return Row(claim, quantity, unit, *figures, passed, key or script_name(), says, cases)
 
 
 def reported(claim: str, quantity: str, unit: str, ours: float, *, reference: float | None = None, key: str = "") -> Row:

@@ -119,11 +119,14 @@ def pendulum_rows(radar: rt.Radar) -> Iterator[Row]:
         yield reported(claim, "greatest range rate", "m/s", float(np.abs(truth).max()))
         yield reported(claim, "greatest change of it within a window", "bins", steepest(radar, seen.time, truth) / width)
         # One bin: the claim. A hundredth: a shift of a quarter of a cycle in time is 0.01 bins at 12 GHz.
-        yield judged(claim, f"highest cell, worst of {len(truth)} columns", "bins", worst(ridge - truth, width), 1.0)
-        yield judged(claim, f"centroid, worst of {len(truth)} columns", "bins", worst(centroid - truth, width), 0.01)
+        columns, says = len(truth), "spectrogram of a pendulum against elliptic functions"
+        for name, found, limit in (("highest cell", ridge, 1.0), ("centroid", centroid, 0.01)):
+            quantity, error = f"{name}, worst of {columns} columns", worst(found - truth, width)
+            yield judged(claim, quantity, "bins", error, limit, says=f"{says}: {name}", cases=columns)
         # By Parseval's theorem 1.5 in range times 1.5 in velocity, for an echo of amplitude 1, in every column.
         total = seen.power.sum(axis=1)
-        yield judged(claim, "power of a column, worst", "of all", float(np.abs(total / 2.25 - 1).max()), 1e-5)
+        error = float(np.abs(total / 2.25 - 1).max())
+        yield judged(claim, "power of a column, worst", "", error, 1e-5, says=f"{says}: power of a column", cases=columns)
 
 
 def steepest(radar: rt.Radar, times: Array, rate: Array) -> float:
@@ -203,7 +206,8 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
     torso = gait.seen(gait.parts[:, [PART_NAMES.index(name) for name in TORSO]].mean(axis=1), radar, found.time)
     away = np.abs(found.velocity[found.power.argmax(axis=1)] - torso) / width
     # An arm or a thigh outshines the torso now and then: of the line in the picture the median column speaks.
-    yield judged(claim, "torso: highest cell, median of the columns", "bins", float(np.median(away)), 1.0)
+    says = "spectrogram of a recorded walk against the motion: torso, legs; median of the columns"
+    yield judged(claim, "torso: highest cell, median of the columns", "bins", float(np.median(away)), 1.0, says=says)
     yield reported(claim, "torso: columns within 3 bins", "share", float((away < 3).mean()))
 
     count = 0
@@ -218,14 +222,15 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
             away = np.abs(found.velocity[power.argmax(axis=1)] - foot[apart]) / width
             begin, end = found.time[run.start], found.time[run.stop - 1]
             case = f"{side} leg, {begin:.2f} to {end:.2f} s"
-            yield judged(claim, f"{case}: its line, median of {len(apart)} columns", "bins", float(np.median(away)), 1.0)
+            quantity, middle = f"{case}: its line, median of {len(apart)} columns", float(np.median(away))
+            yield judged(claim, quantity, "bins", middle, 1.0, says=says)
             yield reported(claim, f"{case}: columns within 3 bins", "share", float((away < 3).mean()))
             yield reported(claim, f"{case}: above the noise, median", "dB", decibels(np.median(power.max(axis=1)) / noise))
             level = np.median(power.max(axis=1) / found.power[apart].max(axis=1))
             yield reported(claim, f"{case}: re the highest cell, median", "dB", decibels(level))
             count += 1
     # The right foot swings as the recording begins, then left, right, left.
-    yield judged(claim, "swings of the legs", "", count, 0.0, reference=4)
+    yield judged(claim, "swings of the legs", "", count, 0.0, reference=4, says="swings of the legs in it, of 4: missed")
 
 
 def decibels(ratio: float) -> float:

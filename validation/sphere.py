@@ -79,20 +79,23 @@ def closed_rows(quick: bool) -> Iterator[Row]:
     mie = rt.rcs.sphere(radius, FREQUENCY_HZ, "mie")
     claim = f"ka {LEAST_KA:g} to {LARGEST_KA:g}"
     # The index of 1e6 turns the phase by 2e-6; otherwise both series have rounding only.
-    yield judged(
-        claim, "Mie against miepython, worst relative power", "", float(np.abs(abs(mie / reference) ** 2 - 1).max()), 1e-5
-    )
+    about = {"says": f"Mie's series against miepython, {claim}: power and phase, relative", "cases": len(ka)}
+    error = float(np.abs(abs(mie / reference) ** 2 - 1).max())
+    yield judged(claim, "Mie against miepython, worst relative power", "", error, 1e-5, **about)
     ratio = mie / reference
     turned = float(np.abs(ratio / ratio[0] / abs(ratio / ratio[0]) - 1).max())
-    yield judged(claim, "Mie against miepython, worst phase but for a constant", "rad", turned, 1e-5)
+    yield judged(claim, "Mie against miepython, worst phase but for a constant", "", turned, 1e-5, **about)
     optics = rt.rcs.sphere(radius, FREQUENCY_HZ, "po")
     integral = np.array([optics_integral(float(x)) for x in ka])
     # Phases up to 2e4 rad, whose rounding alone is 4e-12.
-    yield judged(claim, "PO against its integral, worst relative", "", float(np.abs(optics / integral - 1).max()), 1e-9)
+    about["says"] = f"physical optics' closed form against its integral, {claim}: complex, relative"
+    yield judged(claim, "PO against its integral, worst relative", "", float(np.abs(optics / integral - 1).max()), 1e-9, **about)
     for (least, largest), tolerance in GO_DB.items():
         some = spread(least, largest, 40 if quick else 200)
         go = rt.rcs.sphere(some / WAVE_NUMBER, FREQUENCY_HZ, "go")
-        yield judged(f"ka {least:g} to {largest:g}", "GO against miepython, worst", "dB", decibels(go / exact(some)), tolerance)
+        claim, error = f"ka {least:g} to {largest:g}", decibels(go / exact(some))
+        about = {"says": f"geometric optics of a sphere against miepython, {claim}", "cases": len(some)}
+        yield judged(claim, "GO against miepython, worst", "dB", error, tolerance, **about)
         po = rt.rcs.sphere(some / WAVE_NUMBER, FREQUENCY_HZ, "po")
         yield reported(f"ka {least:g} to {largest:g}", "PO against miepython, worst", "dB", decibels(po / exact(some)))
 
@@ -104,13 +107,17 @@ def specular_rows(quick: bool) -> Iterator[Row]:
     claim = f"specular, ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}"
     # From 10 000 km: the largest sphere is 34 m, whose bent wavefronts take 3.4e-6 of the field; the path of 2e7 m has
     # rounding of 4e-9 m, 1e-6 rad. Both a hundred times below what is claimed of optics.
-    yield judged(claim, "against GO, worst complex", "", float(np.abs(specular(ka) / go - 1).max()), 1e-4)
+    error = float(np.abs(specular(ka) / go - 1).max())
+    says = f"a sphere by `specular` against geometric optics, ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}: complex, relative"
+    yield judged(claim, "against GO, worst complex", "", error, 1e-4, says=says, cases=n)
     some = spread(LEAST_OPTICAL_KA, 12.6, n)
     yield reported("specular, ka 5 to 12.6", "against miepython, worst", "dB", decibels(specular(some) / exact(some)))
     for (least, largest), tolerance in GO_DB.items():
         some = spread(least, largest, n)
         error = decibels(specular(some) / exact(some))
-        yield judged(f"specular, ka {least:g} to {largest:g}", "against miepython, worst", "dB", error, tolerance)
+        says = f"a sphere by `specular` against miepython, ka {least:g} to {largest:g}"
+        claim = f"specular, ka {least:g} to {largest:g}"
+        yield judged(claim, "against miepython, worst", "dB", error, tolerance, says=says, cases=n)
 
 
 def draw(_: list[Row], path: Path) -> None:
