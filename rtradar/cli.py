@@ -95,6 +95,17 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument(
         "--tolerance-complex", type=_number, metavar="X", help="of auto: rms error of the field that will do, over its rms"
     )
+    run.add_argument(
+        "--clutter-removal",
+        choices=("none", "mean", "exponential", "mti"),
+        default="none",
+        help="what takes static clutter out before Doppler (default: none)",
+    )
+    run.add_argument(
+        "--body-material", choices=("perfect-conductor", "skin"), default="perfect-conductor", help="(default: perfect-conductor)"
+    )
+    run.add_argument("--order", type=_whole, default=1, metavar="N", help="most walls on the way of an echo, 0 to 3 (default: 1)")
+    run.add_argument("--keep-all", action="store_true", help="model walls, furniture and paths though they stay below the noise")
     run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
     _add_capture(run)
     run.set_defaults(command=_run)
@@ -159,7 +170,16 @@ def _run(options: argparse.Namespace) -> int:
 
     dials = {name: getattr(options, name) for name in ("tolerance_db", "tolerance_complex")}
     dials = {name: value for name, value in dials.items() if value is not None}
-    result = run(**capture, fidelity=options.fidelity, save_if=options.save_if, dials=dials)
+    result = run(
+        **capture,
+        fidelity=options.fidelity,
+        save_if=options.save_if,
+        dials=dials,
+        clutter_removal=options.clutter_removal,
+        body_material=options.body_material,
+        order=options.order,
+        keep_all=options.keep_all,
+    )
     if options.json is not None:
         _write_json(options.json, result.summary)
     said = result.summary

@@ -25,11 +25,16 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
+from rtradar.pipeline.indoors import check_indoors, indoors, skinned
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products
+from rtradar.pipeline.received import ReceivedWindow
+from rtradar.pipeline.room import RoomIf
+from rtradar.pipeline.room_pictures import draw_room_pictures
 from rtradar.pipeline.survey import Survey, survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low, peak_memory_mb
 from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
+from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.scatter import Accountable, Rung, build_rung
@@ -80,6 +85,10 @@ def run(
     save_if: bool = False,
     noise_power_m2: float | None = None,
     dials: Mapping[str, Any] | None = None,
+    clutter_removal: str = "none",
+    body_material: str = "perfect-conductor",
+    order: int = 1,
+    keep_all: bool = False,
 ) -> Result:
     """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
 
@@ -114,6 +123,14 @@ def run(
         Noise power per sample [m^2], in place of ``snr_db``: for runs that shall share it.
     dials : mapping, optional
         Of the rung, such as ``{"shadow_rays": 256}`` of ``fresnel``; its class documents them.
+    clutter_removal : {"none", "mean", "exponential", "mti"}
+        What takes static clutter out before Doppler; `rtradar.process.clutter` tells of each.
+    body_material : {"perfect-conductor", "skin"}
+        Of the person.
+    order : int
+        Most walls, floors and ceilings on the way of an echo.
+    keep_all : bool
+        Whether paths, walls and furniture are kept though they stay below the noise.
 
     Returns
     -------
@@ -132,8 +149,13 @@ def run(
     forget_peak_memory()
     scene = scene or Scene()
     _check(snr_db, pfa, seed)
+    removal = make_removal(clutter_removal, radar)
+    walled = bool(scene.walls or scene.furniture)
     with stages.time("motion"):
-        body = Body.from_motion(place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg))
+        radar = scene.place(radar)
+        heading = heading_deg + scene.heading_deg
+        placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading)
+        body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
     n_cycles = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
     n_chirps = n_cycles * radar.n_tx
     windows = radar.window_starts(n_chirps)
@@ -143,7 +165,9 @@ def run(
             f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
         )
     warm = time.perf_counter()
-    rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}))
+    if walled:
+        check_indoors(fidelity, scene, spreading)
+    rung = _alone(fidelity, radar, body, variant, spreading, dials or {}, body_material)
     _warm_up(rung, radar)
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
@@ -152,13 +176,34 @@ def run(
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = Noise.for_snr(surveyed.power, snr_db, seed) if noise_power_m2 is None else Noise(noise_power_m2, seed)
-    title = f"{motion.name}, {radar.name}, {fidelity}"
+    title = f"{motion.name}, {radar.name}, {fidelity}" + (f", {scene.name}" if walled else "")
+    inside = None
+    if walled:
+        with stages.time("room"):
+            inside = indoors(
+                radar,
+                body,
+                scene,
+                fidelity=fidelity,
+                variant=variant,
+                material=body_material,
+                order=order,
+                seed=seed,
+                n_chirps=n_chirps,
+                person_power_m2=surveyed.power,
+                noise_power_m2=noise.power,
+                keep_all=keep_all,
+            )
+        rung = inside.rung
+    received = ReceivedWindow(radar, int(windows[len(windows) // 2])) if clutter_removal != "none" else None
     give_back_memory()  # what compiling and the pass over the whole recording took
     with all_or_nothing(Path(out)) as folder:
-        products = Products(folder / "maps.h5", radar, pfa=pfa, seed=seed, stages=stages, title=title)
+        products = Products(
+            folder / "maps.h5", radar, pfa=pfa, seed=seed, stages=stages, title=title, removal=removal, received=received
+        )
         try:
             kept = _if_array(folder / "if.zarr", radar, n_chirps) if save_if else None
-            _stream(radar, rung, noise, products, stages, n_chirps, kept, title)
+            _stream(radar, rung, inside.room if inside else None, noise, products, stages, n_chirps, kept, title)
             clouds = products.finish()
         finally:
             products.close()
@@ -171,6 +216,8 @@ def run(
             save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
         with stages.time("pictures"):
             pictures = draw_pictures(folder, radar, clouds, title)
+            if inside:
+                pictures |= draw_room_pictures(folder, radar, body, scene, inside, title)
         capture_s = n_chirps * radar.chirp_duration_s
 
         def cost() -> dict[str, Any]:
@@ -197,6 +244,10 @@ def run(
                 "variant": variant,
                 "spreading": spreading,
                 "dials": dict(dials or {}),
+                "clutter_removal": clutter_removal,
+                "body_material": body_material,
+                "order": order,
+                "keep_all": keep_all,
                 "radar": dataclasses.asdict(radar),
             },
             "seed": seed,
@@ -216,6 +267,7 @@ def run(
             "noise_power_m2": noise.power,
             "limits": _limits(surveyed, [str(warning.message) for warning in caught]),
             **({"modelled": rung.account()} if isinstance(rung, Accountable) else {}),
+            **({"room": inside.account} if inside else {}),
         }
         with stages.time("report"):
             write_report(
@@ -233,7 +285,15 @@ def run(
 
 
 def _stream(
-    radar: Radar, rung: Rung, noise: Noise, products: Products, stages: Stages, n_chirps: int, kept: Any, title: str
+    radar: Radar,
+    rung: Rung,
+    room: RoomIf | None,
+    noise: Noise,
+    products: Products,
+    stages: Stages,
+    n_chirps: int,
+    kept: Any,
+    title: str,
 ) -> None:
     """Echoes a hop of the windows at a time, and from them IF samples, noise and range spectra by smaller pieces."""
     block = math.ceil(radar.frame_hop_s / radar.cycle_duration_s) * radar.n_tx
@@ -242,6 +302,9 @@ def _stream(
     def spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
         with stages.time("signal"):
             samples = synthesize(echoes, radar, radar.chirp_times(len(echoes.tx), first), dtype=np.complex64)
+        if room is not None:
+            with stages.time("clutter"):
+                samples += room.clutter_if(np.arange(first, first + len(samples)))
         with stages.time("noise"):
             noise.add(samples, radar, first)
         if kept is not None:
@@ -265,6 +328,15 @@ def _chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     """Those of some chirps of the block."""
     chirps = slice(begin, end)
     return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
+
+
+def _alone(
+    fidelity: str, radar: Radar, body: Body, variant: str, spreading: bool, dials: Mapping[str, Any], material: str
+) -> Rung:
+    """The person without the room."""
+    if material == "perfect-conductor":
+        return build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **dials)
+    return skinned(fidelity, radar, body, variant, spreading, material)
 
 
 def _check(snr_db: float, pfa: float, seed: int) -> None:

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, UniformSample, spatial_points
+from rtradar.pipeline.received import ReceivedWindow
 from rtradar.pipeline.store import MapStore
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     SPECTROGRAM_CYCLES,
+    AngleSpectra,
+    ClutterRemoval,
     SlidingSpectrogram,
     SlidingWindows,
     angle_grid,
@@ -63,6 +66,10 @@ class Products:
         Where the time goes.
     title : str
         Of the file.
+    removal : ClutterRemoval
+        Applied before Doppler, and to all that is made of the spectra but for the mean, which knows windows only.
+    received : ReceivedWindow, optional
+        A window whose map is kept as it was before the removal.
 
     Attributes
     ----------
@@ -70,8 +77,19 @@ class Products:
         Chirps to take at once, so that memory stays low.
     """
 
-    def __init__(self, path: Path, radar: Radar, *, pfa: float, seed: int, stages: Stages, title: str) -> None:
-        self._radar, self._pfa, self._stages = radar, pfa, stages
+    def __init__(
+        self,
+        path: Path,
+        radar: Radar,
+        *,
+        pfa: float,
+        seed: int,
+        stages: Stages,
+        title: str,
+        removal: ClutterRemoval,
+        received: ReceivedWindow | None = None,
+    ) -> None:
+        self._radar, self._pfa, self._stages, self._removal, self._received = radar, pfa, stages, removal, received
         self._windows, self._spectrogram = SlidingWindows(radar), SlidingSpectrogram(radar)
         self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
         axes = {
@@ -94,13 +112,19 @@ class Products:
         A block that is cut after any multiple of ``piece`` chirps gives the same as the whole.
         """
         radar, stages, store = self._radar, self._stages, self._store
+        if self._received is not None and (cube := self._received.push(spectra, first)) is not None:
+            self._keep_received(cube, self._received.start_cycle)
+        with stages.time("clutter removal"):
+            spectra = self._removal.block(spectra, first)
         with stages.time("range"):
             power, times = range_time(spectra, radar, first_chirp=first, step_s=_RANGE_TIME_S)
             store.extend("slow_time", times, range_time=power)
         with stages.time("spectrogram"):
             columns = self._spectrogram.push(spectra)
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
-        for _, start, cube in self._windows.push(spectra):
+        for _, start, window in self._windows.push(spectra):
+            with stages.time("clutter removal"):
+                cube = self._removal.window(window)
             with stages.time("doppler"):
                 power = power_map(cube, radar)
             with stages.time("cfar"):
@@ -114,13 +138,30 @@ class Products:
                 angles = {name: values[None] for name, values in maps.items()}
                 store.extend("time", [middle], range_doppler=power[None], detections=mask[None], **angles)
 
-    def _angles(self, cube: NDArray[np.complex64], mask: NDArray[np.bool_], middle: float) -> dict[str, NDArray[np.floating]]:
-        if not self._angle_names:
-            return {}
+    def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
+        radar = self._radar
+        with self._stages.time("received"):
+            power = power_map(cube, radar)
+            mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
+            kept = {"range_doppler_received": power, "detections_received": mask}
+            if "azimuth" in self._angle_names:
+                kept["range_azimuth_received"] = range_azimuth(self._spectra(cube, mask), radar)
+            self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
+
+    def _spectra(self, cube: NDArray[np.complexfloating], mask: NDArray[np.bool_]) -> AngleSpectra:
+        """Angle spectra of the detected cells of one window."""
         radar = self._radar
         rows, columns = np.nonzero(mask)
         velocity = radar.velocity_mps(radar.cycles_per_frame)
-        spectra = angle_spectra(cell_spectra(cube, radar, rows, columns), radar, radar.range_m[rows], velocity[columns])
+        return angle_spectra(cell_spectra(cube, radar, rows, columns), radar, radar.range_m[rows], velocity[columns])
+
+    def _angles(
+        self, cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], middle: float
+    ) -> dict[str, NDArray[np.floating]]:
+        if not self._angle_names:
+            return {}
+        radar = self._radar
+        spectra = self._spectra(cube, mask)
         found = spatial_points(spectra, radar, middle)
         self._spatial.add(np.column_stack([found.points, found.velocity, found.power, found.time]))
         makers = {"azimuth": range_azimuth, "elevation": range_elevation}

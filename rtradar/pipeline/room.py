@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.clutter_shadow import ClutterShadow, Shares, smooth
+from rtradar.scatter.clutter_shadow import ClutterShadow, Hidden, smooth
 from rtradar.signal import synthesize
 
 _Samples = NDArray[np.complex128]
@@ -42,6 +42,11 @@ class RoomIf:
         self._shadow = ClutterShadow(clutter, body, variant=variant) if body is not None and clutter.objects else None
         self._lost: dict[int, _Samples] = {}
 
+    @property
+    def power_m2(self) -> float:
+        """Mean power of the room's IF samples with nobody there [m^2]."""
+        return float((np.abs(self._whole) ** 2).mean())
+
     def clutter_if(self, chirps: NDArray[np.int64]) -> NDArray[np.complex64]:
         """IF samples of the room at these chirps.
 
@@ -63,44 +68,53 @@ class RoomIf:
         anchors = chirps // step
         for anchor in np.unique(anchors).tolist():
             inside = np.flatnonzero(anchors == anchor)
-            share = smooth(chirps[inside] - anchor * step, step)
+            share = smooth(chirps[inside] - anchor * step, step).astype(np.float32)
             before = self._hidden(anchor)
             after = self._hidden(anchor + 1) if (share > 0).any() else before
-            if before is after:
-                out[inside] = (self._whole - before)[tx[inside]]
-            else:
-                kept, changed = self._whole - before, after - before
-                out[inside] = kept[tx[inside]] - share[:, None, None] * changed[tx[inside]]
+            kept, changed = ((first - second).astype(np.complex64) for first, second in ((self._whole, before), (before, after)))
+            own = kept[tx[inside]]
+            if before is not after:
+                own += share[:, None, None] * changed[tx[inside]]
+            out[inside] = own
         return out
 
     def _hidden(self, anchor: int) -> _Samples:
         """IF of one cycle of what the body hides at an anchor, (tx, rx, sample)."""
         if anchor not in self._lost:
             assert self._shadow is not None
-            shares = self._shadow.hidden(anchor)
-            lost, then = np.zeros_like(self._whole), tuple(np.zeros_like(share) for share in shares)
-            if anchor - 1 in self._lost and any(share.any() for share in shares):
+            now = self._shadow.hidden(anchor)
+            lost = np.zeros_like(self._whole)
+            then = Hidden(now.echo[:0], now.share[..., :0])
+            # From scratch where nothing is hidden: then the room is exactly as it is without a person.
+            if anchor - 1 in self._lost and len(now.echo):
                 lost, then = self._lost[anchor - 1], self._shadow.hidden(anchor - 1)
-            lost = self._changed(lost, then, shares)
+            lost = self._changed(lost, then, now)
             self._lost = {key: value for key, value in self._lost.items() if key == anchor - 1} | {anchor: lost}
         return self._lost[anchor]
 
-    def _changed(self, lost: _Samples, before: Shares, after: Shares) -> _Samples:
-        changed = lost
-        for echoes, old, new in zip(self._cycle, before, after, strict=True):
-            which = (old != new).any(axis=(0, 1))
-            if which.any():
-                share = new[..., which].astype(np.float64) - old[..., which]
-                changed = changed + self._synthesized(
+    def _changed(self, lost: _Samples, then: Hidden, now: Hidden) -> _Samples:
+        assert self._shadow is not None
+        echoes = np.union1d(then.echo, now.echo)
+        change = np.zeros((*self._whole.shape[:2], len(echoes)))
+        change[..., np.searchsorted(echoes, now.echo)] = now.share
+        change[..., np.searchsorted(echoes, then.echo)] -= then.share
+        differs = (change != 0).any(axis=(0, 1))
+        echoes, change = echoes[differs], change[..., differs]
+        starts = self._shadow.starts
+        lost = lost.copy()
+        for index, (first, last) in enumerate(zip(*np.searchsorted(echoes, [starts[:-1], starts[1:]]), strict=True)):
+            if first < last:
+                which, whole = echoes[first:last] - starts[index], self._cycle[index]
+                lost += self._synthesized(
                     replace(
-                        echoes,
-                        length=echoes.length[..., which],
-                        amplitude=echoes.amplitude[..., which] * share,
-                        part=echoes.part[which],
-                        bounces=echoes.bounces[which],
+                        whole,
+                        length=whole.length[..., which],
+                        amplitude=whole.amplitude[..., which] * change[..., first:last],
+                        part=whole.part[which],
+                        bounces=whole.bounces[which],
                     )
                 )
-        return changed
+        return lost
 
     def _synthesized(self, echoes: Echoes) -> _Samples:
         return np.asarray(synthesize(echoes, self._radar, self._radar.chirp_times(self._radar.n_tx)), dtype=np.complex128)

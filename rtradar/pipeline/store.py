@@ -33,6 +33,12 @@ _MAPS = {
     "range_elevation": (("time", "range", "elevation"), np.float32, "m2", "power summed over detected cells"),
 }
 
+_SINGLE = {
+    "range_doppler_received": (("range", "velocity"), np.float32, "m2", "range_doppler of one window before clutter was removed"),
+    "detections_received": (("range", "velocity"), np.uint8, "1", "1 where OS-CFAR detects in range_doppler_received"),
+    "range_azimuth_received": (("range", "azimuth"), np.float32, "m2", "range_azimuth of that window before clutter was removed"),
+}
+
 _STEPS_A_CHUNK = 64
 """Steps of time that are written to the file together, of maps with few numbers a step."""
 
@@ -96,6 +102,15 @@ class MapStore:
             data = self._file[name]
             data.resize(len(data) + len(steps), axis=0)
             data[len(data) - len(steps) :] = steps
+
+    def put(self, time: float, **maps: ArrayLike) -> None:
+        """Maps of one moment [s], which do not grow."""
+        for name, values in maps.items():
+            axes, kind, unit, meaning = _SINGLE[name]
+            data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind))
+            data.attrs.update({"units": unit, "long_name": meaning, "time_s": time})
+            for number, axis_name in enumerate(axes):
+                data.dims[number].attach_scale(self._file[axis_name])
 
     def close(self) -> None:
         """Write what is held, and let the file go; may be called again."""

@@ -12,6 +12,7 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
+from rtradar.scatter.body_material import Surface
 from rtradar.scatter.poses import chirp_poses, one_echo_a_part
 
 _NO_BISECTOR = 1e-24  # square of the sum of two opposite unit vectors, as rounding leaves it
@@ -134,10 +135,26 @@ class Analytic:
         Range of the centre and plane waves over the array instead of the specular range to each antenna.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
+    material : {"perfect-conductor", "skin"}
+        Of the body.
+
+    Raises
+    ------
+    InputError
+        Where a body is not made of that, or it is not known over the sweep.
     """
 
-    def __init__(self, radar: Radar, body: Body, *, paper: bool = False, spreading: bool = True) -> None:
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        paper: bool = False,
+        spreading: bool = True,
+        material: str = "perfect-conductor",
+    ) -> None:
         self._radar, self._body, self._paper, self._spreading = radar, body, paper, spreading
+        self._surface = Surface(material, radar)
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -147,4 +164,5 @@ class Analytic:
             length, amplitude = plane_wave_echo(self._radar, *at[1:], spreading=self._spreading)
         else:
             length, amplitude = far_field_echo(*at[1:], spreading=self._spreading)
-        return one_echo_a_part(at.tx_index, length, amplitude, self._radar.centre_frequency_hz)
+        echo = self._surface.echo(at, amplitude)
+        return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)

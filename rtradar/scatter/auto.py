@@ -165,11 +165,13 @@ class Auto:
         weights[LEFT_OUT] = 0
         return weights, cut
 
-    def _at_edges(self, time: float) -> NDArray[np.bool_]:
-        """Parts (part,) that go by `fresnel` within one instant of a time [s]."""
+    def _hiders(self, time: float) -> NDArray[np.bool_]:
+        """What may stand before the parts that go by `fresnel` within an instant or two of a time [s], (part, part)."""
         before = int(time / self._radar.chirp_duration_s) // self._step
-        instants = (self._plan(max(0, before + i)) for i in (-1, 0, 1, 2))
-        return np.asarray(np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0))
+        instants = [self._plan(max(0, before + i)) for i in (-1, 0, 1, 2)]
+        edges = np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
+        hiders = np.any([planned.told.hiders[row] for planned, row in instants], axis=0)
+        return np.asarray(hiders & edges[:, None])
 
     def _plan(self, instant: int) -> tuple[Planned, int]:
         """The chunk of instants that holds this one, and its row."""
@@ -235,8 +237,8 @@ class Auto:
     @property
     def _zones(self) -> ZoneShares:
         if "zones" not in self._tools:
-            of = (self._radar, self._body, self._tracer(), sweep_nodes(self._radar), SHADOW_RAYS)
-            self._tools["zones"] = ZoneShares(*of, wanted=self._at_edges)
+            of = (self._radar, self._body, None, sweep_nodes(self._radar), SHADOW_RAYS)
+            self._tools["zones"] = ZoneShares(*of, hiders=self._hiders)
         tool: ZoneShares = self._tools["zones"]
         return tool
 

@@ -46,7 +46,8 @@ class Forecast(NamedTuple):
 
     ``true (time, part)`` power [m^2]; ``power (time, way, part)`` that each way would give; ``wrong (time, way, part)``
     squared complex error of each way [m^2], without ``optics (time, way, part)``, what curvature adds to it; ``in_view``
-    and ``hidden (time, part)`` bool: wholly, or so that neither mirror point nor zones are seen.
+    and ``hidden (time, part)`` bool: wholly, or so that neither mirror point nor zones are seen; ``hiders (time, part,
+    part)`` bool: what may stand before a part's zones, hidden first, as seen from any antenna.
     """
 
     true: NDArray[np.float64]
@@ -55,6 +56,7 @@ class Forecast(NamedTuple):
     optics: NDArray[np.float64]
     in_view: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
+    hiders: NDArray[np.bool_]
 
 
 def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
@@ -84,7 +86,7 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     turned = (far * np.exp(1j * wavenumber * (far_length - length))).reshape(times, pairs, parts)
     near = near.reshape(times, pairs, parts)
 
-    share, seen, radius = _views(radar, poses, wavenumber)
+    share, seen, radius, hiders = _views(radar, poses, wavenumber)
     free = (near**2).mean(axis=1)
     true = free * np.abs(share) ** 2
     power = np.zeros((times, len(WAYS), parts))
@@ -100,13 +102,13 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     wrong[:, FRESNEL] = free * (_AT_AN_EDGE * cut) ** 2
     wrong[:, PHYSICAL_OPTICS] = true * _INTERPOLATED**2
     in_view = np.abs(share - 1) < 1 - _IN_VIEW
-    return Forecast(true, power, wrong, optics, in_view & seen, ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW))
+    return Forecast(true, power, wrong, optics, in_view & seen, ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW), hiders)
 
 
 def _views(
     radar: Radar, poses: Poses, wavenumber: float
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64]]:
-    """From the middle of the array (time, part): share V, whether the mirror point is seen, mean radius of curvature [m]."""
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64], NDArray[np.bool_]]:
+    """From the middle of the array (time, part): share V, mirror point seen, mean radius of curvature [m]; and who may hide."""
     times, parts = poses.centres.shape[:2]
     eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
     eyes = np.tile(eye, (times, 1))
@@ -125,8 +127,12 @@ def _views(
     centres, frames, semi_axes = (np.ascontiguousarray(array) for array in poses)
     _clearances(eye, points, centres, frames, semi_axes, clearance)
     seen = np.asarray((clearance > 0).all(axis=2))
-    # A ray moved by the reach comes nearer to another unit sphere by at most that over its shortest semi-axis.
-    hiders = clearance < reach[..., None] / poses.semi_axes.min(axis=1)
+    # A ray moved by so much comes nearer to another unit sphere by at most that over its shortest semi-axis: the reach, and
+    # as much of the way to the farthest antenna as is left where it passes the other part.
+    array = np.linalg.norm(np.concatenate([radar.tx, radar.rx]) - eye, axis=1).max()
+    apart = np.linalg.norm(points[:, :, None] - poses.centres[:, None], axis=-1) + poses.semi_axes.max(axis=1)
+    moved = reach[..., None] + array * np.minimum(apart / distance[..., None], 1.0)
+    hiders = np.asarray(clearance < moved / poses.semi_axes.min(axis=1))
     share = np.ones((times, parts), dtype=np.complex128)
     pose, part = np.nonzero(hiders.any(axis=2))
     if len(pose):
@@ -136,7 +142,7 @@ def _views(
         zone = (here, here, points[pose, part], part.astype(np.int64), pose.astype(np.int64))
         found = zone_shares(*zone, (centres, frames, semi_axes), here[:, None], one, hiders[pose, part], k[:, None], k)
         share[pose, part] = found[:, 0, 0]
-    return share, seen, np.asarray(np.sqrt(smaller * larger))
+    return share, seen, np.asarray(np.sqrt(smaller * larger)), hiders
 
 
 @njit(cache=True, error_model="numpy", parallel=True)

@@ -105,21 +105,21 @@ class ZoneShares:
         Where shares are wanted [Hz].
     shadow_rays : int
         Points on each part that are traced.
-    wanted : callable, optional
-        ``wanted(time)``: of which parts (part,) bool shares are wanted 20 ms before or after a time [s]; 1 is given for
-        the others. None: of all.
+    hiders : callable, optional
+        ``hiders(time)``: which parts may stand before others (part, part) bool, hidden first, at an anchor and 10 ms after
+        [s], in place of the tracer's answer; parts with none are in full view. None: ask the tracer.
     """
 
     def __init__(
         self,
         radar: Radar,
         body: Body,
-        tracer: BodyTracer,
+        tracer: BodyTracer | None,
         frequency: NDArray[np.float64],
         shadow_rays: int,
-        wanted: Callable[[float], NDArray[np.bool_]] | None = None,
+        hiders: Callable[[float], NDArray[np.bool_]] | None = None,
     ) -> None:
-        self._radar, self._body, self._tracer, self._shadow_rays, self._wanted = radar, body, tracer, shadow_rays, wanted
+        self._radar, self._body, self._tracer, self._shadow_rays, self._told = radar, body, tracer, shadow_rays, hiders
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, _TX_NODES, _RX_NODES)
         self._step = anchor_step(radar)
@@ -147,16 +147,16 @@ class ZoneShares:
 
     def hiders(self, time: float) -> NDArray[np.bool_]:
         """Which parts rays meet before others at one time [s], for any antenna: (part, part), hidden first."""
+        if self._told is not None:
+            return self._told(time)
+        assert self._tracer is not None, "ZoneShares: neither a tracer nor hiders"
         centres, frames, semi_axes = self._body.at(np.array([time]))
-        found = np.zeros((len(semi_axes),) * 2, dtype=bool)
-        parts = np.arange(len(semi_axes)) if self._wanted is None else np.flatnonzero(self._wanted(time))
-        if len(parts):
-            self._tracer.pose(centres[0], frames[0])
-            tx, rx, points, k = (array[parts] for array in self._zones(centres, frames, semi_axes))
-            rays = zone_rays(tx, rx, centres[0, parts], frames[0, parts], semi_axes[parts], points[:, 0], k, self._shadow_rays)
-            antennas = np.broadcast_to(self._nodes.antennas, (len(parts), *self._nodes.antennas.shape))
-            found[parts] = hiding_parts(self._tracer, antennas, rays, parts, len(semi_axes))
-        return found
+        self._tracer.pose(centres[0], frames[0])
+        parts = np.arange(len(semi_axes))
+        tx, rx, points, k = self._zones(centres, frames, semi_axes)
+        rays = zone_rays(tx, rx, centres[0], frames[0], semi_axes, points[:, 0], k, self._shadow_rays)
+        antennas = np.broadcast_to(self._nodes.antennas, (len(parts), *self._nodes.antennas.shape))
+        return hiding_parts(self._tracer, antennas, rays, parts, len(parts))
 
     def shares(self, times: NDArray[np.float64], hiders: NDArray[np.bool_]) -> NDArray[np.complex128]:
         """Shares (time, frequency, pair, part) at these times (time,) [s] behind ``hiders (part, part)``."""

@@ -25,7 +25,7 @@ _KEPT_ANCHORS = 2048
 
 
 class Anchor(NamedTuple):
-    """One traced pose: ``visible (tx, rx, part)`` bool, ``start (part, 3)`` where rays met each part, NaN if none did [m]."""
+    """One pose: ``visible (tx, rx, part)`` bool, ``start (part, 3)`` the mirror point of one pair in the part's axes [m]."""
 
     visible: NDArray[np.bool_]
     start: NDArray[np.float64]
@@ -34,13 +34,12 @@ class Anchor(NamedTuple):
 def trace_anchor(tracer: BodyTracer, at: ChirpPoses) -> Anchor:
     """Trace one pose, given with one chirp for each Tx.
 
-    Rays from each antenna toward each part find where the search for the mirror point begins; rays from Tx and Rx to
-    the mirror point of each pair find whether another part stands in the way of either leg.
+    Whether another part stands in the way of either leg is asked from Tx and Rx to the mirror point of each pair. One of
+    these points is where the search for those of the chirps after it begins.
     """
     tracer.pose(at.centres[0], at.frames[0])
-    start = _traced_starts(tracer, at)
-    starts = np.broadcast_to(start, at.centres.shape)
-    _, _, points = mirror(at.tx, at.rx, at.centres, at.frames, at.semi_axes, start=starts, points=True)
+    _, _, points = mirror(at.tx, at.rx, at.centres, at.frames, at.semi_axes, points=True)
+    start = np.einsum("pji,pj->pi", at.frames[0], points[0, 0] - at.centres[0])
     return Anchor(unobstructed(tracer, at.tx, at.rx, points), start)
 
 
@@ -64,25 +63,9 @@ def unobstructed(
     """
     own = np.broadcast_to(np.arange(points.shape[2]), points.shape[:3]).ravel()
     targets = points.reshape(-1, 3)
-    seen = np.ones(len(targets), dtype=bool)
-    for antennas in (np.broadcast_to(tx[:, None, None], points.shape), np.broadcast_to(rx[:, :, None], points.shape)):
-        origins = antennas.reshape(-1, 3)
-        hits = tracer.first_hits(origins, targets)
-        # The part's own mesh may miss the ray at its rim, or lie a hair behind the point: only others can hide it.
-        nearer = hits.distance < np.linalg.norm(targets - origins, axis=1) * (1 - 1e-7)
-        seen &= ~((hits.part != own) & nearer)
-    return seen.reshape(points.shape[:3])
-
-
-def _traced_starts(tracer: BodyTracer, at: ChirpPoses) -> NDArray[np.float64]:
-    antennas = np.unique(np.concatenate([at.tx, at.rx.reshape(-1, 3)]), axis=0)
-    parts = at.centres.shape[1]
-    origins = np.repeat(antennas, parts, axis=0)
-    hits = tracer.first_hits(origins, np.tile(at.centres[0], (len(antennas), 1)))
-    own = hits.part == np.tile(np.arange(parts), len(antennas))
-    local = np.where(own[:, None], hits.local, np.nan).reshape(len(antennas), parts, 3)
-    counts = own.reshape(len(antennas), parts).sum(axis=0)
-    return np.where(counts[:, None] > 0, np.nansum(local, axis=0) / np.maximum(counts, 1)[:, None], np.nan)
+    legs = (np.broadcast_to(tx[:, None, None], points.shape), np.broadcast_to(rx[:, :, None], points.shape))
+    from_tx, from_rx = (tracer.sees(antennas.reshape(-1, 3), targets, own) for antennas in legs)
+    return (from_tx & from_rx).reshape(points.shape[:3])
 
 
 class _KeptAnchors:
@@ -160,7 +143,7 @@ class MirrorVisibility:
         weight : (chirp, rx, part) float64
             1 seen, 0 hidden, in between on the ramp between two anchors that differ.
         start : (chirp, part, 3) float64
-            Where rays met each part at the anchor before, in the part's axes, NaN where none did [m].
+            Mirror point of one pair at the anchor before, in the part's axes [m].
         """
         chirps = np.asarray(chirps, dtype=np.int64)
         parts = len(self._body.part_names)

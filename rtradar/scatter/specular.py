@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
+from rtradar.scatter.body_material import Surface
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.poses import chirp_poses, one_echo_a_part
@@ -26,10 +27,26 @@ class Specular:
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
+    material : {"perfect-conductor", "skin"}
+        Of the body.
+
+    Raises
+    ------
+    InputError
+        Where a body is not made of that, or it is not known over the sweep.
     """
 
-    def __init__(self, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True) -> None:
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        material: str = "perfect-conductor",
+    ) -> None:
         self._radar, self._body, self._spreading = radar, body, spreading
+        self._surface = Surface(material, radar)
         backend = select(variant)
         self.variant: str | None = backend.kind
         self.visibility = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))
@@ -39,4 +56,5 @@ class Specular:
         at = chirp_poses(self._radar, self._body, chirps)
         weight, start = self.visibility.at(chirps)
         length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
-        return one_echo_a_part(at.tx_index, length, amplitude * weight, self._radar.centre_frequency_hz)
+        echo = self._surface.echo(at, amplitude * weight)
+        return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)

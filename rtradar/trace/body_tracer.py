@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene
+from rtradar.trace.sightlines import DOUBTFUL, clearances
 
 SUBDIVISIONS = 4
 """5120 triangles a part: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it. Instances make them free."""
@@ -59,6 +60,8 @@ class BodyTracer:
         self._parameters = mi.traverse(self._scene)
         self._centre = np.zeros(3)
         self._ball = 0.0
+        self._pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._waiting = False
         self._part_of: Any
         shapes = sorted(self._scene.shapes(), key=lambda shape: shape.id())
         if self._scalar:
@@ -71,7 +74,17 @@ class BodyTracer:
             self._part_of[registry] = np.arange(len(registry))
 
     def pose(self, centres: NDArray[np.float64], frames: NDArray[np.float64]) -> None:
-        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes."""
+        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes; Mitsuba hears of it by the first ray."""
+        self._pose, self._waiting = (centres, frames), True
+
+    def _place(self) -> None:
+        """See to it that Mitsuba has the pose."""
+        if self._pose is None:
+            raise RuntimeError("BodyTracer: pose the body before rays are sent")
+        if not self._waiting:
+            return
+        centres, frames = self._pose
+        self._waiting = False
         self._centre = (centres.max(axis=0) + centres.min(axis=0)) / 2
         self._ball = float((np.linalg.norm(centres - self._centre, axis=1) + self._semi_axes.max(axis=1)).max()) * 1.01
         matrices = np.zeros((len(centres), 4, 4))
@@ -80,11 +93,30 @@ class BodyTracer:
         matrices[:, 3, 3] = 1
         pose_body_scene(self._mi, self._parameters, matrices)
 
+    def sees(self, origins: NDArray[np.float64], targets: NDArray[np.float64], own: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Whether no other part stands before ``targets (ray, 3)`` on part ``own (ray,)``, seen from ``origins (ray, 3)`` [m].
+
+        Rays that pass every outline at a distance are told in closed form; Mitsuba decides the others.
+        """
+        if self._pose is None:
+            raise RuntimeError("BodyTracer: pose the body before rays are sent")
+        clear = clearances(origins, targets, own, *self._pose, self._semi_axes)
+        seen = clear > 0
+        doubtful = np.flatnonzero(np.abs(clear) < DOUBTFUL)
+        if len(doubtful):
+            starts, ends = origins[doubtful], targets[doubtful]
+            hits = self.first_hits(starts, ends)
+            # The part's own mesh may miss the ray at its rim, or lie a hair behind the point: only others can hide it.
+            nearer = hits.distance < np.linalg.norm(ends - starts, axis=1) * (1 - 1e-7)
+            seen[doubtful] = ~((hits.part != own[doubtful]) & nearer)
+        return seen
+
     def first_hits(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Hits:
         """What rays from ``origins (ray, 3)`` through ``targets (ray, 3)`` meet first; world [m]."""
         if len(origins) == 0:
             # Dr.Jit takes the process down over arrays without entries.
             return Hits(np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 3)))
+        self._place()
         directions = targets - origins
         directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         starts = origins - self._centre

@@ -58,6 +58,7 @@ class _PartTracer(BodyTracer):
         if len(origins) == 0:
             # Dr.Jit takes the process down over arrays without entries.
             return np.empty(0, dtype=np.int64), np.empty(0)
+        self._place()
         starts, ahead = into_ball(origins - self._centre, directions, self._ball)
         if self._scalar:
             part, distance, _, _ = self._trace_scalar(starts, directions)

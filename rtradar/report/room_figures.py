@@ -1,0 +1,174 @@
+"""Pictures of a room: its plan with the paths of echoes, and maps before and after static clutter is removed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from rtradar.radar import Radar
+from rtradar.report.figures import bin_edges, decibels, new_figure
+from rtradar.scene import Scene
+
+_UPRIGHT = 0.5
+"""Walls whose normals rise by less than this are drawn in a plan; the others are floors and ceilings."""
+
+
+def draw_plan(
+    path: Path,
+    scene: Scene,
+    radar: Radar,
+    track: NDArray[np.float64],
+    paths: Mapping[str, NDArray[np.float64]],
+    title: str,
+) -> None:
+    """The room from above: walls, furniture, radar, the person's way, and paths of echoes.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    scene : Scene
+    radar : Radar
+        Where it stands.
+    track : (time, 2) float64
+        Where the person's root goes [m].
+    paths : mapping of str to (point, 3) float64
+        Corners of each path from Tx to Rx [m].
+    title : str
+    """
+    figure = new_figure(10, 6)
+    axes = figure.subplots()
+    for first, last, name in walls_in_plan(scene):
+        axes.plot(*zip(first, last, strict=True), color="black", linewidth=2.5)
+        axes.annotate(name, ((first[0] + last[0]) / 2, (first[1] + last[1]) / 2), fontsize=7, color="dimgrey")
+    for piece in scene.furniture:
+        corners = piece.triangles().corners[..., :2]
+        axes.fill(corners[..., 0].T, corners[..., 1].T, color="tan", alpha=0.5, linewidth=0)
+        axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
+    for name, corners in paths.items():
+        axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
+    axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
+    axes.plot(*radar.position_m[:2], "k^", markersize=9, label="radar")
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
+    axes.set_aspect("equal")
+    axes.grid(alpha=0.3)
+    axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
+    figure.savefig(path)
+
+
+def walls_in_plan(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64], str]]:
+    """Feet of the upright walls: both ends (2,) [m] and the name."""
+    found = []
+    for wall in scene.walls:
+        if abs(float(wall.normal[2])) < _UPRIGHT:
+            corners = wall.corners[:, :2]
+            gaps = np.linalg.norm(corners[:, None] - corners[None], axis=-1)
+            one, other = np.unravel_index(int(gaps.argmax()), gaps.shape)
+            found.append((corners[one], corners[other], wall.name))
+    return found
+
+
+def draw_before_after(
+    path: Path,
+    maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.bool_]]],
+    ghosts: Sequence[tuple[str, float, float]],
+    radar: Radar,
+    title: str,
+) -> None:
+    """Range-Doppler maps with their detections, and ghosts where they are predicted.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    maps : mapping of str to ((range, velocity) float, (range, velocity) bool)
+        Power [m^2] and detections by panel.
+    ghosts : sequence of (str, float, float)
+        Path over walls, range [m] and velocity [m/s].
+    radar : Radar
+    title : str
+    """
+    figure = new_figure(1 + 5.5 * len(maps), 5)
+    panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
+    levels = {name: decibels(power) for name, (power, _) in maps.items()}
+    low, high = min(level[1] for level in levels.values()), max(level[2] for level in levels.values())
+    for axes, (name, (power, mask)) in zip(panels, maps.items(), strict=True):
+        velocity = radar.velocity_mps(power.shape[1])
+        extent = (*bin_edges(velocity), *bin_edges(radar.range_m))
+        image = axes.imshow(levels[name][0], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+        rows, columns = np.nonzero(mask)
+        axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5)
+        _mark(axes, ghosts, radar)
+        axes.set(xlabel="Velocity [m/s], positive receding", title=f"{name}: {len(rows)} detections")
+        axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
+    panels[0].set_ylabel("Range [m]")
+    figure.colorbar(image, ax=list(panels), label="Power [dB re 1 m²]")
+    figure.suptitle(title)
+    figure.savefig(path)
+
+
+def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
+    for name, distance, velocity in ghosts:
+        if distance < radar.max_range_m:
+            axes.plot(velocity, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
+            axes.annotate(name, (velocity, distance), xytext=(6, 3), textcoords="offset points", fontsize=6, color="red")
+
+
+def draw_range_azimuth_with_walls(
+    path: Path,
+    power: NDArray[np.floating],
+    azimuth: NDArray[np.float64],
+    scene: Scene,
+    radar: Radar,
+    ghosts: Sequence[tuple[str, float, float]],
+    title: str,
+) -> None:
+    """Power over azimuth and range, with upright walls drawn where they are.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    power : (range, azimuth) float
+        [m^2].
+    azimuth : (azimuth,) float64
+        [rad].
+    scene : Scene
+    radar : Radar
+    ghosts : sequence of (str, float, float)
+        Path over walls, range [m] and azimuth [rad].
+    title : str
+    """
+    figure = new_figure(8, 5.5)
+    axes = figure.subplots()
+    values, low, high = decibels(power)
+    extent = (*bin_edges(np.degrees(azimuth)), *bin_edges(radar.range_m))
+    low = max(low, high - 50)  # cells that were not detected are zero, and zero has no decibels
+    image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+    place = np.asarray(radar.position_m)
+    for first, last, name in walls_in_plan(scene):
+        along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place[:2]
+        angle, distance = np.degrees(np.arctan2(along[:, 1], along[:, 0])), np.hypot(along[:, 0], along[:, 1])
+        axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
+        inside = np.flatnonzero((angle > extent[0]) & (angle < extent[1]) & (distance < radar.max_range_m))
+        if len(inside):
+            middle = inside[len(inside) // 2]
+            axes.annotate(name, (angle[middle], distance[middle]), fontsize=8, color="white")
+    for name, distance_m, angle_rad in ghosts:
+        if distance_m < radar.max_range_m:
+            axes.plot(np.degrees(angle_rad), distance_m, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
+            axes.annotate(
+                name,
+                (np.degrees(angle_rad), distance_m),
+                xytext=(6, 3),
+                textcoords="offset points",
+                fontsize=6,
+                color="red",
+            )
+    axes.set(xlabel="Azimuth [°]", ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
+    figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")
+    figure.savefig(path)

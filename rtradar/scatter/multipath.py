@@ -1,0 +1,374 @@
+"""The person in a room: echoes over walls, floor and ceiling, and through walls, on top of the rungs `specular` and `analytic`.
+
+A leg over a wall is straight from the antenna's image, so lengths and returns of every path are those of the same geometric
+optics with images for antennas, in float64 at every chirp. What walls, polarisation, the surface of the body and shadows do to
+the field changes slowly: it is found at anchors 10 ms apart for the ends of the lines of antennas (`path_anchors`). In between
+coefficients go straight, and what appears or vanishes fades as in `occlusion`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.array_ends import ArrayEnds
+from rtradar.scatter.body_material import Surface, body_material
+from rtradar.scatter.ghost_echoes import nearby_echoes, weigh
+from rtradar.scatter.mirror import mirror
+from rtradar.scatter.occlusion import MirrorVisibility
+from rtradar.scatter.path_anchors import PathAnchors, Poses, Surroundings, path_anchors
+from rtradar.scatter.polarization import copolar
+from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
+from rtradar.scatter.wall_nodes import frequency_nodes
+from rtradar.scatter.wall_paths import WallPath, corners, images, wall_paths
+from rtradar.scene import Scene
+
+_KEPT_BYTES = 64e6
+"""Of anchors that are remembered, so that pruning and the signal trace once: 10 s of a room of six walls."""
+
+_ANCHORS_AT_ONCE = 32
+_CHIRPS_AT_ONCE = 64
+
+
+@dataclass(frozen=True)
+class PathAccount:
+    """What became of the echoes of one path.
+
+    Parameters
+    ----------
+    path : str
+        Walls in the order in which the wave meets them.
+    order : int
+        Reflections at walls.
+    power_m2 : float
+        Of all parts, averaged over rx and one chirp every 10 ms.
+    over_noise_db : float or None
+        The same over noise, after the gain of samples, cycles and channels; None without noise or without an echo.
+    kept, dropped : tuple of str
+        Body parts.
+    why : str
+        Why those were dropped; empty where none was.
+    """
+
+    path: str
+    order: int
+    power_m2: float
+    over_noise_db: float | None
+    kept: tuple[str, ...]
+    dropped: tuple[str, ...]
+    why: str
+
+    def row(self) -> dict[str, Any]:
+        """For ``summary.json``."""
+        return {**self.__dict__, "kept": list(self.kept), "dropped": list(self.dropped)}
+
+
+class Multipath:
+    """`specular` or `analytic` in a room.
+
+    Parameters
+    ----------
+    radar : Radar
+        Where it stands in the scene, see `Scene.place`.
+    body : Body
+    scene : Scene
+    variant : {"auto", "llvm", "scalar", "cuda"}
+        Mitsuba's backend, which says what furniture and body hide; `analytic` hides nothing and needs none.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    order : int
+        Most reflections at walls on both legs together; 0 leaves the direct echoes, through walls and behind furniture.
+    fidelity : {"specular", "analytic"}
+        Model of the body.
+    material : {"perfect-conductor", "skin"}
+        Of the body.
+
+    Raises
+    ------
+    InputError
+        Where spreading is off though there are walls or furniture, the order is no whole number from 0 to 3, or a material is not
+        known over the sweep.
+    BackendError
+        Where it traces and no backend of that kind works here.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        scene: Scene,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        order: int = 1,
+        fidelity: Literal["specular", "analytic"] = "specular",
+        material: str = "perfect-conductor",
+    ) -> None:
+        if not spreading and (scene.walls or scene.furniture):
+            raise InputError(f"scene '{scene.name}': spreading may be off in free space only; leave --no-spreading out")
+        if isinstance(order, bool) or order not in range(4):
+            raise InputError(f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3")
+        if fidelity not in ("specular", "analytic"):
+            raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: specular, analytic")
+        self._radar, self._body, self._spreading, self._fidelity = radar, body, spreading, fidelity
+        self.variant: str | None = None
+        self._visibility: MirrorVisibility | None = None
+        tracers = None
+        if fidelity == "specular":
+            from rtradar.scatter.path_tracer import PosedOnce
+            from rtradar.trace.backend import select, use
+            from rtradar.trace.room_tracer import RoomTracer
+
+            backend = select(variant)
+            self.variant = backend.kind
+            mi = use(backend)
+            tracer = PosedOnce(mi, body.semi_axes)
+            self._visibility = MirrorVisibility(radar, body, tracer)
+            tracers = (tracer, RoomTracer(mi, scene))
+        self._frequency = frequency_nodes(scene.walls, radar)
+        self._surface = Surface(material, radar)
+        eta = body_material(material, self._frequency).eta(self._frequency)
+        self._around = Surroundings(scene, tracers, eta, self._frequency, radar.polarization)
+        self._plain = not scene.walls and not scene.furniture and material == "perfect-conductor"
+        self._ends = ArrayEnds.of(radar)
+        self._step = anchor_step(radar)
+        self.paths: tuple[WallPath, ...] = wall_paths(scene.walls, np.asarray(radar.position_m), order)
+        parts = len(body.part_names)
+        self._path, self._part = (array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts))
+        self._kept: dict[int, PathAnchors] = {}
+
+    @property
+    def person(self) -> PersonAlone:
+        """The person without the room, by the same tracer and the same shadows."""
+        return PersonAlone(self)
+
+    @property
+    def path_names(self) -> tuple[str, ...]:
+        """Path of each echo."""
+        return tuple(self.paths[number].name for number in self._path)
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps: the direct one of each part first, then those over walls, which may be left out."""
+        chirps = np.asarray(chirps, dtype=np.int64)
+        at = chirp_poses(self._radar, self._body, chirps)
+        if self._plain:
+            length, amplitude = self._direct(chirps, at)
+            return self._as_echoes(at.tx_index, length, amplitude.astype(np.complex128)[None])
+        # First of all: while the body is posed for these, who sees the direct echoes is asked too.
+        interval, share, before, after = self._around_chirps(chirps)
+        line = self._ends.line_of_tx[at.tx_index]
+        first, last = before.start[interval, line], after.start[interval, line]
+        start = np.asarray(first + share[:, None, None] * (last - first), dtype=np.float64)
+        n_direct, n_echoes = at.centres.shape[1], len(self._part)
+        length, amplitude = self._direct(chirps, at, start[:, :n_direct])
+        shape = (len(self._frequency), *length.shape[:2])
+        lengths, bare = np.empty((*length.shape[:2], n_echoes)), np.empty((*length.shape[:2], n_echoes))
+        lengths[..., :n_direct], bare[..., :n_direct] = length, amplitude
+        if n_echoes > n_direct:
+            ghosts = slice(n_direct, n_echoes)
+            wanted = np.any(before.seen | after.seen, axis=(2, 3), keepdims=True)[interval, line, 0, 0, ghosts]
+            lengths[..., ghosts], bare[..., ghosts] = self._over_walls(at, start[:, ghosts], wanted, ghosts)
+        out = np.empty((*shape, n_echoes), dtype=np.complex128)
+        factors = [self._ends.spread(anchor.factor) for anchor in (before, after)]
+        seen = [self._ends.spread(anchor.seen.astype(np.float32)) for anchor in (before, after)]
+        weigh(bare, factors[0], factors[1], seen[0], seen[1], share, interval, at.tx_index, out)
+        return self._as_echoes(at.tx_index, lengths, out)
+
+    def course(self, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Corners (corner, 3) of a path, by its name, from the middle of the array over a point (3,) and back [m]."""
+        path = next(path for path in self.paths if path.name == name)
+        middle = np.asarray(self._radar.position_m, dtype=np.float64)
+        out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
+        return np.array([*out, *reversed(back[:-1])])
+
+    def _as_echoes(self, tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.complex128]) -> Echoes:
+        bounces = 1 + np.array([self.paths[path].order for path in self._path], dtype=np.int64)
+        return Echoes(length=length, amplitude=amplitude, frequency=self._frequency, tx=tx, part=self._part, bounces=bounces)
+
+    def _direct(
+        self, chirps: NDArray[np.int64], at: ChirpPoses, near: NDArray[np.float64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Direct echoes of a conductor; a mirror point that is expected ``near (chirp, part, 3)`` by is found in fewer steps."""
+        if self._visibility is None:
+            return far_field_echo(*at[1:], spreading=self._spreading)
+        weight, met = self._visibility.at(chirps)
+        start = met if near is None else near
+        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
+        return length, amplitude * weight
+
+    def _over_walls(
+        self, at: ChirpPoses, start: NDArray[np.float64], wanted: NDArray[np.bool_], ghosts: slice
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Lengths and returns (chirp, rx, echo) as if conductors stood alone before the images."""
+        path, part = self._path[ghosts], self._part[ghosts]
+        shape = (*at.rx.shape[:2], len(path))
+        length, amplitude = np.empty(shape), np.empty(shape)
+        if self._fidelity == "analytic":
+            for number in np.unique(path):
+                own = path == number
+                tx, rx = (images(leg, antennas) for leg, antennas in self._legs(number, at))
+                poses = (at.centres[:, part[own]], at.frames[:, part[own]], at.semi_axes[part[own]])
+                length[..., own], amplitude[..., own] = far_field_echo(tx, rx, *poses)
+            return length, amplitude
+        legs = list(dict.fromkeys(leg for path in self.paths for leg in (path.out, path.back)))
+        radar, line = self._radar, self._ends.line_of_tx
+        heard = radar.rx[radar.rx_of_tx]
+        known = np.empty(wanted.shape, dtype=bool)
+        nearby_echoes(
+            np.array([images(leg, radar.tx) for leg in legs]),
+            np.ascontiguousarray(np.swapaxes([images(leg, heard) for leg in legs], 2, 3)),
+            np.array([images(leg, self._ends.rx_middle[line]) for leg in legs]),
+            at.tx_index,
+            np.array([legs.index(self.paths[number].out) for number in path]),
+            np.array([legs.index(self.paths[number].back) for number in path]),
+            part,
+            *at[3:],
+            start,
+            wanted,
+            length,
+            amplitude,
+            known,
+        )
+        for echo in np.flatnonzero(~known.all(axis=0)):
+            chirps = np.flatnonzero(~known[:, echo])
+            tx, rx = (images(leg, antennas[chirps]) for leg, antennas in self._legs(path[echo], at))
+            own = part[echo : echo + 1]
+            poses = (at.centres[chirps][:, own], at.frames[chirps][:, own], at.semi_axes[own])
+            exact, strength, points = mirror(tx, rx, *poses, polarization=radar.polarization, points=True)
+            share = copolar(tx[:, None, None] - points, rx[:, :, None] - points, radar.polarization)
+            length[chirps, :, echo] = exact[..., 0]
+            returned = strength / np.where(np.abs(share) > 1e-6, share, np.inf)
+            # Where the body comes between the images, the mirror point ends with no number.
+            amplitude[chirps, :, echo] = np.where(np.isfinite(returned), returned, 0.0)[..., 0]
+        return length, amplitude
+
+    def _legs(self, number: int, at: ChirpPoses) -> tuple[tuple[Any, NDArray[np.float64]], ...]:
+        return (self.paths[number].out, at.tx), (self.paths[number].back, at.rx)
+
+    # -- anchors -------------------------------------------------------------------------------------------------
+
+    def _around_chirps(
+        self, chirps: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64], PathAnchors, PathAnchors]:
+        """Interval of each chirp, share of it that is over, and the anchors before and after each interval."""
+        intervals, interval = np.unique(chirps // self._step, return_inverse=True)
+        share = chirps % self._step / self._step
+        ends = np.concatenate([intervals, intervals[[bool(share[interval == i].any()) for i in range(len(intervals))]] + 1])
+        self._find(np.unique(ends))
+        before = _stack([self._kept[int(number)] for number in intervals])
+        # Where every chirp of an interval is its first, what comes after it does not matter.
+        after = _stack([self._kept.get(int(number) + 1, self._kept[int(number)]) for number in intervals])
+        return interval, share, before, after
+
+    def _find(self, numbers: NDArray[np.int64]) -> None:
+        missing = [int(number) for number in numbers if int(number) not in self._kept]
+        for first in range(0, len(missing), _ANCHORS_AT_ONCE):
+            some = missing[first : first + _ANCHORS_AT_ONCE]
+            at = chirp_poses(self._radar, self._body, np.array(some) * self._step)
+            chirps = np.array(some)[:, None] * self._step
+
+            def beside(place: int, chirps: NDArray[np.int64] = chirps) -> None:
+                if self._visibility is not None:
+                    self._visibility.at(chirps[place])
+
+            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, Poses(*at[3:]), beside)
+            for place, number in enumerate(some):
+                self._kept[number] = PathAnchors(*(array[place].copy() for array in found))
+        needed = set(numbers.tolist())
+        # The first that came stay, for a recording is gone through twice, from its start.
+        size = max((sum(array.nbytes for array in anchor) for anchor in self._kept.values()), default=1)
+        for number in [number for number in self._kept if number not in needed][int(_KEPT_BYTES / size) :]:
+            del self._kept[number]
+
+    # -- what is worth its cost ------------------------------------------------------------------------------------
+
+    def prune(self, n_chirps: int, noise_power_m2: float, *, margin_db: float = 10.0) -> tuple[PathAccount, ...]:
+        """Leave out echoes over walls that stay below the noise.
+
+        Parameters
+        ----------
+        n_chirps : int
+            Of the capture; one every 10 ms is looked at.
+        noise_power_m2 : float
+            Per IF sample; 0 leaves out only what is never seen.
+        margin_db : float
+            An echo is left out where its mean power over the capture, after the gain of adding up the samples, cycles and
+            channels of a frame, is below the noise by more. Windows, which lose 1.8 dB each as Hann's, are not counted: what is
+            left out is weaker than that.
+
+        Returns
+        -------
+        tuple of PathAccount
+            One for each path; direct echoes always stay.
+        """
+        radar = self._radar
+        power = np.zeros(len(self._part))
+        chosen = np.arange(0, n_chirps, self._step)
+        for first in range(0, len(chosen), _CHIRPS_AT_ONCE):
+            echoes = self.echoes(chosen[first : first + _CHIRPS_AT_ONCE])
+            power += (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2)).sum(axis=0)
+        power /= len(chosen)
+        gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
+        keep = (power > 0) & (power * gain >= noise_power_m2 * 10 ** (-margin_db / 10))
+        keep |= np.array([self.paths[number].order == 0 for number in self._path])
+        accounts = tuple(
+            self._account(number, keep, power, noise_power_m2 / gain, margin_db) for number in range(len(self.paths))
+        )
+        self._leave_out(keep)
+        return accounts
+
+    def _account(
+        self, number: int, keep: NDArray[np.bool_], power: NDArray[np.float64], noise: float, margin_db: float
+    ) -> PathAccount:
+        own = self._path == number
+        names = np.array(self._body.part_names, dtype=object)[self._part]
+        total = float(power[own].sum())
+        lost = own & ~keep
+        why = []
+        if (power[lost] == 0).any():
+            why.append("never seen: no mirror point in the wall, or in the shadow of furniture or body")
+        if (power[lost] > 0).any():
+            why.append(f"more than {margin_db:g} dB below the noise after processing")
+        return PathAccount(
+            self.paths[number].name,
+            self.paths[number].order,
+            total,
+            10 * math.log10(total / noise) if total > 0 and noise > 0 else None,
+            tuple(names[own & keep]),
+            tuple(names[lost]),
+            "; ".join(why),
+        )
+
+    def _leave_out(self, keep: NDArray[np.bool_]) -> None:
+        self._path, self._part = self._path[keep], self._part[keep]
+        for number, anchor in self._kept.items():
+            factor, seen, start = anchor
+            self._kept[number] = PathAnchors(factor[..., keep].copy(), seen[..., keep].copy(), start[..., keep, :].copy())
+
+
+class PersonAlone:
+    """The person of a `Multipath` in free space: the rung `specular` or `analytic`, at no further tracing."""
+
+    def __init__(self, room: Multipath) -> None:
+        self._room = room
+        self.variant = room.variant
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        room = self._room
+        at = chirp_poses(room._radar, room._body, chirps)
+        length, amplitude = room._direct(chirps, at)
+        return one_echo_a_part(at.tx_index, length, room._surface.echo(at, amplitude), room._radar.centre_frequency_hz)
+
+
+def _stack(anchors: list[PathAnchors]) -> PathAnchors:
+    return PathAnchors(*(np.stack(column) for column in zip(*anchors, strict=True)))

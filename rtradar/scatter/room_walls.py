@@ -1,0 +1,175 @@
+"""What walls do to a wave: mirror images, and the field after a reflection or a passage, as a vector.
+
+Walls are rectangles in float64, so nothing of this is traced. A wave carries its electric field as a complex 3-vector, for
+exp(+j omega t), without the phase of its straight path through air: a wall splits it into TE and TM by the plane of incidence
+and multiplies each by the coefficient of its slab. Edges are sharp: they send no diffracted wave.
+
+A wall has two faces. Its front is the rectangle itself; waves that come from behind meet the back, one thickness deeper.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.scene import Scene, Wall, slab
+
+Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+
+_NORMAL_INCIDENCE = 1e-9  # sine of incidence below which the plane of incidence has no direction of its own
+
+
+def height(wall: Wall, points: Array, *, back: bool = False) -> Array:
+    """Height of points (..., 3) [m] above the front, or above the back, away from the slab; (...) [m]."""
+    above = (np.asarray(points) - np.array(wall.corner_m)) @ wall.normal
+    return np.asarray(-above - wall.thickness_m if back else above)
+
+
+def image(wall: Wall, points: Array, *, back: bool = False) -> Array:
+    """Mirror images (..., 3) of points (..., 3) in the plane of the front, or of the back [m]."""
+    normal = -wall.normal if back else wall.normal
+    return np.asarray(points - 2 * height(wall, points, back=back)[..., None] * normal)
+
+
+def inside(wall: Wall, points: Array, margin_m: float = 0.0) -> NDArray[np.bool_]:
+    """Whether points (..., 3) [m], dropped onto the front along its normal, lie within the rectangle, or so near to it."""
+    away = np.asarray(points) - np.array(wall.corner_m)
+    within = np.ones(away.shape[:-1], dtype=bool)
+    for edge in (np.array(wall.edge_u_m), np.array(wall.edge_v_m)):
+        length = np.linalg.norm(edge)
+        along = away @ (edge / length)
+        within &= (along >= -margin_m) & (along <= length + margin_m)
+    return within
+
+
+def mirror_point(wall: Wall, origins: Array, targets: Array, *, back: bool = False) -> tuple[Array, NDArray[np.bool_]]:
+    """Where a wave from an origin to a target is reflected.
+
+    Parameters
+    ----------
+    wall : Wall
+    origins, targets : (..., 3) float64
+        World [m]; they broadcast.
+    back : bool
+        Whether the back reflects, in place of the front.
+
+    Returns
+    -------
+    point : (..., 3) float64
+        On the plane of that face [m]; NaN where the two are on different sides of it.
+    valid : (...) bool
+        Whether both stand before that face and the point lies in the rectangle.
+    """
+    origins, targets = np.broadcast_arrays(origins, targets)
+    first, second = height(wall, origins, back=back), height(wall, targets, back=back)
+    before = (first > 0) & (second > 0)
+    share = np.where(before, first, np.nan) / np.where(before, first + second, 1.0)
+    point = origins + share[..., None] * (image(wall, targets, back=back) - origins)
+    return point, before & inside(wall, point)
+
+
+def crossed(wall: Wall, origins: Array, targets: Array) -> NDArray[np.bool_]:
+    """Whether straight legs, ``origins`` to ``targets`` (..., 3) [m], pass through the slab; (...).
+
+    They do where their ends are on different sides of its middle plane, so a leg that ends on a face does not cross.
+    """
+    first, second = height(wall, origins), height(wall, targets)
+    apart = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
+    # Where they pass the front: the fronts of a room meet without a gap, the middle planes of its slabs do not.
+    share = first / np.where(apart, first - second, 1.0)
+    return np.asarray(apart & inside(wall, origins + share[..., None] * (np.asarray(targets) - origins)))
+
+
+def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike) -> Field:
+    """The field after reflection, at the face that it meets.
+
+    Parameters
+    ----------
+    wall : Wall
+        Its roughness takes exp(-2 (k s cos)^2) off the field (Ament, Proc. IRE 41 (1953) 142).
+    field : (node, ..., 3) complex
+        That arrives; (..., 3) stands for all nodes.
+    directions : (..., 3) float64
+        Unit vectors along which it travels.
+    frequency_hz : (node,) float64
+        [Hz].
+
+    Returns
+    -------
+    (node, ..., 3) complex128
+        It travels along ``directions`` mirrored in the wall, without the phase of its path.
+    """
+    normal = wall.normal
+    against = directions @ normal
+    onward = directions - 2 * against[..., None] * normal
+    cosine, frequency = np.minimum(np.abs(against), 1.0), _nodes(frequency_hz, against)
+    te, tm = (_coefficients(wall, cosine, frequency)[kind][0] for kind in (0, 1))
+    lost = np.exp(-2 * (2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.roughness_m * cosine) ** 2)
+    return _dyad(field, directions, onward, normal, te * lost, tm * lost)
+
+
+def transmit(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike) -> Field:
+    """The field behind the wall, in place of the same way through air; arguments as those of `reflect`.
+
+    The ray goes straight on: the small shift to the side is left out, its phase is not.
+    """
+    cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
+    frequency = _nodes(frequency_hz, cosine)
+    te, tm = (_coefficients(wall, cosine, frequency)[kind][1] for kind in (0, 1))
+    air = np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.thickness_m * cosine)
+    return _dyad(field, directions, directions, wall.normal, te * air, tm * air)
+
+
+def through_walls(scene: Scene, origins: Array, targets: Array, frequency_hz: ArrayLike, field: Field) -> Field:
+    """The field at the end of straight legs, through all walls on the way.
+
+    Parameters
+    ----------
+    scene : Scene
+    origins, targets : (..., 3) float64
+        Ends of the legs, world [m]; they broadcast. A leg that ends on a face of a wall does not cross it.
+    frequency_hz : (node,) float64
+        [Hz].
+    field : (node, ..., 3) complex
+        At the origins; (..., 3) stands for all nodes.
+
+    Returns
+    -------
+    (node, ..., 3) complex128
+        Without spreading and without the phase of the leg's length; 0 behind metal.
+    """
+    origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    out = np.array(np.broadcast_to(field, (len(frequency), *origins.shape)), dtype=np.complex128)
+    for wall in scene.walls:
+        legs = crossed(wall, origins, targets)
+        if legs.any():
+            ways = targets[legs] - origins[legs]
+            ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+            out[:, legs] = transmit(wall, out[:, legs], ways, frequency)
+    return out
+
+
+def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
+    """Frequencies (node, 1, ..., 1) for as many axes as ``like`` has."""
+    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
+    return frequency.reshape(-1, *(1,) * like.ndim)
+
+
+def _coefficients(wall: Wall, cosine: Array, frequency: Array) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
+    """Reflection and transmission, for TE and for TM, each (node, ...)."""
+    eta = wall.material.eta(frequency)
+    return slab(eta, wall.thickness_m, frequency, cosine, "te"), slab(eta, wall.thickness_m, frequency, cosine, "tm")
+
+
+def _dyad(field: Field, arriving: Array, leaving: Array, normal: Array, te: Field, tm: Field) -> Field:
+    across = np.cross(arriving, normal)
+    sine = np.linalg.norm(across, axis=-1, keepdims=True)
+    # Straight on, both coefficients do the same: any direction across serves.
+    spare = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    across = np.where(sine > _NORMAL_INCIDENCE, across / np.where(sine > 0, sine, 1.0), spare / np.linalg.norm(spare))
+    share_te = (field * across).sum(axis=-1) * te
+    share_tm = (field * np.cross(across, arriving)).sum(axis=-1) * tm
+    return np.asarray(share_te[..., None] * across + share_tm[..., None] * np.cross(across, leaving))

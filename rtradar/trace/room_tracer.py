@@ -1,0 +1,95 @@
+"""Ask Mitsuba whether furniture stands between two points of a room.
+
+Furniture only: walls are rectangles, and few, so they are done in closed form in float64. Mitsuba works in float32, so its
+scene is centred on the furniture, and rays start where they enter the ball around it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.scene import Scene
+
+CLEAR_M = 1e-3
+"""Both ends of a leg are drawn in by this, so that a point on a surface is not hidden by that surface: a thousand times what
+float32 is off by some 10 m from the middle."""
+
+
+class RoomTracer:
+    """The furniture of a scene, in a Mitsuba scene of its own.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    scene : Scene
+        Its walls are left out.
+    """
+
+    def __init__(self, mi: Any, scene: Scene) -> None:
+        self._mi = mi
+        self._scene: Any = None
+        self._centre, self._ball = np.zeros(3), 0.0
+        pieces = [piece.triangles() for piece in scene.furniture]
+        if pieces:
+            counts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
+            vertices = np.concatenate([piece.vertices for piece in pieces])
+            faces = np.concatenate([piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)])
+            self._centre = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
+            self._ball = float(np.linalg.norm(vertices - self._centre, axis=1).max()) * 1.01
+            mesh = mi.Mesh("furniture", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+            parameters = mi.traverse(mesh)
+            parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
+            parameters["faces"] = np.ravel(faces).astype(np.uint32)
+            parameters.update()
+            self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
+
+    def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
+        """Whether furniture stands between two points.
+
+        Parameters
+        ----------
+        origins, targets : (..., 3) float64
+            World [m]; they broadcast. Both ends are drawn in by `CLEAR_M`, so either may lie on a surface.
+
+        Returns
+        -------
+        (...) bool
+            False everywhere without furniture, and where two points are no more than twice `CLEAR_M` apart.
+        """
+        origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+        out = np.zeros(origins.shape[:-1], dtype=bool)
+        if self._scene is None or out.size == 0:
+            return out
+        starts, ways = (origins - self._centre).reshape(-1, 3), (targets - origins).reshape(-1, 3)
+        size = np.linalg.norm(ways, axis=1)
+        ways = ways / np.where(size > 0, size, 1.0)[:, None]
+        along = -np.einsum("ij,ij->i", starts, ways)
+        nearest = starts + along[:, None] * ways
+        chord = self._ball**2 - np.einsum("ij,ij->i", nearest, nearest)
+        half = np.sqrt(np.maximum(chord, 0.0))
+        first, last = np.maximum(along - half, CLEAR_M), np.minimum(along + half, size - CLEAR_M)
+        # Only legs that enter the ball have to be followed.
+        asked = np.flatnonzero((chord > 0) & (last > first))
+        met = np.zeros(len(starts), dtype=bool)
+        if len(asked):  # Dr.Jit takes the process down over arrays without entries
+            entry = starts[asked] + first[asked, None] * ways[asked]
+            met[asked] = self._met(entry, ways[asked], (last - first)[asked])
+        return met.reshape(out.shape)
+
+    def _met(self, starts: NDArray[np.float64], ways: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.bool_]:
+        mi = self._mi
+        if mi.variant().startswith("scalar"):
+            found = []
+            for start, way, limit in zip(starts.tolist(), ways.tolist(), reach.tolist(), strict=True):
+                ray = mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*way))
+                ray.maxt = limit
+                found.append(bool(self._scene.ray_test(ray)))
+            return np.array(found)
+        origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, ways))
+        ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
+        ray.maxt = mi.Float(np.ascontiguousarray(reach, dtype=np.float32))
+        return np.asarray(self._scene.ray_test(ray, coherent=False).numpy())

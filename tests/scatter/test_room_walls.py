@@ -1,0 +1,148 @@
+"""Walls in closed form: mirror points by Fermat, slab coefficients by hand, energy."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.optimize import minimize
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.scatter import room_walls as rw
+from rtradar.scene import Scene, Wall, material, own_material, slab
+
+# A tilted front, so that no axis is special.
+WALL = Wall(
+    name="wall",
+    corner_m=(1.0, -2.0, 0.0),
+    edge_u_m=(0.6, 2.8, 0.0),
+    edge_v_m=(0.0, 0.0, 2.5),
+    material=material("plasterboard"),
+    thickness_m=0.0125,
+)
+METAL = Wall(
+    name="metal",
+    corner_m=(1.0, -2.0, 0.0),
+    edge_u_m=(0.6, 2.8, 0.0),
+    edge_v_m=(0.0, 0.0, 2.5),
+    material=material("perfect-conductor"),
+    thickness_m=0.01,
+)
+MIDDLE = WALL.corners.mean(axis=0)
+coordinate = st.floats(-1.0, 1.0)
+
+
+def wave(seed: int) -> tuple[np.ndarray, np.ndarray]:
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=3)
+    direction /= np.linalg.norm(direction)
+    field = np.cross(direction, rng.normal(size=3)) + 1j * np.cross(direction, rng.normal(size=3))
+    return direction, field
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_the_mirror_point_is_the_shortest_way_over_the_face(back: bool) -> None:
+    side = -1 if back else 1
+    tx, rx = (MIDDLE + side * away * WALL.normal + [0.1 * away, 0.2, shift] for away, shift in ((1.5, 0.4), (0.7, -0.3)))
+    point, valid = rw.mirror_point(WALL, tx, rx, back=back)
+    corner = WALL.corners[0] - (WALL.thickness_m if back else 0) * WALL.normal
+    u, v = np.array(WALL.edge_u_m), np.array(WALL.edge_v_m)
+
+    def way(share: np.ndarray) -> float:
+        place = corner + share[0] * u + share[1] * v
+        return float(np.linalg.norm(tx - place) + np.linalg.norm(rx - place))
+
+    found = minimize(way, [0.5, 0.5], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15})
+    assert valid
+    # The least way is known to 1e-15 m, its place to the root of that.
+    np.testing.assert_allclose(point, corner + found.x[0] * u + found.x[1] * v, atol=1e-6)
+    length = np.linalg.norm(rw.image(WALL, tx, back=back) - rx)
+    np.testing.assert_allclose(length, found.fun, rtol=0, atol=1e-12)
+
+
+def test_no_mirror_point_on_the_other_side_or_beside_the_rectangle() -> None:
+    before, behind = MIDDLE + WALL.normal, MIDDLE - WALL.normal
+    up = np.array([0, 0, 6.0])
+    _, valid = rw.mirror_point(WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up]))
+    np.testing.assert_array_equal(valid, [False, False, False])
+    _, valid = rw.mirror_point(WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True)
+    np.testing.assert_array_equal(valid, [False, True, False])
+
+
+def test_legs_cross_where_they_end_on_both_sides_of_the_slab() -> None:
+    before, behind, front = MIDDLE + WALL.normal, MIDDLE - WALL.normal, MIDDLE
+    beside = np.array([0, 0, 6.0])
+    origins = np.stack([before, behind, before, before, before + beside, behind])
+    targets = np.stack([behind, before, before + 0.1, front, behind + beside, front])
+    np.testing.assert_array_equal(rw.crossed(WALL, origins, targets), [True, True, False, False, False, True])
+
+
+@given(seed=st.integers(0, 1000))
+def test_a_conductor_turns_the_field_as_its_image(seed: int) -> None:
+    direction, field = wave(seed)
+    expected = 2 * (METAL.normal @ field) * METAL.normal - field
+    np.testing.assert_allclose(rw.reflect(METAL, field, direction, [14e9])[0], expected, atol=1e-12)
+    np.testing.assert_array_equal(rw.transmit(METAL, field, direction, [14e9])[0], 0)
+
+
+@given(seed=st.integers(0, 1000))
+def test_a_wall_without_loss_keeps_the_energy(seed: int) -> None:
+    glass = own_material("glass without loss", source="made up", low_hz=1e9, high_hz=1e11, a=6.0)
+    wall = Wall(name="pane", corner_m=(0, 0, 0), edge_u_m=(0, 1, 0), edge_v_m=(0.6, 0, 0.8), material=glass, thickness_m=0.004)
+    direction, field = wave(seed)
+    powers = [(np.abs(part) ** 2).sum(axis=-1) for part in (rw.reflect(wall, field, direction, [12e9, 14e9]), field)]
+    powers.append((np.abs(rw.transmit(wall, field, direction, [12e9, 14e9])) ** 2).sum(axis=-1))
+    np.testing.assert_allclose(powers[0] + powers[2], powers[1], rtol=1e-12)
+
+
+def test_te_and_tm_take_their_own_coefficients() -> None:
+    # By hand: the wave goes along x and down onto a floor; TE is y, TM lies in x and z.
+    floor = Wall(
+        name="floor",
+        corner_m=(0, 0, 0),
+        edge_u_m=(5, 0, 0),
+        edge_v_m=(0, 5, 0),
+        material=material("concrete"),
+        thickness_m=0.05,
+    )
+    down = np.array([0.8, 0, -0.6])
+    te, tm = (slab(floor.material.eta(14e9), 0.05, 14e9, 0.6, kind) for kind in ("te", "tm"))
+    np.testing.assert_allclose(rw.reflect(floor, np.array([0, 1, 0]), down, [14e9])[0], [0, te[0], 0], atol=1e-12)
+    # e_TE x k, with e_TE = k x n = -y: down, (0.6, 0, 0.8); up, (-0.6, 0, 0.8).
+    e_down, e_up = np.array([0.6, 0, 0.8]), np.array([-0.6, 0, 0.8])
+    np.testing.assert_allclose(rw.reflect(floor, e_down, down, [14e9])[0], tm[0] * e_up, atol=1e-12)
+    air = np.exp(2j * np.pi * 14e9 / SPEED_OF_LIGHT_MPS * 0.05 * 0.6)
+    np.testing.assert_allclose(rw.transmit(floor, e_down, down, [14e9])[0], tm[1] * air * e_down, atol=1e-12)
+
+
+def test_roughness_takes_its_share_off_the_mirrored_field() -> None:
+    rough = Wall(**{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "roughness_m": 0.001})
+    direction, field = wave(3)
+    cosine = abs(direction @ WALL.normal)
+    k = 2 * np.pi * 14e9 / SPEED_OF_LIGHT_MPS
+    ratio = rw.reflect(rough, field, direction, [14e9]) / rw.reflect(WALL, field, direction, [14e9])
+    np.testing.assert_allclose(ratio, np.exp(-2 * (k * 0.001 * cosine) ** 2), rtol=1e-12)
+
+
+def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
+    second = Wall(**{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "corner_m": (2.0, -2.0, 0.0), "name": "b"})
+    scene = Scene(walls=(WALL, second))
+    origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
+    targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
+    field, frequency = np.array([0.0, 0, 1.0]), np.array([12e9, 16e9])
+    got = rw.through_walls(scene, origins[:, None], targets, frequency, field)
+    assert got.shape == (2, 2, 3, 3)
+    np.testing.assert_array_equal(got[:, :, 0], np.broadcast_to(field, (2, 2, 3)))
+    for index, origin in enumerate(origins):
+        for place, walls in ((1, (WALL,)), (2, (WALL, second))):
+            way = (targets[place] - origin) / np.linalg.norm(targets[place] - origin)
+            expected = np.broadcast_to(field, (2, 3))
+            for wall in walls:
+                expected = rw.transmit(wall, expected, way, frequency)
+            np.testing.assert_allclose(got[:, index, place], expected, rtol=1e-12)
+
+
+def test_straight_on_both_polarisations_are_alike() -> None:
+    field = np.cross(WALL.normal, [0.3, 0.2, 0.9])
+    got = rw.reflect(WALL, field, -WALL.normal, [14e9])[0]
+    te, _ = slab(WALL.material.eta(14e9), WALL.thickness_m, 14e9, 1.0, "te")
+    np.testing.assert_allclose(got, te * field, atol=1e-12)

@@ -1,0 +1,81 @@
+"""What stands between two points of a room: against the closed form of boxes, once on each backend that works here."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+
+from rtradar.scene import Furniture, Scene, material
+from rtradar.trace.backend import Backend, use
+from rtradar.trace.room_tracer import CLEAR_M, RoomTracer
+
+Array = NDArray[np.float64]
+CORNER, SIZE = np.array([0.5, -0.4, 0.2]), np.array([0.6, 0.9, 0.7])
+
+
+@pytest.fixture
+def box(tmp_path: Path) -> Scene:
+    trimesh.creation.box(SIZE).export(tmp_path / "box.ply")
+    place = tuple(float(value) for value in CORNER + SIZE / 2)
+    piece = Furniture(name="box", mesh=tmp_path / "box.ply", material=material("wood"), position_m=place, metres_per_unit=1.0)
+    return Scene(furniture=(piece,))
+
+
+def in_box(origins: Array, targets: Array) -> tuple[Array, Array]:
+    """Shares of each leg at which it enters and leaves the slabs of the box; it is in the box where the first is less."""
+    with np.errstate(divide="ignore"):
+        low, high = (CORNER - origins) / (targets - origins), (CORNER + SIZE - origins) / (targets - origins)
+    return np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)
+
+
+@pytest.mark.parametrize("distance", [3.0, 500.0])
+def test_legs_through_a_box_are_blocked(backend: Backend, box: Scene, distance: float) -> None:
+    rng = np.random.default_rng(0)
+    origins = rng.normal(size=(2000, 3))
+    origins *= distance / np.linalg.norm(origins, axis=1, keepdims=True)
+    targets = CORNER + SIZE * rng.uniform(-0.5, 1.5, (2000, 3))
+    enters, leaves = in_box(origins, targets)
+    enters, leaves = np.maximum(enters, 0), np.minimum(leaves, 1)
+    expected = enters < leaves
+    # Near its edges, and near the ends of a leg, float32 and the drawn-in ends may answer otherwise.
+    sure = np.abs(leaves - enters) * distance > 3 * CLEAR_M
+    blocked = RoomTracer(use(backend), box).blocked(origins, targets)
+    assert sure.mean() > 0.9
+    np.testing.assert_array_equal(blocked[sure], expected[sure])
+    assert 0.2 < expected.mean() < 0.9
+
+
+def test_a_surface_does_not_hide_its_own_points(backend: Backend, box: Scene) -> None:
+    rng = np.random.default_rng(1)
+    near = CORNER + SIZE * np.column_stack([np.zeros(500), rng.uniform(0.01, 0.99, (500, 2))])
+    far = near + np.array([SIZE[0], 0, 0])
+    antenna = np.array([-4.0, 1.0, 1.0])
+    tracer = RoomTracer(use(backend), box)
+    assert not tracer.blocked(antenna, near).any()
+    assert not tracer.blocked(near, antenna).any()
+    assert tracer.blocked(antenna, far).all()
+
+
+def test_what_stands_behind_the_target_does_not_block(backend: Backend, box: Scene) -> None:
+    before = CORNER + SIZE / 2 - [SIZE[0] / 2 + 0.01, 0, 0]
+    tracer = RoomTracer(use(backend), box)
+    assert not tracer.blocked(np.array([-4.0, 1.0, 1.0]), before)
+    assert tracer.blocked(np.array([-4.0, 1.0, 1.0]), before + np.array([0.1, 0, 0]))
+
+
+def test_without_furniture_nothing_is_blocked(backend: Backend) -> None:
+    tracer = RoomTracer(use(backend), Scene())
+    assert tracer.blocked(np.zeros((4, 5, 3)), np.ones(3)).shape == (4, 5)
+    assert not tracer.blocked(np.zeros((4, 5, 3)), np.ones(3)).any()
+
+
+def test_shapes_broadcast_and_may_be_empty(backend: Backend, box: Scene) -> None:
+    tracer = RoomTracer(use(backend), box)
+    middle = CORNER + SIZE / 2
+    origins = np.array([[-4.0, 1.0, 1.0], [-4.0, 5.0, 1.0]])
+    targets = np.stack([middle, 2 * middle - origins[0], np.array([0.0, 3.0, 1.0])])
+    expected = np.array([[True, True, False], [True, False, False]])
+    np.testing.assert_array_equal(tracer.blocked(origins[:, None], targets), expected)
+    assert tracer.blocked(np.empty((0, 3)), middle).shape == (0,)
