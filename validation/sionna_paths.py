@@ -35,7 +35,7 @@ def ours(tx: Array, rx: Array) -> Array:
     """Lengths of all valid paths from Tx to Rx [m]; the way out is the whole path, so Rx stands for the body."""
     surface = Surface(material=material("concrete"), thickness_m=0.2)
     sides = dict.fromkeys(("near", "far", "right", "left", "floor", "ceiling"), surface)
-    walls = room_walls(tuple(SIZE), tuple(CORNER[:2]), sides)  # type: ignore[arg-type]
+    walls = room_walls(tuple(SIZE), tuple(CORNER[:2]), sides)
     found = []
     for path in wall_paths(walls, tx, ORDER):
         if path.back:

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import itertools
 import json
+import math
 import sys
 import time
 import warnings
@@ -34,7 +35,7 @@ from rtradar.scatter.rays import ANCHOR_S
 
 CHEAPEST = "analytic"  # all costs are over its
 # In the order of the table; `reference` has a cost and no error.
-RUNGS = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "rays", "reference")
+RUNGS = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto", "rays", "reference")
 SLOW = ("rays", "reference")  # minutes a frame: after all others
 
 
@@ -63,6 +64,8 @@ DIALS = (
         {"paper-12ghz": 5120, "paper-77ghz": 20480},
         "-",
     ),
+    Dial("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
+    Dial("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
     Dial("rays", "rays_per_wavelength", {"paper-12ghz": (1.0, 2.0, 3.0), "paper-77ghz": (3.0,)}, for_both(3.0), "-"),
 )
 COLOURS = {

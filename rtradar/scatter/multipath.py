@@ -8,8 +8,6 @@ coefficients go straight, and what appears or vanishes fades as in `occlusion`.
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -25,6 +23,7 @@ from rtradar.scatter.body_material import Surface, body_material
 from rtradar.scatter.ghost_echoes import nearby_echoes, weigh
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
+from rtradar.scatter.path_account import PathAccount, account
 from rtradar.scatter.path_anchors import PathAnchors, Poses, Surroundings, path_anchors
 from rtradar.scatter.polarization import copolar
 from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
@@ -37,39 +36,6 @@ _KEPT_BYTES = 64e6
 
 _ANCHORS_AT_ONCE = 32
 _CHIRPS_AT_ONCE = 64
-
-
-@dataclass(frozen=True)
-class PathAccount:
-    """What became of the echoes of one path.
-
-    Parameters
-    ----------
-    path : str
-        Walls in the order in which the wave meets them.
-    order : int
-        Reflections at walls.
-    power_m2 : float
-        Of all parts, averaged over rx and one chirp every 10 ms.
-    over_noise_db : float or None
-        The same over noise, after the gain of samples, cycles and channels; None without noise or without an echo.
-    kept, dropped : tuple of str
-        Body parts.
-    why : str
-        Why those were dropped; empty where none was.
-    """
-
-    path: str
-    order: int
-    power_m2: float
-    over_noise_db: float | None
-    kept: tuple[str, ...]
-    dropped: tuple[str, ...]
-    why: str
-
-    def row(self) -> dict[str, Any]:
-        """For ``summary.json``."""
-        return {**self.__dict__, "kept": list(self.kept), "dropped": list(self.dropped)}
 
 
 class Multipath:
@@ -320,33 +286,13 @@ class Multipath:
         gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
         keep = (power > 0) & (power * gain >= noise_power_m2 * 10 ** (-margin_db / 10))
         keep |= np.array([self.paths[number].order == 0 for number in self._path])
+        names = np.array(self._body.part_names, dtype=object)[self._part]
         accounts = tuple(
-            self._account(number, keep, power, noise_power_m2 / gain, margin_db) for number in range(len(self.paths))
+            account(path, self._path == number, keep, power, names, noise_power_m2 / gain, margin_db)
+            for number, path in enumerate(self.paths)
         )
         self._leave_out(keep)
         return accounts
-
-    def _account(
-        self, number: int, keep: NDArray[np.bool_], power: NDArray[np.float64], noise: float, margin_db: float
-    ) -> PathAccount:
-        own = self._path == number
-        names = np.array(self._body.part_names, dtype=object)[self._part]
-        total = float(power[own].sum())
-        lost = own & ~keep
-        why = []
-        if (power[lost] == 0).any():
-            why.append("never seen: no mirror point in the wall, or in the shadow of furniture or body")
-        if (power[lost] > 0).any():
-            why.append(f"more than {margin_db:g} dB below the noise after processing")
-        return PathAccount(
-            self.paths[number].name,
-            self.paths[number].order,
-            total,
-            10 * math.log10(total / noise) if total > 0 and noise > 0 else None,
-            tuple(names[own & keep]),
-            tuple(names[lost]),
-            "; ".join(why),
-        )
 
     def _leave_out(self, keep: NDArray[np.bool_]) -> None:
         self._path, self._part = self._path[keep], self._part[keep]
