@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 DOUBTFUL = 0.005
@@ -13,6 +13,10 @@ DOUBTFUL = 0.005
 
 Its triangles lie up to 0.0007 from the sphere (`rtradar.trace.body_tracer`).
 """
+
+
+_NEAR = 1.1
+"""Of its longest semi-axis: a line that passes the middle of a part farther away than this clears it by a tenth or more."""
 
 
 def clearances(
@@ -37,32 +41,70 @@ def clearances(
     Returns
     -------
     (ray,) float64
-        Below 0 where the line goes through another part; at most 1, where none is near.
+        Below 0 where the line goes through another part; 1 where it passes all of them by a tenth or more.
     """
     arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in (origins, targets, centres, frames, semi_axes))
     starts, ends, places, turns, axes = arrays
     out = np.empty(len(starts))
     inverse = np.ascontiguousarray(np.swapaxes(turns, 1, 2) / axes[:, :, None])
-    _clearances(starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, inverse, axes.max(axis=1), out)
+    of_part, longest = np.ascontiguousarray(own, dtype=np.int64), axes.max(axis=1)
+    near = _near(starts, ends, of_part, places, longest)
+    _clearances(starts, ends, of_part, places, inverse, longest, near, out)
     return out
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _clearances(origins, targets, own, centres, inverse, longest, out):  # type: ignore[no-untyped-def]
-    for ray in prange(len(origins)):
+@njit(cache=True, error_model="numpy")
+def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-def]
+    """Which parts come near any of the lines to a part, (own, part)."""
+    parts = len(centres)
+    middles, reach, counts = np.zeros((parts, 2, 3)), np.zeros((parts, 2)), np.zeros(parts)
+    for ray in range(len(own)):
+        counts[own[ray]] += 1
+        for i in range(3):
+            middles[own[ray], 0, i] += origins[ray, i]
+            middles[own[ray], 1, i] += targets[ray, i]
+    for part in range(parts):
+        middles[part] /= max(counts[part], 1.0)
+    for ray in range(len(own)):
+        for end, places in enumerate((origins, targets)):
+            square = 0.0
+            for i in range(3):
+                square += (places[ray, i] - middles[own[ray], end, i]) ** 2
+            reach[own[ray], end] = max(reach[own[ray], end], square)
+    near = np.zeros((parts, parts), dtype=np.bool_)
+    for part in range(parts):
+        a, way = middles[part, 0], middles[part, 1] - middles[part, 0]
+        begin, end = math.sqrt(reach[part, 0]), math.sqrt(reach[part, 1])
+        length = math.sqrt(way @ way)
+        for other in range(parts):
+            if other != part and counts[part] > 0:
+                gap = centres[other] - a
+                share = min(1.0, max(0.0, (gap @ way) / max(way @ way, 1e-300)))
+                square = 0.0
+                for i in range(3):
+                    square += (gap[i] - share * way[i]) ** 2
+                # The bundle of lines narrows from one end to the other; as wide as where it is before this part.
+                before = max(0.0, share - _NEAR * longest[other] / max(length, 1e-300))
+                wide = max(begin + before * (end - begin), end) if begin > end else end
+                near[part, other] = math.sqrt(square) < _NEAR * longest[other] + wide
+    return near
+
+
+@njit(cache=True, error_model="numpy")
+def _clearances(origins, targets, own, centres, inverse, longest, near, out):  # type: ignore[no-untyped-def]
+    for ray in range(len(origins)):
         least = 1.0
         o, t = origins[ray], targets[ray]
         d0, d1, d2 = t[0] - o[0], t[1] - o[1], t[2] - o[2]
         whole = d0 * d0 + d1 * d1 + d2 * d2
         for part in range(len(centres)):
-            if part == own[ray]:
+            if not near[own[ray], part]:
                 continue
             c = centres[part]
-            # Farther than twice the longest semi-axis from the centre: nothing to look at.
             w0, w1, w2 = c[0] - o[0], c[1] - o[1], c[2] - o[2]
             share = min(1.0, max(0.0, (w0 * d0 + w1 * d1 + w2 * d2) / whole))
             w0, w1, w2 = w0 - share * d0, w1 - share * d1, w2 - share * d2
-            if w0 * w0 + w1 * w1 + w2 * w2 > 4 * longest[part] * longest[part]:
+            if w0 * w0 + w1 * w1 + w2 * w2 > (_NEAR * longest[part]) ** 2:
                 continue
             m = inverse[part]
             a0 = m[0, 0] * (o[0] - c[0]) + m[0, 1] * (o[1] - c[1]) + m[0, 2] * (o[2] - c[2])
