@@ -25,7 +25,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
-from rtradar.pipeline.indoors import check_indoors, indoors, skinned
+from rtradar.pipeline.indoors import check_indoors, indoors
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
@@ -38,6 +38,7 @@ from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.scatter import Accountable, Rung, build_rung
+from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
 from rtradar.signal import Noise, synthesize
 
@@ -165,10 +166,16 @@ def run(
             f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
         )
     warm = time.perf_counter()
+    paths: Multipath | None = None
+    rung: Rung
     if walled:
-        check_indoors(fidelity, scene, spreading)
-    rung = _alone(fidelity, radar, body, variant, spreading, dials or {}, body_material)
-    _warm_up(rung, radar)
+        check_indoors(fidelity, scene, spreading, dials or {})
+        paths = Multipath(radar, body, scene, variant=variant, order=order, fidelity=fidelity, material=body_material)  # type: ignore[arg-type]
+        rung = paths.person
+    else:
+        of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
+        rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
+    _warm_up(paths or rung, radar)
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
@@ -178,15 +185,14 @@ def run(
     noise = Noise.for_snr(surveyed.power, snr_db, seed) if noise_power_m2 is None else Noise(noise_power_m2, seed)
     title = f"{motion.name}, {radar.name}, {fidelity}" + (f", {scene.name}" if walled else "")
     inside = None
-    if walled:
+    if paths is not None:
         with stages.time("room"):
             inside = indoors(
+                paths,
                 radar,
                 body,
                 scene,
-                fidelity=fidelity,
                 variant=variant,
-                material=body_material,
                 order=order,
                 seed=seed,
                 n_chirps=n_chirps,
@@ -328,15 +334,6 @@ def _chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     """Those of some chirps of the block."""
     chirps = slice(begin, end)
     return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
-
-
-def _alone(
-    fidelity: str, radar: Radar, body: Body, variant: str, spreading: bool, dials: Mapping[str, Any], material: str
-) -> Rung:
-    """The person without the room."""
-    if material == "perfect-conductor":
-        return build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **dials)
-    return skinned(fidelity, radar, body, variant, spreading, material)
 
 
 def _check(snr_db: float, pfa: float, seed: int) -> None:

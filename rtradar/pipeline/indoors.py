@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -38,7 +39,7 @@ class Ghost(NamedTuple):
     power_m2: float
 
 
-def check_indoors(fidelity: str, scene: Scene, spreading: bool) -> None:
+def check_indoors(fidelity: str, scene: Scene, spreading: bool, dials: Mapping[str, Any]) -> None:
     """Refuse in one line what has no meaning in a room.
 
     Raises
@@ -50,34 +51,19 @@ def check_indoors(fidelity: str, scene: Scene, spreading: bool) -> None:
         raise InputError(
             f"fidelity '{fidelity}' knows no walls, as of scene '{scene.name}'; specular and analytic do (--fidelity)"
         )
+    if dials:
+        raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
     if not spreading:
         raise InputError(f"scene '{scene.name}': spreading may be off in free space only; leave --no-spreading out")
 
 
-def skinned(fidelity: str, radar: Radar, body: Body, variant: str, spreading: bool, material: str) -> Multipath:
-    """The person of another material than a perfect conductor, in free space.
-
-    Raises
-    ------
-    InputError
-        Where the rung knows perfect conductors only.
-    """
-    if fidelity not in ("specular", "analytic"):
-        raise InputError(
-            f"fidelity '{fidelity}' knows perfect conductors only; for {material} take specular or analytic (--fidelity)"
-        )
-    settings = {"variant": variant, "spreading": spreading, "order": 0, "fidelity": fidelity, "material": material}
-    return Multipath(radar, body, Scene(), **settings)  # type: ignore[arg-type]
-
-
 def indoors(
+    rung: Multipath,
     radar: Radar,
     body: Body,
     scene: Scene,
     *,
-    fidelity: str,
     variant: str,
-    material: str,
     order: int,
     seed: int,
     n_chirps: int,
@@ -89,15 +75,14 @@ def indoors(
 
     Parameters
     ----------
+    rung : Multipath
+        The person in the room; what is not worth its cost is taken out of it.
     radar : Radar
         Where it stands in the scene.
     body : Body
     scene : Scene
-    fidelity : {"specular", "analytic"}
     variant : str
         Mitsuba's backend.
-    material : str
-        Of the body.
     order : int
         Most walls of a path.
     seed : int
@@ -114,7 +99,6 @@ def indoors(
     Indoors
     """
     noise = 0.0 if keep_all else noise_power_m2
-    rung = Multipath(radar, body, scene, variant=variant, order=order, fidelity=fidelity, material=material)  # type: ignore[arg-type]
     paths = rung.prune(n_chirps, noise)
     clutter = Clutter(radar, scene, variant=variant, seed=seed, order=max(order, 1)).prune(noise)
     room = RoomIf(clutter, body, variant=variant)

@@ -74,7 +74,7 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
     near = np.zeros((parts, parts), dtype=np.bool_)
     for part in range(parts):
         a, way = middles[part, 0], middles[part, 1] - middles[part, 0]
-        begin, end = math.sqrt(reach[part, 0]), math.sqrt(reach[part, 1])
+        first, last = math.sqrt(reach[part, 0]), math.sqrt(reach[part, 1])
         length = math.sqrt(way @ way)
         for other in range(parts):
             if other != part and counts[part] > 0:
@@ -85,7 +85,7 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
                     square += (gap[i] - share * way[i]) ** 2
                 # The bundle of lines narrows from one end to the other; as wide as where it is before this part.
                 before = max(0.0, share - _NEAR * longest[other] / max(length, 1e-300))
-                wide = max(begin + before * (end - begin), end) if begin > end else end
+                wide = max(first + before * (last - first), last) if first > last else last
                 near[part, other] = math.sqrt(square) < _NEAR * longest[other] + wide
     return near
 

@@ -1,0 +1,114 @@
+"""A run in a room: what it leaves, what it refuses, and where it says ghosts are."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.errors import InputError
+from rtradar.motion import place
+from rtradar.pipeline.indoors import ghosts
+from rtradar.pipeline.received import ReceivedWindow
+from rtradar.scatter.multipath import Multipath
+
+RADAR = rt.Radar(
+    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=256, frame_duration_s=0.05
+)
+ROOM = """
+[radar]
+position_m = [-4, 1, 1]
+
+[[walls]]
+name = "side"
+corner_m = [-6, 2.5, -1]
+edge_u_m = [12, 0, 0]
+edge_v_m = [0, 0, 4]
+material = "perfect-conductor"
+thickness_m = 0.1
+
+[[furniture]]
+name = "shelf"
+mesh = "shelf"
+material = "chipboard"
+position_m = [2.5, 0, 0]
+yaw_deg = 180
+"""
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> rt.Scene:
+    (tmp_path / "room.toml").write_text(ROOM)
+    return rt.Scene.load(tmp_path / "room.toml")
+
+
+def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tmp_path: Path, room: rt.Scene) -> None:
+    motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
+    rt.run(motion, RADAR, room, out=tmp_path / "out", fidelity="analytic", clutter_removal="mean", pfa=1e-4)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    assert summary["parameters"]["scene"] == "room"
+    paths = {row["path"]: row for row in summary["room"]["paths"]}
+    assert set(paths) == {"body", "side > body", "body > side"}
+    # The wall is to the radar's left, and both legs see it: nothing of these paths is far below the direct one.
+    assert paths["side > body"]["over_noise_db"] > paths["body"]["over_noise_db"] - 10
+    kept = {item["name"]: item for item in summary["room"]["clutter"]["kept"]}
+    assert kept["side"]["kind"] == "mirror"
+    # A conducting mirror d = 1.5 m to the left sends the field 1 / (2 d), that of sqrt(4 pi) / (2 d) for |F| / (R1 R2); 10 % in
+    # power for antennas some 5 cm from the array's middle.
+    assert kept["side"]["power_m2"] == pytest.approx(4 * np.pi / (2 * 1.5) ** 2, rel=0.1)
+    for picture in ("plan.png", "clutter_removal.png", "range_azimuth_walls.png"):
+        assert (tmp_path / "out" / picture).stat().st_size > 1000
+    with h5py.File(tmp_path / "out" / "maps.h5") as maps:
+        window = int(np.abs(maps["time"][:] - maps["range_doppler_received"].attrs["time_s"]).argmin())
+        before, after = maps["range_doppler_received"][:], maps["range_doppler"][window]
+        still = before.shape[1] // 2
+        wall = int(np.argmin(np.abs(RADAR.range_m - 1.5)))
+        assert before[wall, still] > 1e4 * after[wall, still]
+        # What moves stays: beyond the bins beside zero both maps are the same.
+        np.testing.assert_allclose(before[:, : still - 2], after[:, : still - 2], rtol=1e-2, atol=1e-6 * before.max())
+
+
+def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
+    radar = room.place(RADAR)
+    body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0, duration_s=0.2)))
+    rung = Multipath(radar, body, room, fidelity="analytic")
+    found = {ghost.path: ghost for ghost in ghosts(rung, radar, 0.1)}
+    assert set(found) == {"side > body", "body > side"}
+    # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few centimetres.
+    place_of_radar, person = np.array([-4, 1, 1.0]), body.at([0.1]).centres[0].mean(axis=0)
+    image = person * [1, -1, 1] + [0, 5, 0]
+    expected = (np.linalg.norm(person - place_of_radar) + np.linalg.norm(image - place_of_radar)) / 2
+    for ghost in found.values():
+        assert ghost.range_m == pytest.approx(expected, abs=0.15)
+    # What comes back over the wall comes from the image, what goes out over it from the person.
+    seen = found["body > side"].azimuth_rad, found["side > body"].azimuth_rad
+    for angle, target in zip(seen, (image, person), strict=True):
+        way = target - place_of_radar
+        assert angle == pytest.approx(np.arcsin(way[1] / np.linalg.norm(way)), abs=np.radians(4))
+
+
+def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(tmp_path: Path, room: rt.Scene) -> None:
+    motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
+    for given, word in (
+        ({"fidelity": "fresnel"}, "knows no walls"),
+        ({"fidelity": "analytic", "spreading": False}, "free space only"),
+        ({"fidelity": "analytic", "dials": {"tolerance_db": 1.0}}, "tolerance_db"),
+        ({"fidelity": "analytic", "clutter_removal": "magic"}, "magic"),
+    ):
+        with pytest.raises(InputError, match=word) as caught:
+            rt.run(motion, RADAR, room, out=tmp_path / "out", **given)  # type: ignore[arg-type]
+        assert "\n" not in str(caught.value)
+        assert not (tmp_path / "out").exists()
+
+
+def test_a_received_window_is_put_together_from_pieces() -> None:
+    rng = np.random.default_rng(0)
+    stream = rng.normal(size=(400, RADAR.n_rx, 8)) + 0j
+    window = ReceivedWindow(RADAR, start_cycle=20)
+    found = [window.push(stream[first : first + 62], first) for first in range(0, 400, 62)]
+    cubes = [cube for cube in found if cube is not None]
+    assert len(cubes) == 1
+    np.testing.assert_array_equal(cubes[0].reshape(-1, RADAR.n_rx, 8), stream[40 : 40 + RADAR.chirps_per_frame])
