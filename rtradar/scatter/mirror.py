@@ -119,7 +119,8 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
         polarization = p0 * s0 + p1 * s1 + p2 * s2
         polarization -= 2 * (p0 * n0 + p1 * n1 + p2 * n2) * (s0 * n0 + s1 * n1 + s2 * n2)
         polarization /= size
-    out[1] = math.sqrt(math.pi) * facing / math.sqrt(determinant) * polarization
+    # A ray that only grazes has no reflection of this order; the matrix is singular there, or worse.
+    out[1] = math.sqrt(math.pi) * facing / math.sqrt(determinant) * polarization if facing > 0 and determinant > 0 else 0.0
     if spreading:
         out[1] /= range_t * range_r
     out[2], out[3], out[4] = x, y, z

@@ -188,3 +188,18 @@ def test_there_is_no_mirror_where_the_body_stands_between_the_antennas(seed: int
     tx, through = unit(rng.normal(size=(20, 3))) * 3, rng.uniform(-0.5, 0.5, (20, 3)) * axes
     _, amplitude, _ = solve(tx, through + (through - tx) * rng.uniform(0.5, 2, (20, 1)), np.array(axes))
     assert (amplitude == 0).all()
+
+
+def test_grazing_rays_have_no_reflection_but_a_length() -> None:
+    # Tx and Rx on opposite sides, and a sphere that crosses the line between them.
+    across = np.linspace(-0.3, 0.3, 2001)
+    centres = np.zeros((len(across), 1, 3))
+    centres[:, 0, 1] = across
+    frames = np.broadcast_to(np.eye(3), (len(across), 1, 3, 3))
+    tx, rx = np.tile([-4.0, 0, 0], (len(across), 1)), np.tile([[5.0, 0, 0]], (len(across), 1, 1))
+    length, amplitude, _ = mirror(tx, rx, centres, frames, np.full((1, 3), 0.12))
+    assert np.isfinite(length).all()
+    assert np.isfinite(amplitude).all()
+    # Where the sphere stands in the line there is no mirror point, and well beside it there is one.
+    assert (amplitude[np.abs(across) < 0.11] == 0).all()
+    assert (amplitude[np.abs(across) > 0.13] > 0).all()
