@@ -54,23 +54,27 @@ def clearances(
 
 
 @njit(cache=True, error_model="numpy")
+def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
+    """Mean (own, 3) of one end of the lines to each part, and how far (own,) squared they stray from it; added to zeros."""
+    for ray in range(len(own)):
+        for i in range(3):
+            middle[own[ray], i] += places[ray, i] / counts[own[ray]]
+    for ray in range(len(own)):
+        square = 0.0
+        for i in range(3):
+            square += (places[ray, i] - middle[own[ray], i]) ** 2
+        reach[own[ray]] = max(reach[own[ray]], square)
+
+
+@njit(cache=True, error_model="numpy")
 def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-def]
     """Which parts come near any of the lines to a part, (own, part)."""
     parts = len(centres)
     middles, reach, counts = np.zeros((parts, 2, 3)), np.zeros((parts, 2)), np.zeros(parts)
     for ray in range(len(own)):
         counts[own[ray]] += 1
-        for i in range(3):
-            middles[own[ray], 0, i] += origins[ray, i]
-            middles[own[ray], 1, i] += targets[ray, i]
-    for part in range(parts):
-        middles[part] /= max(counts[part], 1.0)
-    for ray in range(len(own)):
-        for end, places in enumerate((origins, targets)):
-            square = 0.0
-            for i in range(3):
-                square += (places[ray, i] - middles[own[ray], end, i]) ** 2
-            reach[own[ray], end] = max(reach[own[ray], end], square)
+    _bundle(origins, own, counts, middles[:, 0], reach[:, 0])
+    _bundle(targets, own, counts, middles[:, 1], reach[:, 1])
     near = np.zeros((parts, parts), dtype=np.bool_)
     for part in range(parts):
         a, way = middles[part, 0], middles[part, 1] - middles[part, 0]
