@@ -25,7 +25,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
 from rtradar.pipeline.folder import all_or_nothing
-from rtradar.pipeline.indoors import check_indoors, indoors
+from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
@@ -169,8 +169,11 @@ def run(
     paths: Multipath | None = None
     rung: Rung
     if walled:
-        check_indoors(fidelity, scene, spreading, dials or {})
-        paths = Multipath(radar, body, scene, variant=variant, order=order, fidelity=fidelity, material=body_material)  # type: ignore[arg-type]
+        if dials:
+            raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
+        paths = Multipath(
+            radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
+        )
         rung = paths.person
     else:
         of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}

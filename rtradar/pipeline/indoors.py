@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -10,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
-from rtradar.errors import InputError
 from rtradar.pipeline.room import RoomIf
 from rtradar.radar import Radar
 from rtradar.scatter.clutter import Clutter
@@ -37,24 +35,6 @@ class Ghost(NamedTuple):
     velocity_mps: float
     azimuth_rad: float
     power_m2: float
-
-
-def check_indoors(fidelity: str, scene: Scene, spreading: bool, dials: Mapping[str, Any]) -> None:
-    """Refuse in one line what has no meaning in a room.
-
-    Raises
-    ------
-    InputError
-        Where the rung knows no walls, or spreading is off.
-    """
-    if fidelity not in ("specular", "analytic"):
-        raise InputError(
-            f"fidelity '{fidelity}' knows no walls, as of scene '{scene.name}'; specular and analytic do (--fidelity)"
-        )
-    if dials:
-        raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
-    if not spreading:
-        raise InputError(f"scene '{scene.name}': spreading may be off in free space only; leave --no-spreading out")
 
 
 def indoors(

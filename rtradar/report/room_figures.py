@@ -112,10 +112,11 @@ def draw_before_after(
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
-    for name, distance, velocity in ghosts:
+    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range."""
+    for name, distance, across in ghosts:
         if distance < radar.max_range_m:
-            axes.plot(velocity, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
-            axes.annotate(name, (velocity, distance), xytext=(6, 3), textcoords="offset points", fontsize=6, color="red")
+            axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
+            axes.annotate(name, (across, distance), xytext=(6, 3), textcoords="offset points", fontsize=6, color="red")
 
 
 def draw_range_azimuth_with_walls(
@@ -158,17 +159,7 @@ def draw_range_azimuth_with_walls(
         if len(inside):
             middle = inside[len(inside) // 2]
             axes.annotate(name, (angle[middle], distance[middle]), fontsize=8, color="white")
-    for name, distance_m, angle_rad in ghosts:
-        if distance_m < radar.max_range_m:
-            axes.plot(np.degrees(angle_rad), distance_m, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
-            axes.annotate(
-                name,
-                (np.degrees(angle_rad), distance_m),
-                xytext=(6, 3),
-                textcoords="offset points",
-                fontsize=6,
-                color="red",
-            )
+    _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
     axes.set(xlabel="Azimuth [°]", ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
     figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")
     figure.savefig(path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +15,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
-from rtradar.scatter.fresnel import SHADOW_RAYS, sweep_nodes
+from rtradar.scatter.fresnel import sweep_nodes
 from rtradar.scatter.fresnel_anchors import ZoneShares
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
@@ -88,7 +89,6 @@ class Auto:
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
         self._step = max(1, round(_INSTANTS_S / radar.chirp_duration_s))
         self._planned: dict[int, Planned] = {}
-        self._tools: dict[str, Any] = {}
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -191,7 +191,7 @@ class Auto:
         self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]
     ) -> Echoes:
         if way >= PHYSICAL_OPTICS:
-            echoes = self._facets(WAYS[way]).echoes(chirps)
+            echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(chirps)
             return Echoes(
                 length=echoes.length[..., parts],
                 amplitude=echoes.amplitude[..., parts],
@@ -222,32 +222,26 @@ class Auto:
             bounces=np.ones(len(parts), dtype=np.int64),
         )
 
-    def _tracer(self) -> BodyTracer:
+    @cached_property
+    def _mirror_points(self) -> MirrorVisibility:
         backend = select(self._variant)
         self.variant = backend.kind
-        return BodyTracer(use(backend), self._body.semi_axes)
+        return MirrorVisibility(self._radar, self._body, BodyTracer(use(backend), self._body.semi_axes))
 
-    @property
-    def _mirror_points(self) -> MirrorVisibility:
-        if "mirror points" not in self._tools:
-            self._tools["mirror points"] = MirrorVisibility(self._radar, self._body, self._tracer())
-        tool: MirrorVisibility = self._tools["mirror points"]
-        return tool
-
-    @property
+    @cached_property
     def _zones(self) -> ZoneShares:
-        if "zones" not in self._tools:
-            of = (self._radar, self._body, None, sweep_nodes(self._radar), SHADOW_RAYS)
-            self._tools["zones"] = ZoneShares(*of, hiders=self._hiders)
-        tool: ZoneShares = self._tools["zones"]
-        return tool
+        return ZoneShares(self._radar, self._body, sweep_nodes(self._radar), self._hiders)
 
-    def _facets(self, name: str) -> Rung:
-        if name not in self._tools:
-            kind = PhysicalOptics if name == WAYS[PHYSICAL_OPTICS] else Reference
-            self._tools[name] = kind(self._radar, self._body, variant=self._variant, spreading=self._spreading)
-            self.variant = self._tools[name].variant
-        rung: Rung = self._tools[name]
+    @cached_property
+    def _physical_optics(self) -> Rung:
+        return self._traced(PhysicalOptics(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+
+    @cached_property
+    def _reference(self) -> Rung:
+        return self._traced(Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+
+    def _traced(self, rung: Rung) -> Rung:
+        self.variant = rung.variant
         return rung
 
 

@@ -24,14 +24,10 @@ _KEPT_ANCHORS = 2048
 
 
 class Sample(NamedTuple):
-    """The envelope in one pose: ``ratio (node, pair, part)`` complex, ``strength (pair, part)`` [m] of what it multiplies.
-
-    ``others`` is the power of parts that are not asked about [m^2].
-    """
+    """The envelope in one pose: ``ratio (node, pair, part)`` complex, ``strength (pair, part)`` [m] of what it multiplies."""
 
     ratio: NDArray[np.complex128]
     strength: NDArray[np.float64]
-    others: float = 0.0
 
 
 class _Interval(NamedTuple):
@@ -134,7 +130,7 @@ def _bend(
 
 def whole_echo(sample: Sample) -> float:
     """Root of the power of all parts, the mean over frequencies and pairs [m]."""
-    return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean() + sample.others))
+    return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean()))
 
 
 @njit(cache=True, error_model="numpy")

@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.facet_integral import facet_integral
 from rtradar.scatter.facet_shadows import FacetShadows, Shares
@@ -23,23 +20,6 @@ def frequency_nodes(radar: Radar, count: int) -> NDArray[np.float64]:
     """Frequencies of the sweep (node,) [Hz], Chebyshev's: the polynomial through them serves all of it best."""
     angles = np.pi * (2 * np.arange(count)[::-1] + 1) / (2 * count)
     return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * np.cos(angles))
-
-
-def chosen_parts(rung: str, body: Body, parts: Sequence[int] | None) -> NDArray[np.int64]:
-    """Numbers of the parts (n,) that a rung is asked for; all where ``parts`` is None.
-
-    Raises
-    ------
-    InputError
-        Where one of them is not a part of the body, or named twice.
-    """
-    count = len(body.part_names)
-    if parts is None:
-        return np.arange(count)
-    chosen = np.array(parts, dtype=np.int64)
-    if chosen.ndim != 1 or not ((chosen >= 0) & (chosen < count)).all() or len(np.unique(chosen)) < len(chosen):
-        raise InputError(f"{rung}: parts = {list(parts)}; these must be numbers from 0 to {count - 1}, each once")
-    return chosen
 
 
 class FacetBody:

@@ -8,7 +8,7 @@ is taken to be G V; then
     specular         |G (v - V)|              v whether the mirror point itself is in view
     fresnel          3 % of G where an edge cuts the zones (``validation/fresnel.py``)
     all of optics    G V / (2 k rho)          the next term of its expansion, rho the mean radius of curvature
-    physical-optics  1.5 % of G V: what its interpolation leaves (``validation/body.py``)
+    physical-optics  1.5 % of G V: about what its interpolation leaves (``validation/ladder.py``)
 
 and that of `reference` is 0, for it is what errors are held against.
 """
@@ -30,6 +30,7 @@ from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_nodes import array_nodes
 from rtradar.scatter.fresnel_zone import RIM, zone_shares
 from rtradar.scatter.mirror import mirror
+from rtradar.trace.clearance import clearance
 
 WAYS = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
 """Ways of modelling a part, cheapest first; the first is no echo, for parts that are hidden."""
@@ -150,22 +151,7 @@ def _clearances(eye, points, centres, frames, semi_axes, out):  # type: ignore[n
     """How far outside each other part, stretched to a unit sphere, the ray from ``eye`` to each part's point passes."""
     times, parts = points.shape[:2]
     for time in prange(times):
-        a, d = np.empty(3), np.empty(3)
         for part in range(parts):
             for other in range(parts):
-                if other == part:
-                    out[time, part, other] = math.inf
-                    continue
-                for i in range(3):
-                    a[i], d[i] = 0.0, 0.0
-                    for j in range(3):
-                        a[i] += frames[time, other, j, i] * (eye[j] - centres[time, other, j])
-                        d[i] += frames[time, other, j, i] * (points[time, part, j] - eye[j])
-                    a[i] /= semi_axes[other, i]
-                    d[i] /= semi_axes[other, i]
-                share = -(a[0] * d[0] + a[1] * d[1] + a[2] * d[2]) / (d[0] ** 2 + d[1] ** 2 + d[2] ** 2)
-                share = min(1.0, max(0.0, share))
-                squared = 0.0
-                for i in range(3):
-                    squared += (a[i] + share * d[i]) ** 2
-                out[time, part, other] = math.sqrt(squared) - 1
+                pose = (centres[time, other], frames[time, other], semi_axes[other])
+                out[time, part, other] = math.inf if other == part else clearance(eye, points[time, part], *pose)

@@ -13,7 +13,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.fresnel_anchors import ZoneShares, hiding_parts
+from rtradar.scatter.fresnel_anchors import TracedHiders, ZoneShares, hiding_parts
 from rtradar.scatter.fresnel_zone import zone_rays, zone_shares
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
@@ -57,7 +57,8 @@ class Fresnel:
         backend = select(variant)
         self.variant: str | None = backend.kind
         self._frequency = sweep_nodes(radar)
-        self.shares = ZoneShares(radar, body, BodyTracer(use(backend), body.semi_axes), self._frequency, shadow_rays)
+        hiders = TracedHiders(radar, body, BodyTracer(use(backend), body.semi_axes), shadow_rays)
+        self.shares = ZoneShares(radar, body, self._frequency, hiders)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

@@ -74,6 +74,45 @@ def hiding_parts(
     return found
 
 
+class TracedHiders:
+    """Which parts rays from any antenna meet before those of others.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    tracer : BodyTracer
+        Of the same body.
+    shadow_rays : int
+        Points on each part that are traced.
+    """
+
+    def __init__(self, radar: Radar, body: Body, tracer: BodyTracer, shadow_rays: int) -> None:
+        self._radar, self._body, self._tracer, self._shadow_rays = radar, body, tracer, shadow_rays
+        self._antennas = array_nodes(radar, _TX_NODES, _RX_NODES).antennas
+
+    def __call__(self, time: float) -> NDArray[np.bool_]:
+        """At one time [s]: (part, part), hidden first."""
+        centres, frames, semi_axes = self._body.at(np.array([time]))
+        self._tracer.pose(centres[0], frames[0])
+        parts = np.arange(len(semi_axes))
+        tx, rx, points, k = _middle_zones(self._radar, centres, frames, semi_axes)
+        rays = zone_rays(tx, rx, centres[0], frames[0], semi_axes, points[:, 0], k, self._shadow_rays)
+        antennas = np.broadcast_to(self._antennas, (len(parts), *self._antennas.shape))
+        return hiding_parts(self._tracer, antennas, rays, parts, len(parts))
+
+
+def _middle_zones(
+    radar: Radar, centres: NDArray[np.float64], frames: NDArray[np.float64], semi_axes: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Of every part: the middle of the array twice (part, 3), mirror points (part, time, 3), wavenumber (part,)."""
+    times, parts = centres.shape[:2]
+    tx, rx = radar.tx.mean(axis=0), radar.rx.mean(axis=0)
+    _, _, points = mirror(np.tile(tx, (times, 1)), np.tile(rx, (times, 1, 1)), centres, frames, semi_axes, points=True)
+    k = np.full(parts, 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
+    return np.tile(tx, (parts, 1)), np.tile(rx, (parts, 1)), np.moveaxis(points[:, 0], 0, 1), k
+
+
 class Interval(NamedTuple):
     """Shares over 10 ms: ``fine (part,)`` bool, ``ends (2, frequency, pair, part)`` complex.
 
@@ -99,27 +138,17 @@ class ZoneShares:
     ----------
     radar : Radar
     body : Body
-    tracer : BodyTracer
-        Of the same body.
     frequency : (frequency,) float64
         Where shares are wanted [Hz].
-    shadow_rays : int
-        Points on each part that are traced.
-    hiders : callable, optional
-        ``hiders(time)``: which parts may stand before others (part, part) bool, hidden first, at an anchor and 10 ms after
-        [s], in place of the tracer's answer; parts with none are in full view. None: ask the tracer.
+    hiders : callable
+        ``hiders(time)``: which parts may stand before others (part, part) bool, hidden first, at an anchor [s] and 10 ms
+        after, such as `TracedHiders`; parts with none are in full view.
     """
 
     def __init__(
-        self,
-        radar: Radar,
-        body: Body,
-        tracer: BodyTracer | None,
-        frequency: NDArray[np.float64],
-        shadow_rays: int,
-        hiders: Callable[[float], NDArray[np.bool_]] | None = None,
+        self, radar: Radar, body: Body, frequency: NDArray[np.float64], hiders: Callable[[float], NDArray[np.bool_]]
     ) -> None:
-        self._radar, self._body, self._tracer, self._shadow_rays, self._told = radar, body, tracer, shadow_rays, hiders
+        self._radar, self._body, self._hiders = radar, body, hiders
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, _TX_NODES, _RX_NODES)
         self._step = anchor_step(radar)
@@ -145,26 +174,13 @@ class ZoneShares:
             _blend(nodes, slopes, fine, where, spread[inside], inside, out)
         return out
 
-    def hiders(self, time: float) -> NDArray[np.bool_]:
-        """Which parts rays meet before others at one time [s], for any antenna: (part, part), hidden first."""
-        if self._told is not None:
-            return self._told(time)
-        assert self._tracer is not None, "ZoneShares: neither a tracer nor hiders"
-        centres, frames, semi_axes = self._body.at(np.array([time]))
-        self._tracer.pose(centres[0], frames[0])
-        parts = np.arange(len(semi_axes))
-        tx, rx, points, k = self._zones(centres, frames, semi_axes)
-        rays = zone_rays(tx, rx, centres[0], frames[0], semi_axes, points[:, 0], k, self._shadow_rays)
-        antennas = np.broadcast_to(self._nodes.antennas, (len(parts), *self._nodes.antennas.shape))
-        return hiding_parts(self._tracer, antennas, rays, parts, len(parts))
-
     def shares(self, times: NDArray[np.float64], hiders: NDArray[np.bool_]) -> NDArray[np.complex128]:
         """Shares (time, frequency, pair, part) at these times (time,) [s] behind ``hiders (part, part)``."""
         centres, frames, semi_axes = self._body.at(times)
         out = np.ones((len(times), len(self._wavenumber), len(self._nodes.pairs), len(semi_axes)), dtype=np.complex128)
         hidden = np.flatnonzero(hiders.any(axis=1))
         if len(hidden):
-            tx, rx, points, k = self._zones(centres, frames, semi_axes)
+            tx, rx, points, k = _middle_zones(self._radar, centres, frames, semi_axes)
             pose, part = np.repeat(np.arange(len(times)), len(hidden)), np.tile(hidden, len(times))
             shares = zone_shares(
                 tx[part],
@@ -182,16 +198,6 @@ class ZoneShares:
             out[pose, :, :, part] = shares
         return out
 
-    def _zones(
-        self, centres: NDArray[np.float64], frames: NDArray[np.float64], semi_axes: NDArray[np.float64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        """Of every part: the middle of the array twice (part, 3), mirror points (part, time, 3), wavenumber (part,)."""
-        times, parts = centres.shape[:2]
-        tx, rx = self._radar.tx.mean(axis=0), self._radar.rx.mean(axis=0)
-        _, _, points = mirror(np.tile(tx, (times, 1)), np.tile(rx, (times, 1, 1)), centres, frames, semi_axes, points=True)
-        k = np.full(parts, 2 * np.pi * self._radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
-        return np.tile(tx, (parts, 1)), np.tile(rx, (parts, 1)), np.moveaxis(points[:, 0], 0, 1), k
-
     def _time(self, chirp: float) -> float:
         # Past the end of the recording the body rests in its last pose; before the capture nothing moved.
         return min((max(chirp, 0.0) + 0.5) * self._radar.chirp_duration_s, self._body.duration_s)
@@ -201,7 +207,7 @@ class ZoneShares:
         number = max(number, 0)
         if number not in self._anchors:
             time = self._time(number * self._step)
-            hiders = self.hiders(time)
+            hiders = self._hiders(time)
             self._anchors[number] = hiders, self.shares(np.array([time]), hiders)[0]
             if len(self._anchors) > _KEPT_INTERVALS:
                 self._anchors.popitem(last=False)

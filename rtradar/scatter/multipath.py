@@ -8,7 +8,7 @@ coefficients go straight, and what appears or vanishes fades as in `occlusion`.
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +76,7 @@ class Multipath:
         variant: str = "auto",
         spreading: bool = True,
         order: int = 1,
-        fidelity: Literal["specular", "analytic"] = "specular",
+        fidelity: str = "specular",
         material: str = "perfect-conductor",
     ) -> None:
         if not spreading and (scene.walls or scene.furniture):
@@ -90,14 +90,14 @@ class Multipath:
         self._visibility: MirrorVisibility | None = None
         tracers = None
         if fidelity == "specular":
-            from rtradar.scatter.path_tracer import PosedOnce
             from rtradar.trace.backend import select, use
+            from rtradar.trace.body_tracer import BodyTracer
             from rtradar.trace.room_tracer import RoomTracer
 
             backend = select(variant)
             self.variant = backend.kind
             mi = use(backend)
-            tracer = PosedOnce(mi, body.semi_axes)
+            tracer = BodyTracer(mi, body.semi_axes)
             self._visibility = MirrorVisibility(radar, body, tracer)
             tracers = (tracer, RoomTracer(mi, scene))
         self._frequency = frequency_nodes(scene.walls, radar)

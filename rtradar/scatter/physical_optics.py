@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -16,7 +15,7 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.envelope import PIECES, Envelope, Sample, hermite, stretch, whole_echo
-from rtradar.scatter.facet_body import FacetBody, chosen_parts
+from rtradar.scatter.facet_body import FacetBody
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
 
@@ -84,8 +83,6 @@ class PhysicalOptics:
         Change of a part's echo over the array, over the same, above which it is computed at more places of the array.
     frequencies : int
         Over the sweep. Three leave 3 % where a part is half hidden at 12 GHz, five 1.5 %, and a longer synthesis of the IF.
-    parts : sequence of int, optional
-        Whose echoes are wanted, by number; None: of all. The others still hide them, and nothing else is found of them.
 
     Raises
     ------
@@ -105,7 +102,6 @@ class PhysicalOptics:
         tolerance: float = 0.05,
         unevenness: float = 0.02,
         frequencies: int = 3,
-        parts: Sequence[int] | None = None,
     ) -> None:
         if frequencies not in range(1, _MOST_FREQUENCIES + 1):
             raise InputError(
@@ -122,19 +118,13 @@ class PhysicalOptics:
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_duration_s))
-        self._parts = chosen_parts("physical-optics", body, parts)
-        self._others = np.setdiff1d(np.arange(len(body.part_names)), self._parts)
-        self._envelope = Envelope(self._sample, len(self._parts), tolerance)
+        self._envelope = Envelope(self._sample, len(body.part_names), tolerance)
 
-    def _sample(self, place: float, columns: NDArray[np.int64], whole: float | None) -> Sample:
+    def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
         """Envelope at the fine nodes: computed there where it differs over the array, else spread from the coarse ones."""
         time = min((place * self._step + 0.5) * self._radar.chirp_duration_s, self._body.duration_s)
-        pose, parts = self._body.at([time]), self._parts[columns]
+        pose = self._body.at([time])
         coarse = self._at_nodes(pose, self._coarse, parts)
-        if whole is None and len(self._others):
-            # Of the rest of the body what its mirror points return: enough to tell by what an echo counts as small.
-            rest = self._mirrored(pose, self._coarse, self._others)[1]
-            coarse = coarse._replace(others=float((rest**2).sum(axis=1).mean()))
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse) if whole is None else whole
@@ -142,12 +132,9 @@ class PhysicalOptics:
         if uneven.any():
             fine = self._at_nodes(pose, self._fine, parts[uneven])
             ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
-        return Sample(ratio, strength, coarse.others)
+        return Sample(ratio, strength)
 
-    def _mirrored(
-        self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Path length and amplitude of the mirror points (pair, part) [m]."""
+    def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
         antennas, pairs = nodes.antennas, nodes.pairs
         centres, frames = (np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames))
         length, strength, _ = mirror(
@@ -159,21 +146,17 @@ class PhysicalOptics:
             polarization=self._radar.polarization,
             spreading=self._spreading,
         )
-        return length[:, 0], strength[:, 0]
-
-    def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
-        antennas, pairs = nodes.antennas, nodes.pairs
-        length, mirrored = self._mirrored(pose, nodes, parts)
         amplitude = self._surface.amplitude(
             pose.centres,
             pose.frames,
             antennas[None],
             pairs,
-            length[None],
+            length[None, :, 0],
             self._surface.seen(pose.centres[0], pose.frames[0], antennas, parts),
             np.arange(len(antennas))[None],
             parts,
         )[:, 0]
+        mirrored = strength[:, 0]
         # Without a mirror point there is next to nothing to see either: antennas on opposite sides.
         ratio = np.where(mirrored != 0, amplitude / np.where(mirrored != 0, mirrored, 1.0), 0.0)
         return Sample(ratio, np.abs(mirrored))
@@ -182,15 +165,8 @@ class PhysicalOptics:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength, _ = mirror(
-            at.tx,
-            at.rx,
-            at.centres[:, self._parts],
-            at.frames[:, self._parts],
-            at.semi_axes[self._parts],
-            polarization=self._radar.polarization,
-            spreading=self._spreading,
-        )
+        length, strength, _ = mirror(*at[1:], polarization=self._radar.polarization, spreading=self._spreading)
+        parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals = chirps // self._step
         for interval in np.unique(intervals):
@@ -208,6 +184,6 @@ class PhysicalOptics:
             amplitude=amplitude,
             frequency=self._surface.frequency,
             tx=at.tx_index,
-            part=self._parts,
-            bounces=np.ones(len(self._parts), dtype=np.int64),
+            part=np.arange(parts),
+            bounces=np.ones(parts, dtype=np.int64),
         )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, Forecast
 
 _COST = np.array([0.0, 1.0, 1.5, 6.0, 12.0, 200.0])
-"""Of a part, over that of `analytic`: ``validation/trade.py``, rounded."""
+"""Of a part, by and large: it says which change to try first, where several would do."""
 
 
 _SYSTEMATIC, _INTERFERING = 0.5, 0.6

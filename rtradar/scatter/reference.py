@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.facet_body import FacetBody, chosen_parts
+from rtradar.scatter.facet_body import FacetBody
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
 
@@ -34,13 +32,6 @@ class Reference:
         Whether amplitudes hold 1 / (R1 R2).
     facets : int, optional
         Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a grown person.
-    parts : sequence of int, optional
-        Whose echoes are wanted, by number; None: of all. The others still hide them.
-
-    Raises
-    ------
-    InputError
-        Where there is no such part.
     """
 
     def __init__(
@@ -51,19 +42,17 @@ class Reference:
         variant: str = "auto",
         spreading: bool = True,
         facets: int | None = None,
-        parts: Sequence[int] | None = None,
     ) -> None:
         self._radar, self._body = radar, body
         self._surface = FacetBody(radar, body, variant=variant, spreading=spreading, facets=facets, nodes=_NODES)
-        self._parts = chosen_parts("reference", body, parts)
         self.variant: str | None = self._surface.variant
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        nodes, parts = len(self._surface.frequency), self._parts
-        length, _, _ = mirror(at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
+        length, _, _ = mirror(*at[1:])
+        nodes, parts = len(self._surface.frequency), np.arange(length.shape[2])
         amplitude = np.empty((nodes, *length.shape), dtype=np.complex128)
         cycles = chirps // self._radar.n_tx
         pairs = np.stack([np.zeros(self._radar.n_rx, dtype=np.int64), 1 + np.arange(self._radar.n_rx)], axis=1)

@@ -75,7 +75,9 @@ class BodyTracer:
 
     def pose(self, centres: NDArray[np.float64], frames: NDArray[np.float64]) -> None:
         """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes; Mitsuba hears of it by the first ray."""
-        self._pose, self._waiting = (centres, frames), True
+        # Several ask about one pose in turn, and to place it is most of the cost of a few rays.
+        if self._pose is None or not all(map(np.array_equal, self._pose, (centres, frames))):
+            self._pose, self._waiting = (centres.copy(), frames.copy()), True
 
     def _place(self) -> None:
         """See to it that Mitsuba has the pose."""

@@ -8,6 +8,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.trace.clearance import clearance
+
 DOUBTFUL = 0.005
 """Rays that pass nearer to a surface than this, in units where the ellipsoid is a unit sphere, are for the tracer.
 
@@ -46,10 +48,9 @@ def clearances(
     arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in (origins, targets, centres, frames, semi_axes))
     starts, ends, places, turns, axes = arrays
     out = np.empty(len(starts))
-    inverse = np.ascontiguousarray(np.swapaxes(turns, 1, 2) / axes[:, :, None])
     of_part, longest = np.ascontiguousarray(own, dtype=np.int64), axes.max(axis=1)
     near = _near(starts, ends, of_part, places, longest)
-    _clearances(starts, ends, of_part, places, inverse, longest, near, out)
+    _clearances(starts, ends, of_part, places, turns, axes, longest, near, out)
     return out
 
 
@@ -95,7 +96,7 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
 
 
 @njit(cache=True, error_model="numpy")
-def _clearances(origins, targets, own, centres, inverse, longest, near, out):  # type: ignore[no-untyped-def]
+def _clearances(origins, targets, own, centres, frames, axes, longest, near, out):  # type: ignore[no-untyped-def]
     for ray in range(len(origins)):
         least = 1.0
         o, t = origins[ray], targets[ray]
@@ -110,14 +111,5 @@ def _clearances(origins, targets, own, centres, inverse, longest, near, out):  #
             w0, w1, w2 = w0 - share * d0, w1 - share * d1, w2 - share * d2
             if w0 * w0 + w1 * w1 + w2 * w2 > (_NEAR * longest[part]) ** 2:
                 continue
-            m = inverse[part]
-            a0 = m[0, 0] * (o[0] - c[0]) + m[0, 1] * (o[1] - c[1]) + m[0, 2] * (o[2] - c[2])
-            a1 = m[1, 0] * (o[0] - c[0]) + m[1, 1] * (o[1] - c[1]) + m[1, 2] * (o[2] - c[2])
-            a2 = m[2, 0] * (o[0] - c[0]) + m[2, 1] * (o[1] - c[1]) + m[2, 2] * (o[2] - c[2])
-            b0 = m[0, 0] * d0 + m[0, 1] * d1 + m[0, 2] * d2
-            b1 = m[1, 0] * d0 + m[1, 1] * d1 + m[1, 2] * d2
-            b2 = m[2, 0] * d0 + m[2, 1] * d1 + m[2, 2] * d2
-            share = min(1.0, max(0.0, -(a0 * b0 + a1 * b1 + a2 * b2) / (b0 * b0 + b1 * b1 + b2 * b2)))
-            a0, a1, a2 = a0 + share * b0, a1 + share * b1, a2 + share * b2
-            least = min(least, math.sqrt(a0 * a0 + a1 * a1 + a2 * a2) - 1)
+            least = min(least, clearance(o, t, c, frames[part], axes[part]))
         out[ray] = least

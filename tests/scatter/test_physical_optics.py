@@ -164,29 +164,6 @@ def test_dials_out_of_range_are_refused(dial: str) -> None:
         PhysicalOptics(small_radar(), Passing(), **{dial: -1})  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize("rung", [PhysicalOptics, Reference])
-def test_some_parts_are_what_they_are_among_all(rung: type[PhysicalOptics] | type[Reference]) -> None:
-    radar, body, chirps = small_radar(), Passing(), np.arange(10, 190, 7)
-    whole = rung(radar, body, facets=320).echoes(chirps)  # type: ignore[arg-type]
-    one = rung(radar, body, facets=320, parts=[0]).echoes(chirps)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(one.part, [0])
-    np.testing.assert_array_equal(one.length, whole.length[..., :1])
-    # What counts as small is told from the mirror point of the other part instead of its echo: anchors may differ.
-    np.testing.assert_allclose(one.amplitude, whole.amplitude[..., :1], atol=2e-3 * np.abs(whole.amplitude).max())
-    # It is hidden as before.
-    alone = rung(radar, Alone(), facets=320).echoes(chirps)  # type: ignore[arg-type]
-    assert np.abs(one.amplitude - alone.amplitude).max() > 0.3 * np.abs(alone.amplitude).max()
-    none = rung(radar, body, facets=320, parts=[]).echoes(chirps)  # type: ignore[arg-type]
-    assert none.length.shape == (len(chirps), 2, 0)
-
-
-@pytest.mark.parametrize("rung", [PhysicalOptics, Reference])
-@pytest.mark.parametrize("parts", [[2], [-1], [0, 0]])
-def test_parts_that_are_none_are_refused(rung: type[PhysicalOptics] | type[Reference], parts: list[int]) -> None:
-    with pytest.raises(InputError, match=r"parts = .*numbers from 0 to 1"):
-        rung(small_radar(), Passing(), facets=320, parts=parts)  # type: ignore[arg-type]
-
-
 # -- the array --------------------------------------------------------------------------------------------------------
 
 

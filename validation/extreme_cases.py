@@ -1,0 +1,152 @@
+"""What an extreme case is, and what cases share: small radars and bodies, closed forms, and ways to be refused or warned."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import tempfile
+import warnings
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rtradar as rt
+import rtradar.body
+from rtradar.body.body import Poses
+from rtradar.scatter import build_rung
+
+Array = NDArray[np.float64]
+C = 299_792_458.0
+RUNGS = ("analytic", "specular")
+TRACED = ("specular", "fresnel", "physical-optics", "rays")
+BESIDE = np.array([0.0, 0.1, 0.0])
+
+
+class Case(NamedTuple):
+    """One extreme; ``run`` gives back what it got, and raises AssertionError where that is wrong."""
+
+    name: str
+    expected: str
+    run: Callable[[], str]
+    slow: bool = False
+
+
+def collector() -> tuple[list[Case], Callable[..., Any]]:
+    """A list of cases, and the decorator that adds a function to it by its name and what is expected of it."""
+    cases: list[Case] = []
+
+    def case(name: str, expected: str, *, slow: bool = False) -> Callable[[Callable[[], str]], Callable[[], str]]:
+        def add(run: Callable[[], str]) -> Callable[[], str]:
+            cases.append(Case(name, expected, run, slow))
+            return run
+
+        return add
+
+    return cases, case
+
+
+def refused(work: Callable[[], object], words: str) -> str:
+    """The message of the refusal, which must be one line that holds ``words``, a regular expression."""
+    try:
+        found = work()
+    except rt.InputError as error:
+        message = str(error)
+        assert "\n" not in message, message
+        assert re.search(words, message), message
+        return f"refused: {message}"
+    raise AssertionError(f"not refused, but {found!r}"[:200])
+
+
+def warned(work: Callable[[], Any], words: str) -> tuple[Any, str]:
+    """What it gave, and the warning that holds ``words``."""
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        found = work()
+    said = [str(warning.message) for warning in caught if re.search(words, str(warning.message))]
+    assert said, f"no warning with '{words}', but {[str(w.message) for w in caught]}"
+    return found, said[0]
+
+
+def alone(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) -> rt.Ellipsoids:
+    return rt.Ellipsoids([centre], [np.eye(3) if frame is None else frame], [axes])
+
+
+def together(*targets: rt.Ellipsoids) -> rt.Ellipsoids:
+    return rt.Ellipsoids(*(np.concatenate([getattr(t, name) for t in targets]) for name in ("centres", "frames", "semi_axes")))
+
+
+def along_axis(half_length: float, radii: tuple[float, float], gap: float, frequency: float) -> complex:
+    """F [m] seen along a symmetry axis from ``gap`` before the surface, whose principal radii there are ``radii``."""
+    distance = half_length + gap
+    size = (distance / gap) ** 2 * np.sqrt(np.pi / ((1 / radii[0] + 1 / gap) * (1 / radii[1] + 1 / gap)))
+    return complex(size * np.exp(2j * 2 * np.pi * frequency / C * half_length))
+
+
+def worst_error(pairs: list[tuple[complex, complex]], limit: float) -> str:
+    errors = [abs(ours / reference - 1) for ours, reference in pairs]
+    assert np.isfinite(errors).all(), errors
+    assert max(errors) < limit, errors
+    return f"right to {max(errors):.1e}"
+
+
+@dataclasses.dataclass(frozen=True)
+class Ball:
+    """A sphere that flies along x; all that a rung asks of a body."""
+
+    speed: float = 0.0
+    radius: float = 0.2
+    place: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    part_names: tuple[str, ...] = ("ball",)
+    duration_s: float = 0.2
+
+    @property
+    def semi_axes(self) -> Array:
+        return np.full((1, 3), self.radius)
+
+    def at(self, times: Array) -> Poses:
+        times = np.atleast_1d(times)
+        centres = np.tile(np.asarray(self.place, dtype=np.float64), (len(times), 1, 1))
+        centres[:, 0, 0] += self.speed * times
+        return Poses(centres, np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes)
+
+
+def small_radar(**changes: Any) -> rt.Radar:
+    values: dict[str, Any] = {
+        "name": "small",
+        "tx_y": 2,
+        "tx_z": 0,
+        "rx_y": 4,
+        "rx_z": 0,
+        "chirp_duration_s": 250e-6,
+        "samples_per_chirp": 128,
+        "frame_duration_s": 0.05,
+    }
+    return rt.Radar(**(values | changes))
+
+
+@cache
+def motion() -> rt.Motion:
+    return rt.synthetic_motion("kick", seed=1, duration_s=0.6)
+
+
+def chain(radar: rt.Radar | None = None, what: rt.Motion | None = None, **options: Any) -> tuple[rt.Result, list[str]]:
+    """The whole chain, and its warnings; every number of its summary is finite, or it could not have been written."""
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        values: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.12}
+        result = rt.run(what or motion(), radar or small_radar(), out=Path(folder, "out"), **(values | options))
+    assert np.isfinite(result.points).all()
+    assert np.isfinite(result.survey.power_at).all()
+    return result, [str(warning.message) for warning in caught]
+
+
+def spectrum(radar: rt.Radar, body: Ball, rung: str = "analytic") -> Any:
+    """Range-Doppler of one window of a sphere."""
+    chirps = np.arange(radar.chirps_per_frame)
+    # The rung asks a body for its poses, its parts and its duration: this one has them.
+    echoes = build_rung(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    return rt.process.range_doppler(rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar)
