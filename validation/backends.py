@@ -28,7 +28,8 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
 from rtradar.trace.backend import available, select, use
-from rtradar.trace.body_tracer import SUBDIVISIONS, BodyTracer, Hits
+from rtradar.trace.body_tracer import BodyTracer, Hits
+from rtradar.trace.unit_sphere import SUBDIVISIONS
 
 Array = NDArray[np.float64]
 MOST_DIFFERENT = 1e-4

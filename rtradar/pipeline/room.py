@@ -19,7 +19,7 @@ _Samples = NDArray[np.complex128]
 class RoomIf:
     """IF samples of static clutter, with the moving shadow of a body in it.
 
-    The IF of the whole room is that of one TDM cycle, the same in all of them. At anchors 10 ms apart the IF of what the body
+    The IF of the whole room is that of one TDM cycle, the same in all of them. At anchors 20 ms apart the IF of what the body
     hides is made, from the last anchor's by what has changed; between anchors it fades as the echoes do, for the sum is
     linear in them.
 
@@ -41,6 +41,7 @@ class RoomIf:
             self._whole += self._synthesized(echoes)
         self._shadow = ClutterShadow(clutter, body, variant=variant) if body is not None and clutter.objects else None
         self._lost: dict[int, _Samples] = {}
+        self._mirrored: dict[int, NDArray[np.complex64]] = {}
 
     @property
     def power_m2(self) -> float:
@@ -103,18 +104,28 @@ class RoomIf:
         starts = self._shadow.starts
         lost = lost.copy()
         for index, (first, last) in enumerate(zip(*np.searchsorted(echoes, [starts[:-1], starts[1:]]), strict=True)):
-            if first < last:
-                which, whole = echoes[first:last] - starts[index], self._cycle[index]
+            if first == last:
+                continue
+            which, share, whole = echoes[first:last] - starts[index], change[..., first:last], self._cycle[index]
+            if len(whole.part) == 1:
+                lost += share * self._alone(index)
+            else:
                 lost += self._synthesized(
                     replace(
                         whole,
                         length=whole.length[..., which],
-                        amplitude=whole.amplitude[..., which] * change[..., first:last],
+                        amplitude=whole.amplitude[..., which] * share,
                         part=whole.part[which],
                         bounces=whole.bounces[which],
                     )
                 )
         return lost
 
-    def _synthesized(self, echoes: Echoes) -> _Samples:
-        return np.asarray(synthesize(echoes, self._radar, self._radar.chirp_times(self._radar.n_tx)), dtype=np.complex128)
+    def _alone(self, index: int) -> NDArray[np.complex64]:
+        """IF of an object of one echo: of a mirror, which a person stands before again and again."""
+        if index not in self._mirrored:
+            self._mirrored[index] = self._synthesized(self._cycle[index])
+        return self._mirrored[index]
+
+    def _synthesized(self, echoes: Echoes) -> NDArray[np.complex64]:
+        return np.asarray(synthesize(echoes, self._radar, self._radar.chirp_times(self._radar.n_tx), dtype=np.complex64))

@@ -32,6 +32,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit, prange
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
@@ -41,6 +42,8 @@ CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
 
 _TIME_CONSTANT_S = 1.0
 _PULSES = 2
+
+_CELLS_AT_ONCE = 1024
 
 
 class ClutterRemoval:
@@ -131,11 +134,30 @@ class ClutterRemoval:
         return cycles
 
 
+@njit(cache=True, error_model="numpy", parallel=True)
+def _without_mean(cycles, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (cycle, cell)`` with what is left of ``cycles`` without their mean."""
+    count, cells = cycles.shape
+    for block in prange((cells + _CELLS_AT_ONCE - 1) // _CELLS_AT_ONCE):
+        first, last = block * _CELLS_AT_ONCE, min((block + 1) * _CELLS_AT_ONCE, cells)
+        # Summed in double: the mean of equal values is that value, and nothing of them is left.
+        mean = np.zeros(last - first, dtype=np.complex128)
+        for cycle in range(count):
+            row = cycles[cycle, first:last]
+            for cell in range(last - first):
+                mean[cell] += row[cell]
+        rounded = (mean / count).astype(cycles.dtype)
+        for cycle in range(count):
+            row, left = cycles[cycle, first:last], out[cycle, first:last]
+            for cell in range(last - first):
+                left[cell] = row[cell] - rounded[cell]
+
+
 class _Mean(ClutterRemoval):
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        # Summed in double: the mean of equal values is that value, and nothing of them is left.
-        mean = cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
-        return np.subtract(cycles, mean)
+        out = np.empty(cycles.shape, dtype=cycles.dtype)
+        _without_mean(np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1))
+        return out
 
 
 class _Exponential(ClutterRemoval):

@@ -150,8 +150,8 @@ class Steering:
     runs: NDArray[np.int64]
 
 
-# 96: both lines, the range bins of a person and of where one goes next; 75 kB each.
-@lru_cache(maxsize=96)
+# Both lines and all range bins, for in a room there are echoes in all of them; 75 kB each where asked for.
+@lru_cache(maxsize=512)
 def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> Steering:
     """Phases and range bins of a line for points at one range.
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
@@ -47,7 +48,7 @@ def draw_plan(
         axes.annotate(name, ((first[0] + last[0]) / 2, (first[1] + last[1]) / 2), fontsize=7, color="dimgrey")
     for piece in scene.furniture:
         corners = piece.triangles().corners[..., :2]
-        axes.fill(corners[..., 0].T, corners[..., 1].T, color="tan", alpha=0.5, linewidth=0)
+        axes.add_collection(PolyCollection(list(corners), color="tan", alpha=0.5, linewidth=0))
         axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)

@@ -2,9 +2,9 @@
 
 Over a wall each part of the body sends an echo more, so `mirror` for each of them would cost more than all the rest of a run.
 Between instants at which it has been asked, a mirror point wanders little on its part. So one or two steps of Newton's method,
-for the middle of the line of receivers, start where the point is expected. The path is stationary there: for each
-receiver its second-order term, -1/2 g H^-1 g with the slope g on the tangent plane, leaves an error of third order, below
-1 um.
+for the middle of the line of receivers, start where the point is expected, or none if it is found there. The path is stationary
+there: for each receiver its second-order term, -1/2 g H^-1 g with the slope g on the tangent plane, leaves an error of third
+order, below 1 um.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ _MAX_STEPS = 6
 _LEFT_OUT_M = 1e-6
 """Most that lengths may be off by; where a receiver's own mirror point is farther off, the echo is not counted as known."""
 
-_SMALL_STEP = 0.01
-"""A Newton step below this share of the least semi-axis is followed by one below its square."""
+_SMALL_STEP = 0.003
+"""Share of the least semi-axis: a smaller step of Newton's method is left to the receivers."""
 
 
 @njit(cache=True, error_model="numpy")
@@ -119,6 +119,7 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                 local[i] = start[chirp, echo, i]
             least = min(axes[0], min(axes[1], axes[2]))
             settled = False
+            facing_tx = 0.0
             for _ in range(_MAX_STEPS):
                 scale = 1 / math.sqrt((local[0] / axes[0]) ** 2 + (local[1] / axes[1]) ** 2 + (local[2] / axes[2]) ** 2)
                 for i in range(3):
@@ -126,11 +127,10 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                 for i in range(3):
                     point[i] = centre[i] + frame[i, 0] * local[0] + frame[i, 1] * local[1] + frame[i, 2] * local[2]
                 _tangents(local, axes, frame, e, f, normal, bend)
-                if settled:
-                    break
                 _slope(point, e, f, here, to_tx)
                 _slope(point, e, f, there, to_rx)
-                facing = _facing(point, normal, here, to_tx[0]) + _facing(point, normal, there, to_rx[0])
+                facing_tx = _facing(point, normal, here, to_tx[0])
+                facing = facing_tx + _facing(point, normal, there, to_rx[0])
                 h_ee = (1 - to_tx[1] ** 2) / to_tx[0] + (1 - to_rx[1] ** 2) / to_rx[0] + facing * bend[0]
                 h_ff = (1 - to_tx[2] ** 2) / to_tx[0] + (1 - to_rx[2] ** 2) / to_rx[0] + facing * bend[1]
                 h_ef = -to_tx[1] * to_tx[2] / to_tx[0] - to_rx[1] * to_rx[2] / to_rx[0] + facing * bend[2]
@@ -141,13 +141,14 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                 size = math.sqrt(step_e * step_e + step_f * step_f)
                 if not (facing > 0 and determinant > 0 and size < 10 * least):
                     break
+                # So small a step is within what each receiver makes good for itself.
                 settled = size < _SMALL_STEP * least
+                if settled:
+                    break
                 # The step, turned back into the part's own axes.
                 for i in range(3):
                     local[i] += step_e * (frame[0, i] * e[0] + frame[1, i] * e[1] + frame[2, i] * e[2])
                     local[i] += step_f * (frame[0, i] * f[0] + frame[1, i] * f[1] + frame[2, i] * f[2])
-            _slope(point, e, f, here, to_tx)
-            facing_tx = _facing(point, normal, here, to_tx[0])
             own_ee = (1 - to_tx[1] ** 2) / to_tx[0] + facing_tx * bend[0]
             own_ff = (1 - to_tx[2] ** 2) / to_tx[0] + facing_tx * bend[1]
             own_ef = -to_tx[1] * to_tx[2] / to_tx[0] + facing_tx * bend[2]

@@ -2,13 +2,11 @@
 
 A leg over a wall is straight from the antenna's image, so lengths and returns of every path are those of the same geometric
 optics with images for antennas, in float64 at every chirp. What walls, polarisation, the surface of the body and shadows do to
-the field changes slowly: it is found at anchors 10 ms apart for the ends of the lines of antennas (`path_anchors`). In between
+the field changes slowly: it is found at anchors 20 ms apart for the ends of the lines of antennas (`path_anchors`). In between
 coefficients go straight, and what appears or vanishes fades as in `occlusion`.
 """
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +18,19 @@ from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_ends import ArrayEnds
 from rtradar.scatter.body_material import Surface, body_material
-from rtradar.scatter.ghost_echoes import nearby_echoes, weigh
+from rtradar.scatter.ghost_echoes import weigh
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.path_account import PathAccount, account
 from rtradar.scatter.path_anchors import PathAnchors, Poses, Surroundings, path_anchors
-from rtradar.scatter.polarization import copolar
 from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
+from rtradar.scatter.wall_echoes import WallEchoes
 from rtradar.scatter.wall_nodes import frequency_nodes
-from rtradar.scatter.wall_paths import WallPath, corners, images, wall_paths
+from rtradar.scatter.wall_paths import WallPath, corners, wall_paths
 from rtradar.scene import Scene
+
+ANCHORS_S = 20e-3
+"""Between instants at which what is left of echoes over walls is found; against 2.5 ms, ghosts are -23 dB off (10 ms: -24)."""
 
 _KEPT_BYTES = 64e6
 """Of anchors that are remembered, so that pruning and the signal trace once: 10 s of a room of six walls."""
@@ -106,8 +107,9 @@ class Multipath:
         self._around = Surroundings(scene, tracers, eta, self._frequency, radar.polarization)
         self._plain = not scene.walls and not scene.furniture and material == "perfect-conductor"
         self._ends = ArrayEnds.of(radar)
-        self._step = anchor_step(radar)
+        self._step = anchor_step(radar, ANCHORS_S)
         self.paths: tuple[WallPath, ...] = wall_paths(scene.walls, np.asarray(radar.position_m), order)
+        self._over_walls = WallEchoes(radar, self.paths, far_field=fidelity == "analytic")
         parts = len(body.part_names)
         self._path, self._part = (array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts))
         self._kept: dict[int, PathAnchors] = {}
@@ -129,7 +131,6 @@ class Multipath:
         if self._plain:
             length, amplitude = self._direct(chirps, at)
             return self._as_echoes(at.tx_index, length, amplitude.astype(np.complex128)[None])
-        # First of all: while the body is posed for these, who sees the direct echoes is asked too.
         interval, share, before, after = self._around_chirps(chirps)
         line = self._ends.line_of_tx[at.tx_index]
         first, last = before.start[interval, line], after.start[interval, line]
@@ -142,7 +143,9 @@ class Multipath:
         if n_echoes > n_direct:
             ghosts = slice(n_direct, n_echoes)
             wanted = np.any(before.seen | after.seen, axis=(2, 3), keepdims=True)[interval, line, 0, 0, ghosts]
-            lengths[..., ghosts], bare[..., ghosts] = self._over_walls(at, start[:, ghosts], wanted, ghosts)
+            lengths[..., ghosts], bare[..., ghosts] = self._over_walls.at(
+                self._path[ghosts], self._part[ghosts], at, start[:, ghosts], wanted
+            )
         out = np.empty((*shape, n_echoes), dtype=np.complex128)
         factors = [self._ends.spread(anchor.factor) for anchor in (before, after)]
         seen = [self._ends.spread(anchor.seen.astype(np.float32)) for anchor in (before, after)]
@@ -171,55 +174,6 @@ class Multipath:
         length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
         return length, amplitude * weight
 
-    def _over_walls(
-        self, at: ChirpPoses, start: NDArray[np.float64], wanted: NDArray[np.bool_], ghosts: slice
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Lengths and returns (chirp, rx, echo) as if conductors stood alone before the images."""
-        path, part = self._path[ghosts], self._part[ghosts]
-        shape = (*at.rx.shape[:2], len(path))
-        length, amplitude = np.empty(shape), np.empty(shape)
-        if self._fidelity == "analytic":
-            for number in np.unique(path):
-                own = path == number
-                tx, rx = (images(leg, antennas) for leg, antennas in self._legs(number, at))
-                poses = (at.centres[:, part[own]], at.frames[:, part[own]], at.semi_axes[part[own]])
-                length[..., own], amplitude[..., own] = far_field_echo(tx, rx, *poses)
-            return length, amplitude
-        legs = list(dict.fromkeys(leg for path in self.paths for leg in (path.out, path.back)))
-        radar, line = self._radar, self._ends.line_of_tx
-        heard = radar.rx[radar.rx_of_tx]
-        known = np.empty(wanted.shape, dtype=bool)
-        nearby_echoes(
-            np.array([images(leg, radar.tx) for leg in legs]),
-            np.ascontiguousarray(np.swapaxes([images(leg, heard) for leg in legs], 2, 3)),
-            np.array([images(leg, self._ends.rx_middle[line]) for leg in legs]),
-            at.tx_index,
-            np.array([legs.index(self.paths[number].out) for number in path]),
-            np.array([legs.index(self.paths[number].back) for number in path]),
-            part,
-            *at[3:],
-            start,
-            wanted,
-            length,
-            amplitude,
-            known,
-        )
-        for echo in np.flatnonzero(~known.all(axis=0)):
-            chirps = np.flatnonzero(~known[:, echo])
-            tx, rx = (images(leg, antennas[chirps]) for leg, antennas in self._legs(path[echo], at))
-            own = part[echo : echo + 1]
-            poses = (at.centres[chirps][:, own], at.frames[chirps][:, own], at.semi_axes[own])
-            exact, strength, points = mirror(tx, rx, *poses, polarization=radar.polarization, points=True)
-            share = copolar(tx[:, None, None] - points, rx[:, :, None] - points, radar.polarization)
-            length[chirps, :, echo] = exact[..., 0]
-            returned = strength / np.where(np.abs(share) > 1e-6, share, np.inf)
-            # Where the body comes between the images, the mirror point ends with no number.
-            amplitude[chirps, :, echo] = np.where(np.isfinite(returned), returned, 0.0)[..., 0]
-        return length, amplitude
-
-    def _legs(self, number: int, at: ChirpPoses) -> tuple[tuple[Any, NDArray[np.float64]], ...]:
-        return (self.paths[number].out, at.tx), (self.paths[number].back, at.rx)
-
     # -- anchors -------------------------------------------------------------------------------------------------
 
     def _around_chirps(
@@ -240,13 +194,7 @@ class Multipath:
         for first in range(0, len(missing), _ANCHORS_AT_ONCE):
             some = missing[first : first + _ANCHORS_AT_ONCE]
             at = chirp_poses(self._radar, self._body, np.array(some) * self._step)
-            chirps = np.array(some)[:, None] * self._step
-
-            def beside(place: int, chirps: NDArray[np.int64] = chirps) -> None:
-                if self._visibility is not None:
-                    self._visibility.at(chirps[place])
-
-            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, Poses(*at[3:]), beside)
+            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, Poses(*at[3:]))
             for place, number in enumerate(some):
                 self._kept[number] = PathAnchors(*(array[place].copy() for array in found))
         needed = set(numbers.tolist())
@@ -263,7 +211,7 @@ class Multipath:
         Parameters
         ----------
         n_chirps : int
-            Of the capture; one every 10 ms is looked at.
+            Of the capture; one every 20 ms is looked at.
         noise_power_m2 : float
             Per IF sample; 0 leaves out only what is never seen.
         margin_db : float

@@ -23,7 +23,7 @@ class PathAccount:
     order : int
         Reflections at walls.
     power_m2 : float
-        Of all parts, averaged over rx and one chirp every 10 ms.
+        Of all parts, averaged over rx and one chirp every 20 ms.
     over_noise_db : float or None
         The same over noise, after the gain of samples, cycles and channels; None without noise or without an echo.
     kept, dropped : tuple of str

@@ -7,7 +7,7 @@ points are those for the middles of the lines of antennas, legs run from the end
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import Literal, NamedTuple
 
@@ -72,7 +72,6 @@ def path_anchors(
     path: NDArray[np.int64],
     part: NDArray[np.int64],
     poses: Poses,
-    beside: Callable[[int], None],
 ) -> PathAnchors:
     """Look at some poses.
 
@@ -84,8 +83,6 @@ def path_anchors(
     path, part : (echo,) int64
         Of each echo. Whether other parts hide a direct one is left to `MirrorVisibility`.
     poses : Poses
-    beside : function of int
-        Called with the number of each anchor while the body is posed for it, where anything is traced.
 
     Returns
     -------
@@ -114,7 +111,6 @@ def path_anchors(
         clear = [_no_furniture(room, leg, ask) for leg, ask in zip(legs, asked, strict=True)]
         for anchor in range(len(seen)):
             body.pose(poses.centres[anchor], poses.frames[anchor])
-            beside(anchor)
             for leg, still in zip(legs, clear, strict=True):
                 _clear_of_body(body, leg, still[anchor], anchor, part, direct)
         seen &= clear[0][:, :, :, None] & clear[1][:, :, None]
@@ -205,6 +201,5 @@ def _clear_of_body(
         own = part[chosen[echo]] if last else np.full(len(echo), -1)
         rays.append((origins[anchor, line, end, echo], targets[anchor, line, end, echo], own, line, end, chosen[echo]))
     starts, stops, own, line, end, echo = (np.concatenate(column) for column in zip(*rays, strict=True))
-    hits = body.first_hits(starts, stops)
-    hidden = (hits.part != own) & (hits.distance < np.linalg.norm(stops - starts, axis=1) * (1 - 1e-7))
+    hidden = ~body.sees(starts, stops, own)
     clear[line[hidden], end[hidden], echo[hidden]] = False

@@ -14,12 +14,12 @@ from rtradar.radar import Radar
 _ANCHORS_S = 10e-3
 
 
-def anchor_step(radar: Radar) -> int:
-    """Chirps between anchors, the instants 10 ms apart at which scenes are traced and power is measured.
+def anchor_step(radar: Radar, apart_s: float = _ANCHORS_S) -> int:
+    """Chirps between anchors, the instants at which scenes are traced and power is measured.
 
-    A limb at 5 m/s goes 5 cm between them.
+    A limb at 5 m/s goes 5 cm in 10 ms.
     """
-    return max(1, round(_ANCHORS_S / radar.chirp_duration_s))
+    return max(1, round(apart_s / radar.chirp_duration_s))
 
 
 class Rung(Protocol):

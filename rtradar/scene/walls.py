@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -75,13 +76,13 @@ class Wall:
         object.__setattr__(self, "thickness_m", check_number(where, "thickness_m", self.thickness_m, 1e-4, 10.0))
         object.__setattr__(self, "roughness_m", check_number(where, "roughness_m", self.roughness_m, 0.0, 0.1))
 
-    @property
+    @cached_property
     def normal(self) -> NDArray[np.float64]:
         """Unit normal of the front, away from the slab, (3,)."""
         normal = np.cross(self.edge_u_m, self.edge_v_m)
         return np.asarray(normal / np.linalg.norm(normal))
 
-    @property
+    @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Corners of the front face, anticlockwise seen from the front, (4, 3) [m]."""
         corner, u, v = (np.array(vector) for vector in (self.corner_m, self.edge_u_m, self.edge_v_m))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 
 import numpy as np
@@ -13,9 +12,14 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
+from rtradar.signal.phasor import phasor
+from rtradar.signal.spreading import MOST_NODES, spread_sum
 
 MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
+
+MANY_ECHOES = 32
+"""From so many on, tones are spread over a grid for one FFT if float32 will do, in half the time and, from 250 on, a fifth."""
 
 _LANES = 32
 _INSTANTS = 16
@@ -23,22 +27,6 @@ _INSTANTS = 16
 
 _POWERS = 3
 """Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
-
-
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _phasor(turns):  # type: ignore[no-untyped-def]
-    """Cosine and sine of so many turns, to 2e-16: by Taylor's series of an eighth, branch-free, and so in vector lanes."""
-    quarters = np.floor(4 * turns + 0.5)
-    angle = (turns - 0.25 * quarters) * (2 * math.pi)
-    x = angle * angle
-    sine = 1 / 362880 + x * (-1 / 39916800 + x * (1 / 6227020800 - x / 1307674368000))
-    sine = angle * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
-    cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * (-1 / 87178291200 + x / 20922789888000)))
-    cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
-    quadrant = quarters - 4 * np.floor(0.25 * quarters)
-    odd = quadrant == 1 or quadrant == 3
-    across, up = (sine, cosine) if odd else (cosine, sine)
-    return -across if quadrant == 1 or quadrant == 2 else across, -up if quadrant >= 2 else up
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
@@ -118,8 +106,8 @@ def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, 
                 delay[i] = length[chirp, receiver, heard[i]] / SPEED_OF_LIGHT_MPS
             for i in range(count):
                 beat = slope * delay[i]
-                start_re[i], start_im[i] = _phasor(start_frequency * delay[i] - 0.5 * beat * delay[i])
-                turn_re[i], turn_im[i] = _phasor(beat / sample_rate)
+                start_re[i], start_im[i] = phasor(start_frequency * delay[i] - 0.5 * beat * delay[i])
+                turn_re[i], turn_im[i] = phasor(beat / sample_rate)
             sum_re[:] = 0.0
             sum_im[:] = 0.0
             # Horner's scheme over threes of powers of the sample number.
@@ -185,7 +173,8 @@ def synthesize(
     times : (chirp,) array_like
         Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
-        Of the samples; sums and phases are float64 in both.
+        Of the samples. Phases are float64 in both, sums too - but for `MANY_ECHOES` and more, which `spread_sum` adds up in
+        complex64, to 1e-6, where amplitudes are given at 6 frequencies at most.
 
     Returns
     -------
@@ -208,7 +197,8 @@ def synthesize(
         raise ValueError(f"synthesize: times has shape {times.shape}; with these echoes it must be {echoes.length.shape[:1]}")
     _warn_of_motion_in_chirp(echoes, radar, times)
     out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
-    _synthesize(
+    many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES and out.dtype == np.complex64
+    (spread_sum if many else _synthesize)(
         np.ascontiguousarray(echoes.length),
         np.ascontiguousarray(echoes.amplitude, dtype=np.complex128),
         _powers_of_sample_number(echoes.frequency, radar),

@@ -15,10 +15,8 @@ from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene
-from rtradar.trace.sightlines import DOUBTFUL, clearances
-
-SUBDIVISIONS = 4
-"""5120 triangles a part: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it. Instances make them free."""
+from rtradar.trace.sightlines import DOUBTFUL, clearances, outline_rays
+from rtradar.trace.unit_sphere import SUBDIVISIONS, UnitSphere
 
 
 @dataclass(frozen=True)
@@ -55,6 +53,7 @@ class BodyTracer:
         self._mi = mi
         self._scalar = mi.variant().startswith("scalar")
         self._semi_axes = np.asarray(semi_axes, dtype=np.float64)
+        self._sphere = UnitSphere(mi)
         self._vertices, self._faces = unit_sphere(SUBDIVISIONS)
         self._scene = build_body_scene(mi, self._vertices, self._faces, len(self._semi_axes))
         self._parameters = mi.traverse(self._scene)
@@ -96,21 +95,19 @@ class BodyTracer:
         pose_body_scene(self._mi, self._parameters, matrices)
 
     def sees(self, origins: NDArray[np.float64], targets: NDArray[np.float64], own: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether no other part stands before ``targets (ray, 3)`` on part ``own (ray,)``, seen from ``origins (ray, 3)`` [m].
+        """Whether no other part stands between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
 
-        Rays that pass every outline at a distance are told in closed form; Mitsuba decides the others.
+        A target lies on part ``own (ray,)``, which cannot hide it, or on none, -1. Rays that pass every outline at a distance are
+        told in closed form; Mitsuba decides the others, outline by outline.
         """
         if self._pose is None:
             raise RuntimeError("BodyTracer: pose the body before rays are sent")
         clear = clearances(origins, targets, own, *self._pose, self._semi_axes)
         seen = clear > 0
         doubtful = np.flatnonzero(np.abs(clear) < DOUBTFUL)
-        if len(doubtful):
-            starts, ends = origins[doubtful], targets[doubtful]
-            hits = self.first_hits(starts, ends)
-            # The part's own mesh may miss the ray at its rim, or lie a hair behind the point: only others can hide it.
-            nearer = hits.distance < np.linalg.norm(ends - starts, axis=1) * (1 - 1e-7)
-            seen[doubtful] = ~((hits.part != own[doubtful]) & nearer)
+        rays, whose = outline_rays(origins[doubtful], targets[doubtful], own[doubtful], *self._pose, self._semi_axes)
+        seen[doubtful] = True
+        seen[doubtful[whose[self._sphere.meets(rays)]]] = False
         return seen
 
     def first_hits(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Hits:

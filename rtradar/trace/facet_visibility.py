@@ -15,9 +15,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rtradar.body.meshes import unit_sphere
-from rtradar.trace.body_tracer import SUBDIVISIONS
 from rtradar.trace.outlines import VIEWS, may_hide, outlines
+from rtradar.trace.unit_sphere import UnitSphere
 
 _NEAR = 0.01
 """Lines of sight are traced that pass a part, outside or inside of its outline, by less than this share of its semi-axes."""
@@ -186,15 +185,8 @@ class FacetTracer:
     """
 
     def __init__(self, mi: Any, semi_axes: NDArray[np.float64]) -> None:
-        self._mi = mi
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
-        vertices, faces = unit_sphere(SUBDIVISIONS)
-        mesh = mi.Mesh("unit_sphere", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
-        parameters["faces"] = np.ravel(faces).astype(np.uint32)
-        parameters.update()
-        self._scene = mi.load_dict({"type": "scene", "unit_sphere": mesh})
+        self._sphere = UnitSphere(mi)
 
     def occluders(
         self,
@@ -236,22 +228,6 @@ class FacetTracer:
             float(margin),
             hidden,
         )
-        # Dr.Jit takes the process down over arrays without entries.
-        if len(slot):
-            met = self._met(rays)
-            hidden.ravel()[slot[met]] = hider[met]
+        met = self._sphere.meets(rays)
+        hidden.ravel()[slot[met]] = hider[met]
         return hidden
-
-    def _met(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
-        """Which of the rays (7, ray) meet the unit sphere of triangles."""
-        mi = self._mi
-        if mi.variant().startswith("scalar"):
-            found = []
-            for x, y, z, *way, reach in rays.T.tolist():
-                ray = mi.Ray3f(mi.Point3f(x, y, z), mi.Vector3f(*way))
-                ray.maxt = reach
-                found.append(bool(self._scene.ray_test(ray)))
-            return np.array(found)
-        ray = mi.Ray3f(mi.Point3f(np.ascontiguousarray(rays[:3])), mi.Vector3f(np.ascontiguousarray(rays[3:6])))
-        ray.maxt = mi.Float(np.ascontiguousarray(rays[6]))
-        return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())

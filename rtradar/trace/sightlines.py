@@ -13,7 +13,7 @@ from rtradar.trace.clearance import clearance
 DOUBTFUL = 0.005
 """Rays that pass nearer to a surface than this, in units where the ellipsoid is a unit sphere, are for the tracer.
 
-Its triangles lie up to 0.0007 from the sphere (`rtradar.trace.body_tracer`).
+Its triangles lie up to 0.0007 from the sphere (`rtradar.trace.unit_sphere`).
 """
 
 
@@ -36,7 +36,7 @@ def clearances(
     origins, targets : (ray, 3) float64
         Ends, world [m].
     own : (ray,) int64
-        Part that the target is on, which does not count.
+        Part that the target is on, which does not count; -1: all do.
     centres, frames, semi_axes : (part, 3), (part, 3, 3), (part, 3) float64
         Pose [m].
 
@@ -70,14 +70,15 @@ def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
 @njit(cache=True, error_model="numpy")
 def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-def]
     """Which parts come near any of the lines to a part, (own, part)."""
+    # One more than there are parts: targets that are on none come last.
     parts = len(centres)
-    middles, reach, counts = np.zeros((parts, 2, 3)), np.zeros((parts, 2)), np.zeros(parts)
+    middles, reach, counts = np.zeros((parts + 1, 2, 3)), np.zeros((parts + 1, 2)), np.zeros(parts + 1)
     for ray in range(len(own)):
         counts[own[ray]] += 1
     _bundle(origins, own, counts, middles[:, 0], reach[:, 0])
     _bundle(targets, own, counts, middles[:, 1], reach[:, 1])
-    near = np.zeros((parts, parts), dtype=np.bool_)
-    for part in range(parts):
+    near = np.zeros((parts + 1, parts), dtype=np.bool_)
+    for part in range(parts + 1):
         a, way = middles[part, 0], middles[part, 1] - middles[part, 0]
         first, last = math.sqrt(reach[part, 0]), math.sqrt(reach[part, 1])
         length = math.sqrt(way @ way)
@@ -113,3 +114,62 @@ def _clearances(origins, targets, own, centres, frames, axes, longest, near, out
                 continue
             least = min(least, clearance(o, t, c, frames[part], axes[part]))
         out[ray] = least
+
+
+def outline_rays(
+    origins: NDArray[np.float64],
+    targets: NDArray[np.float64],
+    own: NDArray[np.int64],
+    centres: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    semi_axes: NDArray[np.float64],
+) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+    """Rays along lines of sight past each part that they come near, in axes where this part is the unit sphere.
+
+    Parameters
+    ----------
+    As of `clearances`.
+
+    Returns
+    -------
+    rays : (7, n) float32
+        Start, two radii before what may be met; direction; how far to go.
+    whose : (n,) int64
+        Line of sight of each.
+    """
+    arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in (origins, targets, centres, frames, semi_axes))
+    starts, ends, places, turns, axes = arrays
+    return _outline_rays(starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, turns, axes)
+
+
+@njit(cache=True, error_model="numpy")
+def _outline_rays(origins, targets, own, centres, frames, axes):  # type: ignore[no-untyped-def]
+    most = len(origins) * len(centres)
+    rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
+    start, way = np.empty(3), np.empty(3)
+    for ray in range(len(origins)):
+        for part in range(len(centres)):
+            if part == own[ray]:
+                continue
+            span, along = 0.0, 0.0
+            for i in range(3):
+                start[i], way[i] = 0.0, 0.0
+                for j in range(3):
+                    start[i] += frames[part, j, i] * (origins[ray, j] - centres[part, j]) / axes[part, i]
+                    way[i] += frames[part, j, i] * (targets[ray, j] - origins[ray, j]) / axes[part, i]
+                span += way[i] * way[i]
+                along -= start[i] * way[i]
+            nearest = min(1.0, max(0.0, along / span))
+            square = 0.0
+            for i in range(3):
+                square += (start[i] + nearest * way[i]) ** 2
+            if square > (1 + DOUBTFUL) ** 2:
+                continue
+            distance = math.sqrt(span)
+            ahead = max(nearest - 2 / distance, 0.0)
+            for i in range(3):
+                rays[i, count], rays[3 + i, count] = start[i] + ahead * way[i], way[i] / distance
+            rays[6, count] = (1 - ahead) * distance
+            whose[count] = ray
+            count += 1
+    return rays[:, :count].copy(), whose[:count]

@@ -14,7 +14,7 @@ from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter.mirror import mirror
-from rtradar.scatter.multipath import Multipath
+from rtradar.scatter.multipath import ANCHORS_S, Multipath
 from rtradar.scatter.polarization import copolar
 from rtradar.scatter.poses import anchor_step, chirp_poses
 from rtradar.scatter.specular import Specular
@@ -283,7 +283,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     sheet = replace(wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0))
     radar = single()
     rung = Multipath(radar, body, Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
-    chirps = np.arange(0, 1000, anchor_step(radar))
+    chirps = np.arange(0, 1000, anchor_step(radar, ANCHORS_S))
     echoes = rung.echoes(chirps)
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     _, _, point = mirror(images(rung.paths[1].back, at.tx), at.rx, *at[3:], points=True)
@@ -295,7 +295,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     assert 0 < seen.sum() < len(seen)
     # On its way in it fades: between two anchors it is neither all nor nothing.
     first = int(chirps[np.flatnonzero(seen)[0]])
-    fade = np.abs(rung.echoes(np.arange(first - anchor_step(radar), first + 1)).amplitude[0, :, 0, 1])
+    fade = np.abs(rung.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[0, :, 0, 1])
     assert fade[0] == 0
     assert (np.diff(fade) > 0).all()
 

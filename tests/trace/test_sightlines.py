@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.sightlines import clearances
+from rtradar.trace.sightlines import clearances, outline_rays
 
 Array = NDArray[np.float64]
 
@@ -67,3 +67,31 @@ def test_what_is_told_without_rays_is_what_rays_tell(seed: int, backend: Backend
     by_rays = ~((hits.part != own) & nearer)
     assert 0.2 < by_rays.mean() < 0.9
     np.testing.assert_array_equal(tracer.sees(origins, targets, own), by_rays)
+
+
+def test_a_target_on_no_part_is_hidden_by_any(backend: Backend) -> None:
+    """Three points on one line: before a ball of 0.1 m, inside, and behind it; and a line that passes 1 mm beside it."""
+    tracer = BodyTracer(use(backend), np.full((2, 3), 0.1))
+    tracer.pose(np.array([[1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]), np.tile(np.eye(3), (2, 1, 1)))
+    origins = np.zeros((5, 3))
+    targets = np.array([[0.89, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [2.0, 2 * 0.1016, 0], [2.0, 2 * 0.0994, 0]])
+    own = np.full(5, -1)
+    np.testing.assert_array_equal(tracer.sees(origins, targets, own), [True, False, False, True, False])
+    np.testing.assert_array_equal(tracer.sees(origins, targets, np.zeros(5, dtype=np.int64)), True)
+
+
+def test_rays_along_outlines_start_two_radii_before_them_and_end_at_the_target() -> None:
+    centres, frames, axes = crowd(7)
+    rng = np.random.default_rng(7)
+    origins = np.array([-4.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (200, 3))
+    targets, own = rng.uniform(-0.6, 0.6, (200, 3)), rng.integers(-1, 6, 200)
+    rays, whose = outline_rays(origins, targets, own, centres, frames, axes)
+    assert rays.dtype == np.float32
+    assert len(whose) > 25
+    np.testing.assert_allclose(np.linalg.norm(rays[3:6], axis=0), 1, atol=1e-6)
+    # In axes of some part other than its own, each ends at its target.
+    ends = rays[:3] + rays[6] * rays[3:6]
+    local = np.einsum("pji,npj->npi", frames, targets[whose][:, None] - centres) / axes
+    gap = np.linalg.norm(local - ends.T[:, None], axis=-1)
+    gap[np.arange(len(whose))[own[whose] >= 0], own[whose][own[whose] >= 0]] = np.inf
+    assert gap.min(axis=1).max() < 1e-4

@@ -1,0 +1,87 @@
+"""Many echoes spread over a grid for one FFT: against the plain sum, tone by tone."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+from rtradar.signal import synthesize
+from rtradar.signal.synthesis import MANY_ECHOES
+
+LOW = Radar.preset("paper-12ghz")
+ODD = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=45, frame_duration_s=3.75e-3)
+
+
+def crowd(radar: Radar, nodes: int, seed: int, *, count: int = MANY_ECHOES, chirps: int = 3) -> Echoes:
+    rng = np.random.default_rng(seed)
+    shape = (chirps, radar.n_rx, count)
+    places = -np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes) / 2
+    amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
+    return Echoes(
+        # The same for all chirps, for nothing moves so fast.
+        length=rng.uniform(-0.1, 1.1, shape[1:]) * 2 * radar.max_range_m + np.zeros(shape),
+        amplitude=amplitude,
+        frequency=radar.centre_frequency_hz + radar.bandwidth_hz * places,
+        tx=radar.tx_of_chirp(np.arange(chirps)),
+        part=np.zeros(count, dtype=np.int64),
+        bounces=np.ones(count, dtype=np.int64),
+    )
+
+
+def plain(echoes: Echoes, radar: Radar) -> NDArray[np.complex128]:
+    """Paper, eq. 9 with its last term, in NumPy; amplitudes by Lagrange's polynomial."""
+    time = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
+    frequency = radar.start_frequency_hz + radar.slope_hz_per_s * time
+    delay = echoes.length[..., None] / SPEED_OF_LIGHT_MPS
+    beat = radar.slope_hz_per_s * delay
+    turns = radar.start_frequency_hz * delay + beat * time - beat * delay / 2
+    amplitude = np.zeros(turns.shape, dtype=np.complex128)
+    for node, own in enumerate(echoes.frequency):
+        others = np.delete(echoes.frequency, node)
+        amplitude += echoes.amplitude[node][..., None] * np.prod((frequency[:, None] - others) / (own - others), axis=1)
+    heard = (beat >= 0) & (beat < radar.sample_rate_hz)
+    return np.asarray(np.sum(np.where(heard, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2))
+
+
+# Three nodes to a grid of complex64: 1e-6 of the sum; a second grid, whose powers cancel in part, three times that.
+@pytest.mark.parametrize(("nodes", "error"), [(1, 1e-6), (2, 1e-6), (3, 1e-6), (4, 3e-6), (6, 5e-6)])
+@pytest.mark.parametrize("radar", [LOW, ODD], ids=["12ghz", "45 samples"])
+def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int, error: float) -> None:
+    echoes = crowd(radar, nodes, seed=nodes)
+    expected = plain(echoes, radar)
+    found = synthesize(echoes, radar, radar.chirp_times(3), dtype=np.complex64)
+    assert found.dtype == np.complex64
+    assert np.sqrt((np.abs(found - expected) ** 2).mean() / (np.abs(expected) ** 2).mean()) < error
+
+
+@settings(max_examples=25)
+@given(st.integers(0, 2**32 - 1))
+def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chirps(seed: int) -> None:
+    echoes = crowd(ODD, 3, seed, chirps=60)
+    order = np.random.default_rng(seed).permutation(MANY_ECHOES)
+    times = ODD.chirp_times(60)
+    shuffled = replace(echoes, length=echoes.length[..., order], amplitude=echoes.amplitude[..., order])
+    found = synthesize(echoes, ODD, times, dtype=np.complex64)
+    largest = np.abs(found).max()
+    np.testing.assert_allclose(synthesize(shuffled, ODD, times, dtype=np.complex64), found, rtol=0, atol=2e-6 * largest)
+    tail = replace(echoes, length=echoes.length[50:], amplitude=echoes.amplitude[:, 50:], tx=echoes.tx[50:])
+    np.testing.assert_array_equal(synthesize(tail, ODD, times[50:], dtype=np.complex64), found[50:])
+
+
+def test_one_echo_among_silent_ones_is_a_clean_tone() -> None:
+    """What is left out of a tone lies far below it at every other beat frequency."""
+    echoes = crowd(LOW, 1, seed=0)
+    alone = np.zeros_like(echoes.amplitude)
+    alone[..., 5] = 1.0
+    length = np.full_like(echoes.length, 5.4321)
+    one = replace(echoes, length=length, amplitude=alone)
+    x = synthesize(one, LOW, LOW.chirp_times(3), dtype=np.complex64)[0, 0]
+    spectrum = np.abs(np.fft.fft(x * np.blackman(256) ** 2)) / 256
+    peak = int(spectrum.argmax())
+    assert np.delete(spectrum, np.arange(peak - 20, peak + 21) % 256).max() < 1e-6 * spectrum[peak]
