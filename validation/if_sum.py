@@ -3,8 +3,8 @@
 Plain: x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, an exponential for every echo
 and sample. It is timed with its turns in float64, and compared with them in long double, one chirp in sixteen. 21 echoes
 anywhere in the band: constant amplitudes, the parabola through three frequencies, a third of the echoes on such parabolas
-and the others constant, and the polynomial through five. Relative to the root mean square of the IF. Speed is reported, not
-judged: it is the machine's.
+and the others constant, and the polynomial through five. Then 252 echoes in complex64, which are added up in another way.
+Relative to the root mean square of the IF. Speed is reported, not judged: it is the machine's.
 
     python validation/if_sum.py [--quick] [--json FILE]
 """
@@ -29,13 +29,14 @@ Complex = NDArray[np.complex128]
 PARTS = 21
 TOLERANCE = 1e-5
 CASES = ((1, 0), (3, 0), (3, 14), (5, 0))  # nodes, constant echoes
+CROWD, CROWD_CASES = 252, ((1, 0), (3, 0), (5, 0))  # a body and twelve ways over walls
 COMPARED = slice(None, None, 16)
 REPEATS = 3
 
 
-def block(radar: Radar, chirps: int, nodes: int, constant: int, rng: np.random.Generator) -> Echoes:
+def block(radar: Radar, chirps: int, nodes: int, constant: int, count: int, rng: np.random.Generator) -> Echoes:
     """Echoes that stand still, so that nothing but the sum is looked at, anywhere in the band; so many of them constant."""
-    shape = (chirps, radar.n_rx, PARTS)
+    shape = (chirps, radar.n_rx, count)
     way = rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m
     amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
     amplitude[..., :constant] = amplitude[:1, ..., :constant]
@@ -44,8 +45,8 @@ def block(radar: Radar, chirps: int, nodes: int, constant: int, rng: np.random.G
         amplitude=amplitude,
         frequency=radar.start_frequency_hz + (np.arange(nodes) + 0.5) / nodes * radar.bandwidth_hz,
         tx=radar.tx_of_chirp(np.arange(chirps)),
-        part=np.arange(PARTS),
-        bounces=np.ones(PARTS, dtype=np.int64),
+        part=np.arange(count),
+        bounces=np.ones(count, dtype=np.int64),
     )
 
 
@@ -82,18 +83,27 @@ def every_sixteenth(echoes: Echoes) -> Echoes:
 def case_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
     radar = Radar.preset(preset)
     chirps = Radar.preset("paper-12ghz").chirps_per_frame
-    echoes = block(radar, chirps, nodes, constant, rng)
+    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}{f', {constant} echoes constant' if constant else ''}"
+    yield from compared(claim, block(radar, chirps, nodes, constant, PARTS, rng), radar, np.complex128)
+
+
+def crowd_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
+    """Many echoes in complex64, which are spread over a grid."""
+    radar = Radar.preset(preset)
+    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}, complex64"
+    yield from compared(claim, block(radar, 192, nodes, constant, CROWD, rng), radar, np.complex64)
+
+
+def compared(claim: str, echoes: Echoes, radar: Radar, dtype: type[np.complexfloating]) -> Iterator[Row]:
+    chirps, _, count = echoes.length.shape
     times = radar.chirp_times(chirps)
-
-    fast = synthesize(echoes, radar, times)  # compiled before it is timed
-    fast_s = min(timed(lambda: synthesize(echoes, radar, times)) for _ in range(REPEATS))
+    fast = synthesize(echoes, radar, times, dtype=dtype)  # compiled before it is timed
+    fast_s = min(timed(lambda: synthesize(echoes, radar, times, dtype=dtype)) for _ in range(REPEATS))
     plain_s = timed(lambda: plain_sum(echoes, radar, np.float64))
-
     reference = plain_sum(every_sixteenth(echoes), radar, np.longdouble)
     error = float(np.abs(fast[COMPARED] - reference).max() / np.sqrt(np.mean(np.abs(reference) ** 2)))
-    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}{f', {constant} echoes constant' if constant else ''}"
     yield judged(claim, "largest relative error to the plain sum", "", error, TOLERANCE, key="if-sum")
-    yield reported(claim, f"plain sum, {chirps} chirps, {PARTS} echoes", "s", plain_s, key="if-sum")
+    yield reported(claim, f"plain sum, {chirps} chirps, {count} echoes", "s", plain_s, key="if-sum")
     yield reported(claim, "fast", "s", fast_s, key="if-sum")
     yield reported(claim, "times faster", "", plain_s / fast_s, key="if-sum")
 
@@ -107,7 +117,8 @@ def timed(work: Callable[[], object]) -> float:
 def measure(quick: bool) -> list[Row]:
     rng = np.random.default_rng(0)
     presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
-    return [row for preset in presets for nodes, constant in CASES for row in case_rows(preset, nodes, constant, rng)]
+    kinds = ((CASES, case_rows), (CROWD_CASES, crowd_rows))
+    return [row for preset in presets for cases, rows in kinds for case in cases for row in rows(preset, *case, rng)]
 
 
 if __name__ == "__main__":

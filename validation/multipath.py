@@ -16,6 +16,7 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from typing import NamedTuple
+from unittest import mock
 
 import numpy as np
 import rows
@@ -27,7 +28,9 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.process import angle, power_map, range_spectrum
+from rtradar.scatter import multipath
 from rtradar.scatter.multipath import Multipath
 from rtradar.scatter.wall_paths import WallPath
 from rtradar.scene import Scene, Surface, Wall, material, room_walls
@@ -372,8 +375,28 @@ def apparent(radar: rt.Radar, ghost: Ghost) -> tuple[Array, Array]:
     return found[0], found[1]
 
 
+def anchor_rows(quick: bool) -> Iterator[Row]:
+    """What is lost between the instants at which ghosts are looked at, for a person who walks in a living room."""
+    scene = Scene.load("living-room")
+    radar = scene.place(rt.Radar.preset("paper-12ghz"))
+    motion = rt.motion.place(rt.synthetic_motion("walk", seed=0, duration_s=3.0), heading_deg=scene.heading_deg)
+    body = rt.Body.from_motion(motion.shifted([*scene.person_position_m, 0.0]))
+    # From the middle of the capture on, a tenth of a second of it.
+    chirps = np.arange(radar.chirps_per_frame) + 20_000 // radar.n_tx * radar.n_tx
+    fields = {}
+    for apart_s in (2.5e-3, multipath.ANCHORS_S):
+        with mock.patch.object(multipath, "ANCHORS_S", apart_s):
+            echoes = Multipath(radar, body, scene).echoes(chirps)
+        over_walls = echoes.bounces > 1
+        phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length[..., over_walls]
+        fields[apart_s] = echoes.amplitude[len(echoes.frequency) // 2][..., over_walls] * np.exp(1j * phase)
+    first, last = fields.values()
+    error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
+    yield reported("living room, walk", f"ghosts at anchors {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms", "dB", error)
+
+
 def measure(quick: bool) -> list[Row]:
-    return [*length_rows(quick), *optics_rows(quick), *map_rows(quick)]
+    return [*length_rows(quick), *optics_rows(quick), *map_rows(quick), *anchor_rows(quick)]
 
 
 if __name__ == "__main__":

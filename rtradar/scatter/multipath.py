@@ -30,7 +30,7 @@ from rtradar.scatter.wall_paths import WallPath, corners, wall_paths
 from rtradar.scene import Scene
 
 ANCHORS_S = 20e-3
-"""Between instants at which what is left of echoes over walls is found; against 2.5 ms, ghosts are -23 dB off (10 ms: -24)."""
+"""Between instants at which what is left of echoes over walls is found: ghosts are within -21 dB (`validation/multipath.py`)."""
 
 _KEPT_BYTES = 64e6
 """Of anchors that are remembered, so that pruning and the signal trace once: 10 s of a room of six walls."""

@@ -22,8 +22,11 @@ from rtradar.signal.phasor import phasor
 _POWERS = 3
 """Powers of the sample number that one grid takes: all of an amplitude given at up to three frequencies."""
 
+_CUBIC = (0.0, -6.0, 0.0, 32.0)
+"""Chebyshev's polynomial over the chirp, by which more are divided: float32 then holds both parts, which hardly cancel."""
+
 MOST_NODES = 6
-"""Frequencies at which amplitudes may be given: float32 holds the powers of so many to 1e-5, not those of 13."""
+"""Frequencies at which amplitudes may be given: two grids."""
 
 _TAPS = 16
 """Cells that an echo is spread over: with twice as many cells as samples, what is left out is 1e-8 of the echo."""
@@ -47,7 +50,7 @@ def spread_sum(
     sample_rate: float,
     out: NDArray[np.complex64],
 ) -> None:
-    """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it; 3e-6 for more than three nodes.
+    """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it.
 
     Parameters
     ----------
@@ -64,31 +67,37 @@ def spread_sum(
     chirps, receivers, samples = out.shape
     cells, half = fft.next_fast_len(2 * samples), samples // 2
     gaussian, variance, weights = _gaussian(samples, cells)
-    about_middle = _about_middle(powers, half / samples)
-    after_middle = (np.arange(samples, dtype=np.float32) - half) / samples
+    parabolas = _parabolas(powers, half / samples)
+    cubic = np.polynomial.polynomial.polyval((np.arange(samples) - half) / samples, _CUBIC).astype(np.float32)
     for first in range(0, chirps, _CHIRPS_AT_ONCE):
         some = slice(first, min(first + _CHIRPS_AT_ONCE, chirps))
         own, sums = np.ascontiguousarray(amplitude[:, some]), out[some]
         sums[:] = 0
-        for lowest in range(len(about_middle) - _POWERS, -1, -_POWERS):
+        for number, parabola in enumerate(parabolas):
             grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
-            three = np.ascontiguousarray(about_middle[lowest : lowest + _POWERS])
-            _spread(length[some], own, three, start_frequency, slope, sample_rate, half, samples, gaussian, variance, grid)
+            _spread(length[some], own, parabola, start_frequency, slope, sample_rate, half, samples, gaussian, variance, grid)
             summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
-            if lowest + _POWERS < len(about_middle):
-                sums *= after_middle**_POWERS
+            if number > 0:
+                sums *= cubic
             sums[..., :half] += summed[..., cells - half :] * weights[:half]
             sums[..., half:] += summed[..., : samples - half] * weights[half:]
 
 
-def _about_middle(powers: NDArray[np.float64], middle: float) -> NDArray[np.float64]:
-    """The same polynomials, of the sample number counted from the middle of the chirp; threes of powers, filled up with 0."""
-    count = len(powers)
-    shifted = np.zeros((-(-count // _POWERS) * _POWERS, powers.shape[1]))
-    for low in range(count):
-        for high in range(low, count):
+def _parabolas(powers: NDArray[np.float64], middle: float) -> list[NDArray[np.float64]]:
+    """The same polynomials of the sample number, counted from the middle of the chirp: one parabola (3, node), or two.
+
+    The first of two is to be multiplied by `_CUBIC` before the second is added.
+    """
+    nodes = powers.shape[1]
+    shifted = np.zeros((2 * _POWERS, nodes))
+    for low in range(len(powers)):
+        for high in range(low, len(powers)):
             shifted[low] += math.comb(high, low) * middle ** (high - low) * powers[high]
-    return shifted
+    parts = np.zeros((2, _POWERS, nodes))
+    for node, column in enumerate(shifted.T):
+        quotient, remainder = (np.atleast_1d(part) for part in np.polynomial.polynomial.polydiv(column, _CUBIC))
+        parts[0, : len(quotient), node], parts[1, : len(remainder), node] = quotient, remainder
+    return list(parts) if len(powers) > _POWERS else [parts[1]]
 
 
 @lru_cache
