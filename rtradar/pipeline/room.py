@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from rtradar.body import Body
@@ -14,6 +15,16 @@ from rtradar.scatter.clutter_shadow import ClutterShadow, Hidden, smooth
 from rtradar.signal import synthesize
 
 _Samples = NDArray[np.complex128]
+
+
+@njit(cache=True, error_model="numpy", parallel=True)
+def _fade(kept, changed, share, tx, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (chirp, rx, sample)``: what is kept of the room, and the share of its change that has come."""
+    for chirp in prange(len(out)):
+        own, more, part = kept[tx[chirp]], changed[tx[chirp]], share[chirp]
+        for receiver in range(out.shape[1]):
+            for sample in range(out.shape[2]):
+                out[chirp, receiver, sample] = own[receiver, sample] + part * more[receiver, sample]
 
 
 class RoomIf:
@@ -69,14 +80,11 @@ class RoomIf:
         anchors = chirps // step
         for anchor in np.unique(anchors).tolist():
             inside = np.flatnonzero(anchors == anchor)
-            share = smooth(chirps[inside] - anchor * step, step).astype(np.float32)
+            share = smooth(chirps[inside] - anchor * step, step)
             before = self._hidden(anchor)
             after = self._hidden(anchor + 1) if (share > 0).any() else before
             kept, changed = ((first - second).astype(np.complex64) for first, second in ((self._whole, before), (before, after)))
-            own = kept[tx[inside]]
-            if before is not after:
-                own += share[:, None, None] * changed[tx[inside]]
-            out[inside] = own
+            _fade(kept, changed, share.astype(np.float32), tx[inside], out[inside[0] : inside[-1] + 1])
         return out
 
     def _hidden(self, anchor: int) -> _Samples:

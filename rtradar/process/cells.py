@@ -5,18 +5,14 @@ A window has some hundred detected cells among 30 000 to 170 000, in a few dozen
 
 from __future__ import annotations
 
-import os
-
 import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.spectra import hann
+from rtradar.process.spectra import hann, in_threads
 from rtradar.process.steering import range_walk
 from rtradar.radar import Radar
-
-_BINS_PER_BLOCK = 8  # neighbours in memory: what one line of the cache brings is used at once
 
 
 def cell_spectra(
@@ -68,14 +64,17 @@ def cell_spectra(
     values = np.empty((*steps.shape, radar.n_channels), dtype=cube.dtype)
     window = hann(n_cycles) / hann(n_cycles).sum()
     weights = window.astype(cube.real.dtype)[:, None, None]
-    slow_time = cube.reshape(n_cycles, radar.n_channels, n_range)
-    used = np.unique(steps)
-    for first in range(0, len(used), _BINS_PER_BLOCK):
-        wanted = used[first : first + _BINS_PER_BLOCK]
-        weighted = np.multiply(slow_time[:, :, wanted], weights, dtype=cube.dtype)
-        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True, workers=os.cpu_count())
-        here = (steps >= wanted[0]) & (steps <= wanted[-1])
-        values[here] = np.moveaxis(doppler, 2, 1)[turns[here], np.searchsorted(wanted, steps[here])]
+    used, place = np.unique(steps, return_inverse=True)
+    place = place.reshape(steps.shape)
+    every = len(used) == n_range
+
+    def transform(tx: int) -> None:
+        # One Tx at a time fits the cache of a core, and its channels lie side by side in what is filled.
+        own = cube[:, tx] if every else cube[:, tx][:, :, used]
+        doppler = scipy.fft.fft(np.multiply(own, weights, dtype=cube.dtype), axis=0, overwrite_x=True)
+        values[:, :, tx * radar.n_rx : (tx + 1) * radar.n_rx] = doppler[turns, :, place]
+
+    in_threads(transform, range(radar.n_tx))
     return values
 
 

@@ -134,7 +134,7 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
         weighted = np.multiply(samples[block], weights, dtype=np.complex64, casting="same_kind")
         spectra[block] = scipy.fft.fft(weighted, axis=2, overwrite_x=True)
 
-    _in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
+    in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
     return spectra
 
 
@@ -233,7 +233,7 @@ def power_map(
         return total
 
     # The order of the sum is fixed, so the map does not depend on the number of threads.
-    squares = sum(_in_threads(tx_power, range(radar.n_tx))) if channel is None else channel_power(*divmod(channel, radar.n_rx))
+    squares = sum(in_threads(tx_power, range(radar.n_tx))) if channel is None else channel_power(*divmod(channel, radar.n_rx))
     power = np.asarray(squares).reshape(n_cycles, n_range, 2).sum(axis=2)
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
@@ -278,7 +278,7 @@ def _workers() -> int:
     return os.cpu_count() or 1
 
 
-def _in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
+def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
     """Results in the order of the items; NumPy and the FFT release the interpreter lock, so threads do pay."""
     if len(items) < 2:
         return [work(item) for item in items]

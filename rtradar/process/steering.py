@@ -126,6 +126,13 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=16)
+def _taper(radar: Radar, axis: int, taper: Taper) -> NDArray[np.float64]:
+    line = virtual_lines(radar)[axis - 1]
+    assert line is not None
+    return taper_weights(line, taper)
+
+
+@lru_cache(maxsize=16)
 def range_walk(radar: Radar) -> int:
     """Range bins on either side of a cell in which the elements see an echo of that cell from the side."""
     largest = float(sine_grid(radar)[-1])
@@ -150,7 +157,7 @@ class Steering:
     runs: NDArray[np.int64]
 
 
-# Both lines and all range bins, for in a room there are echoes in all of them; 75 kB each where asked for.
+# Both lines and all range bins, for in a room there are echoes in all of them; 75 kB each.
 @lru_cache(maxsize=512)
 def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> Steering:
     """Phases and range bins of a line for points at one range.
@@ -175,9 +182,17 @@ def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> St
     offsets = np.clip(steps, -reach, reach).astype(np.int64)
     # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
     turns = excess * (radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
-    weights = np.ascontiguousarray((np.exp(-2j * np.pi * turns) * taper_weights(line, taper)).T.astype(np.complex64))
+    weights = np.ascontiguousarray((np.exp(-2j * np.pi * turns) * _taper(radar, axis, taper)).T.astype(np.complex64))
     weights.flags.writeable = False
     return Steering(weights, _runs(offsets.T + reach))
+
+
+def steer_everywhere(radar: Radar) -> None:
+    """Make what `steering` gives for every range bin now: then it takes no memory later, wherever somebody goes."""
+    for axis, line in enumerate(virtual_lines(radar), start=1):
+        if line is not None:
+            for range_bin in range(radar.samples_per_chirp):
+                steering(radar, axis, range_bin, "taylor")
 
 
 def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
