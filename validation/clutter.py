@@ -134,11 +134,14 @@ def room_rows(name: str) -> Iterator[Row]:
     for label, (method, options) in SETTINGS.items():
         claim = f"{name}, {label}"
         alone = by_package(method, still, radar, options)
-        yield judged(claim, "left of a still room alone, of its strongest cell", "", abs(alone).max() / strongest, 0.0)
+        says = "clutter removal: left of a still room alone, of its strongest cell"
+        quantity = "left of a still room alone, of its strongest cell"
+        yield judged(claim, quantity, "", abs(alone).max() / strongest, 0.0, says=says)
         ours = spectra_of(by_package(method, still + moving, radar, options))
         expected = spectra_of(by_hand(method, truth, radar, **options))
         left_db = 20 * math.log10(abs(ours - expected).max() / strongest)
-        yield judged(claim, f"left of a room {ROOM_DB:g} dB above the movers, of its strongest cell", "dB", left_db, MOST_LEFT_DB)
+        quantity = f"left of a room {ROOM_DB:g} dB above the movers, of its strongest cell"
+        yield judged(claim, quantity, "dB", left_db, MOST_LEFT_DB, says=f"clutter removal: {quantity}")
         kept_db = 20 * math.log10(abs(expected).max() / abs(spectra_of(truth[-radar.cycles_per_frame :])).max())
         yield reported(claim, "strongest cell of the movers, after over before", "dB", kept_db)
 
@@ -165,7 +168,8 @@ def response_rows(name: str) -> Iterator[Row]:
                 gain /= abs(1 - keep * np.exp(-2j * np.pi * turn))
             worst = max(worst, abs(measured_db - 20 * math.log10(gain)))
         # float32 values of size 1 whose second difference is down to 9e-5 at 77 GHz: 6e-8 / 9e-5 = 0.006 dB at most, rms less.
-        yield judged(f"{name}, {label}", "response from 1 bin to half the pulse rate, largest error", "dB", worst, 0.006)
+        quantity = "response from 1 bin to half the pulse rate, largest error"
+        yield judged(f"{name}, {label}", quantity, "dB", worst, 0.006, says=f"clutter removal: {quantity}")
         for speed in (0.5, 1.0, 2.0):
             turn = speed / (2 * radar.max_velocity_mps)
             x = np.exp(2j * np.pi * turn * np.arange(n)).astype(np.complex64)[:, None, None]
@@ -207,7 +211,8 @@ def mean_rows(name: str) -> Iterator[Row]:
         ghost_db = 10 * math.log10(after[n // 2] / before.max())
         closed_db = 20 * math.log10(abs(own - sums(bins)) / peak)
         claim = f"ghost at zero of a mover at {bins:g} bins, of its peak"
-        yield judged(f"{name}, mean", claim, "dB", ghost_db, 1e-6, reference=closed_db)
+        says = "clutter removal by the mean: ghost at zero Doppler against closed form"
+        yield judged(f"{name}, mean", claim, "dB", ghost_db, 1e-6, reference=closed_db, says=says)
 
 
 def noise_rows(quick: bool) -> Iterator[Row]:
@@ -223,7 +228,8 @@ def noise_rows(quick: bool) -> Iterator[Row]:
         share = 1 - math.exp(-radar.cycle_duration_s / options.get("time_constant_s", 1.0))
         expected = {"mean": 1 - 1 / n, "mti": 1.0, "exponential": 2 / (2 - share)}[method]
         if method != "exponential" or options["time_constant_s"] < 0.1:  # in the longer one the start has not died away
-            yield judged(f"white noise, {label}", "power after over before", "", factor, 0.005, reference=expected)
+            says = "clutter removal: power of white noise, after over before"
+            yield judged(f"white noise, {label}", "power after over before", "", factor, 0.005, reference=expected, says=says)
 
 
 # -- clutter map -----------------------------------------------------------------------------------------------------------
@@ -264,10 +270,10 @@ def independent_rows(quick: bool) -> Iterator[Row]:
                 alarms[pfa].append(float(detector.push(power).mean()))
         for pfa, rates in alarms.items():
             claim = f"windows apart, {looks} look{'s' if looks > 1 else ''}, {pfa:g} asked"
-            yield judged(
-                claim, f"counted over asked, windows 2 to {old}", "", np.mean(rates[1:old]) / pfa, MOST_OFF, reference=1.0
-            )
-            yield judged(claim, "counted over asked, all later", "", np.mean(rates[old:]) / pfa, MOST_OFF, reference=1.0)
+            says = "clutter-map CFAR on noise: false alarms counted over those asked"
+            for part, counted in ((f"windows 2 to {old}", rates[1:old]), ("all later", rates[old:])):
+                ratio = float(np.mean(counted)) / pfa
+                yield judged(claim, f"counted over asked, {part}", "", ratio, MOST_OFF, reference=1.0, says=says)
 
 
 def noise_maps(radar: Radar, n_windows: int, seed: int) -> Iterator[NDArray[np.floating]]:
@@ -301,7 +307,8 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
         for part, values in ((f"windows 5 to {old}", rates[4:old]), ("all later", rates[old:])):
             ratio = float(np.mean(values)) / pfa
             if kind == "ours":
-                yield judged(claim, f"counted over asked, {part}", "", ratio, MOST_OFF, reference=1.0)
+                says = "clutter-map CFAR on noise, windows that share 75 %: false alarms counted over those asked"
+                yield judged(claim, f"counted over asked, {part}", "", ratio, MOST_OFF, reference=1.0, says=says)
             else:
                 yield reported(claim, f"counted over asked, {part}", "", ratio)
 

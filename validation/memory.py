@@ -42,13 +42,14 @@ def measure(quick: bool) -> list[Row]:
                     found = summary(folder, radar, fidelity, duration_s)
                 peak[duration_s] = found["peak_memory_mb"]
                 claim = f"{radar}, {fidelity}, {duration_s:g} s"
-                rows.append(judged(claim, "peak memory", "MB", peak[duration_s], LIMIT_MB))
+                rows.append(judged(claim, "peak memory", "MB", peak[duration_s], LIMIT_MB, says="a whole run: peak memory"))
                 rows.append(reported(claim, "wall", "s", found["wall_s"]))
                 rows.append(reported(claim, "real-time factor", "1", found["real_time_factor"]))
                 for stage, seconds in found["stages"].items():
                     rows.append(reported(claim, f"stage {stage}", "s", seconds))
             growth = f"peak memory, {long_s:g} s over {short_s:g} s"
-            rows.append(judged(f"{radar}, {fidelity}", growth, "1", peak[long_s] / peak[short_s], GROWTH))
+            says = f"a whole run: {growth}"
+            rows.append(judged(f"{radar}, {fidelity}", growth, "1", peak[long_s] / peak[short_s], GROWTH, says=says))
     return rows
 
 

@@ -59,10 +59,12 @@ def image_rows() -> Iterator[Row]:
         yield judged(
             f"images, order {order}", "length, worst", "m", worst[order], 1e-6, says="lengths of mirror paths in a box room"
         )
-        yield judged(f"images, order {order}", "how many", "1", len(shares[order]), 0, reference=count)
+        says = "mirror paths in a box room: how many"
+        yield judged(f"images, order {order}", "how many", "1", len(shares[order]), 0, reference=count, says=says)
         # A conductor mirrors v into v exactly, whatever the angles: rounding.
         missing = max(float(np.abs(strength - 1).max()) for strength in shares[order].values())
-        yield judged(f"images, order {order}", "each once, of a perfect mirror", "1", missing, 1e-9)
+        says = "mirror paths in a box room of perfect mirrors: each once, and whole"
+        yield judged(f"images, order {order}", "each once, of a perfect mirror", "1", missing, 1e-9, says=says)
 
 
 def airy(eta: complex, thickness: float, k: float, cosine: Array, te: bool) -> Array:

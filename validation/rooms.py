@@ -68,8 +68,10 @@ def measure(quick: bool) -> list[Row]:
                 if removal == "none":
                     clutter = found.summary["room"]["clutter"]
                     rows.append(reported(claim, "signal to clutter", "dB", clutter["signal_to_clutter_db"]))
-                    cost = found.summary["wall_s"] / alone.summary["wall_s"]
-                    rows.append(reported(claim, "cost over free space", "", cost))
+                cost = found.summary["wall_s"] / alone.summary["wall_s"]
+                rows.append(reported(claim, "cost over free space", "", cost))
+                once = found.summary["stages"]["room"] / alone.summary["wall_s"]
+                rows.append(reported(claim, "of it what is done once a capture: tracing the room, choosing paths", "", once))
                 rows += detection_rows(claim, scored(out, truth))
                 if len(found.points) and len(alone.points):
                     scale = np.array([radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps])

@@ -46,6 +46,8 @@ def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     if len(quaternions) < 2:
         return quaternions
     same_side = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) >= 0
+    if same_side.all():
+        return quaternions  # not copied: a recording that was only moved shares its rotations with the one before
     signs = np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
     return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
 
