@@ -12,6 +12,9 @@ from rtradar.body.meshes import unit_sphere
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
+_LEAST_RAYS = 4096
+"""Traced at once, with idle ones among them: what Dr.Jit keeps for itself would else grow with the most that ever came."""
+
 
 class UnitSphere:
     """The triangles of every part, in a Mitsuba scene.
@@ -44,6 +47,10 @@ class UnitSphere:
                 ray.maxt = reach
                 found.append(bool(self._scene.ray_test(ray)))
             return np.array(found)
-        ray = mi.Ray3f(mi.Point3f(np.ascontiguousarray(rays[:3])), mi.Vector3f(np.ascontiguousarray(rays[3:6])))
-        ray.maxt = mi.Float(np.ascontiguousarray(rays[6]))
-        return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())
+        count = rays.shape[1]
+        padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
+        padded[:, :count] = rays
+        padded[3, count:] = 1  # from the middle, no way at all
+        ray = mi.Ray3f(mi.Point3f(padded[:3]), mi.Vector3f(padded[3:6]))
+        ray.maxt = mi.Float(padded[6])
+        return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())[:count]
