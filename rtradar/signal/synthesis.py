@@ -19,7 +19,7 @@ MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
 
 MANY_ECHOES = 32
-"""From so many on, tones are spread over a grid for one FFT if float32 will do, in half the time and, from 250 on, a fifth."""
+"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` has what it saves)."""
 
 _LANES = 32
 _INSTANTS = 16
