@@ -66,12 +66,10 @@ def cell_spectra(
     weights = window.astype(cube.real.dtype)[:, None, None]
     used, place = np.unique(steps, return_inverse=True)
     place = place.reshape(steps.shape)
-    every = len(used) == n_range
 
     def transform(tx: int) -> None:
         # One Tx at a time fits the cache of a core, and its channels lie side by side in what is filled.
-        own = cube[:, tx] if every else cube[:, tx][:, :, used]
-        doppler = scipy.fft.fft(np.multiply(own, weights, dtype=cube.dtype), axis=0, overwrite_x=True)
+        doppler = scipy.fft.fft(np.multiply(cube[:, tx][:, :, used], weights, dtype=cube.dtype), axis=0, overwrite_x=True)
         values[:, :, tx * radar.n_rx : (tx + 1) * radar.n_rx] = doppler[turns, :, place]
 
     in_threads(transform, range(radar.n_tx))

@@ -29,7 +29,7 @@ from rtradar.trace.body_tracer import BodyTracer
 Array = NDArray[np.float64]
 _SHORTEST_M = 1e-6
 ANCHORS_S = 20e-3
-"""Between instants at which the body is looked at: at 2 m/s it goes 4 cm, a third of the Fresnel zone of a wall 3 m behind it."""
+"""Between instants at which the body is looked at; what changes of the shadow is then known to -7 dB (`multipath.py`)."""
 
 _KEPT_ANCHORS = 8
 """Remembered: those on both sides of a chirp, and a few before."""

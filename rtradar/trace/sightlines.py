@@ -21,6 +21,10 @@ _NEAR = 1.1
 """Of its longest semi-axis: a line that passes the middle of a part farther away than this clears it by a tenth or more."""
 
 
+def _contiguous(*arrays: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
+    return tuple(np.ascontiguousarray(array, dtype=np.float64) for array in arrays)
+
+
 def clearances(
     origins: NDArray[np.float64],
     targets: NDArray[np.float64],
@@ -45,8 +49,7 @@ def clearances(
     (ray,) float64
         Below 0 where the line goes through another part; 1 where it passes all of them by a tenth or more.
     """
-    arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in (origins, targets, centres, frames, semi_axes))
-    starts, ends, places, turns, axes = arrays
+    starts, ends, places, turns, axes = _contiguous(origins, targets, centres, frames, semi_axes)
     out = np.empty(len(starts))
     of_part, longest = np.ascontiguousarray(own, dtype=np.int64), axes.max(axis=1)
     near = _near(starts, ends, of_part, places, longest)
@@ -137,8 +140,7 @@ def outline_rays(
     whose : (n,) int64
         Line of sight of each.
     """
-    arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in (origins, targets, centres, frames, semi_axes))
-    starts, ends, places, turns, axes = arrays
+    starts, ends, places, turns, axes = _contiguous(origins, targets, centres, frames, semi_axes)
     return _outline_rays(starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, turns, axes)
 
 
