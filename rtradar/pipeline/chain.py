@@ -35,7 +35,6 @@ from rtradar.pipeline.survey import Survey, survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low, peak_memory_mb
 from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
 from rtradar.process import clutter_removal as make_removal
-from rtradar.process.steering import steer_everywhere
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.scatter import Accountable, Rung, build_rung
@@ -356,7 +355,6 @@ def _warm_up(rung: Rung, radar: Radar) -> None:
     if measures_angle(radar):
         cycle = np.zeros((1, radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex64)
         angle_spectra(cell_spectra(cycle, radar, [0], [0]), radar, [0.0], [0.0])
-        steer_everywhere(radar)
 
 
 def _if_array(path: Path, radar: Radar, n_chirps: int) -> Any:

@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.cells import cell_spectra
 from rtradar.process.spectra import range_spectrum
-from rtradar.process.steering import Taper, range_walk, sine_grid, steering, virtual_lines
+from rtradar.process.steering import Taper, range_walk, sine_grid, steering, steering_everywhere, virtual_lines
 from rtradar.radar import Radar
 
 
@@ -112,10 +112,14 @@ def angle_spectra(
         if line is None:
             return None
         result = np.empty((len(cells), len(sine_grid(radar))), dtype=np.float32)
-        for range_bin in np.unique(bins):
-            chosen = np.flatnonzero(bins == range_bin)
-            to_point = steering(radar, axis, int(range_bin) if focus else None, taper)
-            _power(samples, still, chosen, line.channels, to_point.weights, to_point.runs, result)
+        if not focus:
+            known, place = steering(radar, axis, None, taper), np.zeros_like(bins)
+        elif taper == "taylor":
+            known, place = steering_everywhere(radar, axis), bins
+        else:
+            used, place = np.unique(bins, return_inverse=True)
+            known = steering(radar, axis, used, taper)
+        _power(samples, still, place, line.channels, known.weights, known.runs, known.starts, result)
         return result
 
     return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)
@@ -213,20 +217,19 @@ def refine(
 
 
 # By hand: for products of this size the threads of BLAS wait for each other longer than they work.
-@numba.njit(cache=True, nogil=True, fastmath=True)
-def _power(values, still, chosen, channels, weights, runs, power):  # type: ignore[no-untyped-def]
-    """Fill the chosen rows of power (cell, sine) from values (cell, offset, channel) turned by still (cell, channel)."""
-    n_sines = weights.shape[1]
-    real, imaginary = np.empty(n_sines, dtype=np.float32), np.empty(n_sines, dtype=np.float32)
-    for cell in chosen:
-        real[:] = 0
-        imaginary[:] = 0
-        for run in range(runs.shape[0]):
+@numba.njit(cache=True, fastmath=True, parallel=True)
+def _power(values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
+    """Fill power (cell, sine) from values (cell, offset, channel) turned by still (cell, channel), weights by place."""
+    n_sines = weights.shape[2]
+    for cell in numba.prange(len(values)):
+        real, imaginary = np.zeros(n_sines, dtype=np.float32), np.zeros(n_sines, dtype=np.float32)
+        for run in range(starts[place[cell]], starts[place[cell] + 1]):
             element, offset, first, last = runs[run]
             channel = channels[element]
             value = values[cell, offset, channel] * still[cell, channel]
             # Counted from 0: an index that may be negative keeps the compiler from using vectors.
-            run_weights, run_real, run_imaginary = weights[element, first:last], real[first:last], imaginary[first:last]
+            run_weights = weights[place[cell], element, first:last]
+            run_real, run_imaginary = real[first:last], imaginary[first:last]
             for i in range(last - first):
                 run_real[i] += value.real * run_weights[i].real - value.imag * run_weights[i].imag
                 run_imaginary[i] += value.real * run_weights[i].imag + value.imag * run_weights[i].real

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
@@ -64,10 +65,19 @@ def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
 
 def _laid_out(spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
     """Power of each cell (cell, sine) read at its own sines (cell, angle), summed by range bin."""
-    place = (sines - spectra.sines[0]) / (spectra.sines[1] - spectra.sines[0])
-    left = np.clip(np.floor(place).astype(np.int64), 0, len(spectra.sines) - 2)
-    share = place - left
-    read = (1 - share) * np.take_along_axis(power, left, axis=1) + share * np.take_along_axis(power, left + 1, axis=1)
     total = np.zeros((radar.samples_per_chirp, sines.shape[1]))
-    np.add.at(total, np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64), read)
+    bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
+    _add_up(power, sines, spectra.sines[0], spectra.sines[1] - spectra.sines[0], bins, total)
     return total
+
+
+@njit(cache=True, error_model="numpy")
+def _add_up(power, sines, first, step, bins, total):  # type: ignore[no-untyped-def]
+    """Add power (cell, sine), read at sines (cell, angle) between points of the uniform grid, to total (bin, angle)."""
+    last = power.shape[1] - 2
+    for cell in range(len(power)):
+        for angle in range(sines.shape[1]):
+            place = (sines[cell, angle] - first) / step
+            left = min(max(math.floor(place), 0), last)
+            share = place - left
+            total[bins[cell], angle] += (1 - share) * power[cell, left] + share * power[cell, left + 1]

@@ -10,9 +10,10 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.spectra import hann, in_threads
+from rtradar.process.spectra import hann
 from rtradar.process.steering import range_walk
 from rtradar.radar import Radar
+from rtradar.threads import in_threads
 
 
 def cell_spectra(
@@ -69,7 +70,9 @@ def cell_spectra(
 
     def transform(tx: int) -> None:
         # One Tx at a time fits the cache of a core, and its channels lie side by side in what is filled.
-        doppler = scipy.fft.fft(np.multiply(cube[:, tx][:, :, used], weights, dtype=cube.dtype), axis=0, overwrite_x=True)
+        weighted = np.take(cube[:, tx], used, axis=2)
+        weighted *= weights
+        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
         values[:, :, tx * radar.n_rx : (tx + 1) * radar.n_rx] = doppler[turns, :, place]
 
     in_threads(transform, range(radar.n_tx))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 
 from rtradar.process.angle import refine
@@ -51,16 +52,41 @@ def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     -------
     Peaks
     """
-    highest = power.max(axis=1, keepdims=True)
-    floor = np.maximum(
-        highest * np.float32(10 ** (-BELOW_HIGHEST_DB / 10)),
-        np.minimum(highest, np.median(power, axis=1, keepdims=True) * np.float32(10 ** (ABOVE_MEDIAN_DB / 10))),
-    )
-    maximum = (power > 0) & (power >= floor)
-    maximum[:, 1:] &= power[:, 1:] > power[:, :-1]
-    maximum[:, :-1] &= power[:, :-1] >= power[:, 1:]
-    candidates = np.where(maximum, power, np.float32(0))
-    index = np.argsort(candidates, axis=1)[:, : -MOST_PEAKS - 1 : -1]
-    real = np.take_along_axis(candidates, index, axis=1) > 0
-    index = np.where(real, index, index[:, :1])
+    index = np.empty((len(power), MOST_PEAKS), dtype=np.int64)
+    count = np.empty(len(power), dtype=np.int64)
+    _highest(power, np.float32(10 ** (-BELOW_HIGHEST_DB / 10)), np.float32(10 ** (ABOVE_MEDIAN_DB / 10)), index, count)
+    real = np.arange(MOST_PEAKS) < count[:, None]
     return Peaks(*refine(sines, power, index), real)
+
+
+@njit(cache=True, parallel=True)
+def _highest(power, below, above, index, count):  # type: ignore[no-untyped-def]
+    """Fill index (cell, peak) with the maxima, the strongest first and again where there are no more, and count (cell,)."""
+    sines = power.shape[1]
+    for cell in prange(len(power)):
+        own, best = power[cell], index[cell]
+        highest = own.max()
+        floor, found, others = highest * below, 0, 0
+        best[:] = own.argmax()
+        for sine in range(sines):
+            value = own[sine]
+            rises = sine == 0 or value > own[sine - 1]
+            if not (value > 0 and value >= floor and rises and (sine == sines - 1 or value >= own[sine + 1])):
+                continue
+            # The median, which takes longest, matters only where there is more than the highest.
+            if value < highest and others == 0:
+                floor = max(floor, min(highest, np.median(own) * above))
+                others = 1
+                if value < floor:
+                    continue
+            place = found
+            while place > 0 and value > own[best[place - 1]]:
+                place -= 1
+            if place < len(best):
+                for later in range(len(best) - 1, place, -1):
+                    best[later] = best[later - 1]
+                best[place] = sine
+                found = min(found + 1, len(best))
+        for none in range(found, len(best)):
+            best[none] = best[0]
+        count[cell] = found

@@ -10,12 +10,8 @@ takes 131 MB instead of 262 MB.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TypeVar
 
 import numpy as np
 import scipy.fft
@@ -23,8 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-
-_Result = TypeVar("_Result")
+from rtradar.threads import in_threads
 
 _CHIRPS_PER_BATCH = 128
 """Chirps transformed at once: 8 receivers x 256 samples x 8 bytes make 2 MB, which stays in the cache of a core."""
@@ -97,8 +92,8 @@ def range_doppler(
     kind = _complex_kind(samples)
     cube = samples[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_channels, samples.shape[2])
     weighted = cube * fast.astype(kind) * slow.astype(kind)[:, None, None]
-    spectra = scipy.fft.fft(weighted, axis=2, overwrite_x=True, workers=_workers())
-    spectra = scipy.fft.fft(spectra, axis=0, overwrite_x=True, workers=_workers())
+    spectra = scipy.fft.fft(weighted, axis=2, overwrite_x=True, workers=-1)
+    spectra = scipy.fft.fft(spectra, axis=0, overwrite_x=True, workers=-1)
     values = np.fft.fftshift(spectra, axes=0).transpose(2, 0, 1)
     return RangeDoppler(np.ascontiguousarray(values), radar.range_m, radar.velocity_mps(n_cycles))
 
@@ -272,15 +267,3 @@ def _hann_weights(n: int) -> NDArray[np.float64]:
     weights = hann(n) / hann(n).sum()
     weights.flags.writeable = False
     return weights
-
-
-def _workers() -> int:
-    return os.cpu_count() or 1
-
-
-def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
-    """Results in the order of the items; NumPy and the FFT release the interpreter lock, so threads do pay."""
-    if len(items) < 2:
-        return [work(item) for item in items]
-    with ThreadPoolExecutor(min(_workers(), len(items))) as pool:
-        return list(pool.map(work, items))

@@ -146,53 +146,57 @@ class Steering:
 
     Parameters
     ----------
-    weights : (element, sine) complex64
+    weights : (bin, element, sine) complex64
         Phases taken back, times the taper.
     runs : (run, 4) int64
         Where each element is read: element, offset, first sine, sine after the last. The offset counts from 0 at
-        `range_walk` bins before the bin of the cell.
+        `range_walk` bins before the bin of the cell. Those of one bin stand behind those of the bin before.
+    starts : (bin + 1,) int64
+        Where the runs of each bin begin.
     """
 
     weights: NDArray[np.complex64]
     runs: NDArray[np.int64]
+    starts: NDArray[np.int64]
 
 
-# Both lines and all range bins, for in a room there are echoes in all of them; 75 kB each.
-@lru_cache(maxsize=512)
-def steering(radar: Radar, axis: int, range_bin: int | None, taper: Taper) -> Steering:
-    """Phases and range bins of a line for points at one range.
+def steering(radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, taper: Taper) -> Steering:
+    """Phases and range bins of a line for points at some ranges.
 
     Parameters
     ----------
     radar : Radar
     axis : {1, 2}
         Which line.
-    range_bin : int or None
-        Range of the point, whose echo is looked for in the bin nearest to half its path over each element; None for a
-        plane wave, looked for in the bin of the cell alone (the far-field FFT).
+    range_bins : (bin,) int64 or None
+        Ranges of the points, whose echoes are looked for in the bin nearest to half their path over each element; None for
+        a plane wave, looked for in the bin of the cell alone (the far-field FFT): one entry, for all bins.
     taper : {"uniform", "taylor"}
         As in `taper_weights`.
     """
     line = virtual_lines(radar)[axis - 1]
     if line is None:
         raise InputError(f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one")
-    reach = range_walk(radar)
-    excess = line.excess_m(sine_grid(radar), None if range_bin is None else radar.range_bin_m * range_bin)
-    steps = np.zeros(excess.shape) if range_bin is None else np.rint(excess / (2 * radar.range_bin_m))
-    offsets = np.clip(steps, -reach, reach).astype(np.int64)
-    # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
-    turns = excess * (radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
-    weights = np.ascontiguousarray((np.exp(-2j * np.pi * turns) * _taper(radar, axis, taper)).T.astype(np.complex64))
-    weights.flags.writeable = False
-    return Steering(weights, _runs(offsets.T + reach))
+    reach, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
+    weights = np.empty((1 if range_bins is None else len(range_bins), len(line.channels), len(sines)), dtype=np.complex64)
+    runs = []
+    for place in range(len(weights)):
+        range_m = None if range_bins is None else radar.range_bin_m * int(range_bins[place])
+        excess = line.excess_m(sines, range_m)
+        steps = np.zeros(excess.shape) if range_m is None else np.rint(excess / (2 * radar.range_bin_m))
+        offsets = np.clip(steps, -reach, reach).astype(np.int64)
+        # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
+        turns = excess * (radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
+        weights[place] = (np.exp(-2j * np.pi * turns) * own).T
+        runs.append(_runs(offsets.T + reach))
+    return Steering(weights, np.concatenate(runs), np.cumsum([0, *map(len, runs)]))
 
 
-def steer_everywhere(radar: Radar) -> None:
-    """Make what `steering` gives for every range bin now: then it takes no memory later, wherever somebody goes."""
-    for axis, line in enumerate(virtual_lines(radar), start=1):
-        if line is not None:
-            for range_bin in range(radar.samples_per_chirp):
-                steering(radar, axis, range_bin, "taylor")
+# Both lines of two radars; 20 MB each, all at once: so memory stays the same wherever somebody goes.
+@lru_cache(maxsize=4)
+def steering_everywhere(radar: Radar, axis: int) -> Steering:
+    """`steering` for every range bin of a radar, with the Taylor taper."""
+    return steering(radar, axis, np.arange(radar.samples_per_chirp), "taylor")
 
 
 def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
+from rtradar.threads import in_threads
 
 
 @dataclass(frozen=True)
@@ -55,5 +55,4 @@ class Noise:
             values *= sigma
             part += values.view(np.complex64)[..., 0]
 
-        with ThreadPoolExecutor() as pool:
-            list(pool.map(fill, range(0, len(samples), radar.n_tx)))
+        in_threads(fill, range(0, len(samples), radar.n_tx))

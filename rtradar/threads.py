@@ -1,0 +1,26 @@
+"""Threads that stay: to start some for every call costs as much as a short call's work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache
+from typing import TypeVar
+
+_Result = TypeVar("_Result")
+
+
+def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
+    """Results in the order of the items; NumPy, the FFT and compiled loops release the interpreter lock, so threads do pay.
+
+    ``work`` must not call this itself: it would wait for threads that wait for it.
+    """
+    if len(items) < 2:
+        return [work(item) for item in items]
+    return list(_pool().map(work, items))
+
+
+@lru_cache(maxsize=1)
+def _pool() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="rtradar")
