@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,12 +63,6 @@ class ArrayEnds:
             tx_weight,
             np.array(rx_weights)[line_of_tx],
         )
-
-    def spread(self, at_ends: NDArray[Any]) -> NDArray[Any]:
-        """Values (..., line, 2, rx_end, echo) for every Tx and the receivers that hear it: (..., tx, rx, echo)."""
-        own = at_ends[..., self.line_of_tx, :, :, :]
-        over_tx = np.einsum("ti,...tije->...tje", self.tx_weight.astype(np.float32), own)
-        return np.asarray(np.einsum("trj,...tje->...tre", self.rx_weight.astype(np.float32), over_tx))
 
 
 def _straight(count: int) -> Array:

@@ -27,8 +27,10 @@ import numpy as np
 from numba import njit, prange
 from numpy.typing import NDArray
 
+from rtradar.phasor import phasor
+
 Array = NDArray[np.float64]
-_CHUNKS = 32  # that threads share; each sums on its own
+_TASKS = 32  # that threads share: some receivers, and a share of the tubes that is summed on its own
 _STEEP = 1e-9  # sine of the angle from the vertical below which v has no direction of its own
 
 
@@ -112,7 +114,7 @@ def radiate(
     (node, rx, group) complex128
         Scattering length for exp(+j omega t), over R2 with ``spreading`` [m].
     """
-    parts = np.zeros((_CHUNKS, len(wavenumber), *length.shape), dtype=np.complex128)
+    parts = np.zeros((math.ceil(_TASKS / len(rx)), len(wavenumber), *length.shape), dtype=np.complex128)
     if len(footprints):
         f, c = footprints, np.ascontiguousarray
         _radiate(
@@ -173,14 +175,17 @@ def mean_of_phasor(a: float, b: float, c: float) -> tuple[float, float]:
             real += _EVEN[m] * even
             third_last, second_last, last = last, odd, even
         return real, imaginary
-    mid = -(low + high)
-    left, right = (mid - low) / 2, (high - mid) / 2
-    left_size = math.sin(left) / left if left > 1e-8 else 1.0
-    right_size = math.sin(right) / right if right > 1e-8 else 1.0
-    left_turn, right_turn = (mid + low) / 2, (mid + high) / 2
-    # 2 (E(low, mid) - E(mid, high)) / (-j (low - high)), E the mean over a side.
-    real = math.cos(left_turn) * left_size - math.cos(right_turn) * right_size
-    imaginary = -math.sin(left_turn) * left_size + math.sin(right_turn) * right_size
+    # 2 (E(low, mid) - E(mid, high)) / (-j (low - high)), E the mean over a side. What it takes of sines and cosines are those
+    # of half of low and of half of high: half of mid - low is -(low + high / 2), and so on.
+    cos_low, sin_low = phasor(low / (4 * math.pi))
+    cos_high, sin_high = phasor(high / (4 * math.pi))
+    left, right = -(low + high / 2), high + low / 2
+    left_sine = -(2 * sin_low * cos_low * cos_high + (1 - 2 * sin_low * sin_low) * sin_high)
+    right_sine = 2 * sin_high * cos_high * cos_low + (1 - 2 * sin_high * sin_high) * sin_low
+    left_size = left_sine / left if left > 1e-8 else 1.0
+    right_size = right_sine / right if right > 1e-8 else 1.0
+    real = cos_high * left_size - cos_low * right_size
+    imaginary = sin_high * left_size - sin_low * right_size
     scale = 2 / (high - low)
     return imaginary * scale, -real * scale
 
@@ -203,10 +208,14 @@ def _radiate(  # type: ignore[no-untyped-def]
     out,
 ):
     tubes, receivers, nodes, chunks = len(places), len(rx), len(wavenumber), len(out)
-    for chunk in prange(chunks):
+    for task in prange(chunks * receivers):
+        chunk, receiver = task // receivers, task % receivers
+        x, y, z = rx[receiver, 0], rx[receiver, 1], rx[receiver, 2]
         u = np.empty(3)
         # Interleaved, for hidden tubes come in runs.
         for tube in range(chunk, tubes, chunks):
+            if not visible[receiver, tube]:
+                continue
             p0, p1, p2, middle = places[tube, 0], places[tube, 1], places[tube, 2], places[tube, 3]
             ax, ay, az = p1[0] - p0[0], p1[1] - p0[1], p1[2] - p0[2]
             bx, by, bz = p2[0] - p0[0], p2[1] - p0[1], p2[2] - p0[2]
@@ -217,45 +226,41 @@ def _radiate(  # type: ignore[no-untyped-def]
             if nx * normal[tube, 0] + ny * normal[tube, 1] + nz * normal[tube, 2] < 0:
                 nx, ny, nz = -nx, -ny, -nz
             n_d, n_e = nx * dx + ny * dy + nz * dz, nx * ex + ny * ey + nz * ez
-            for receiver in range(receivers):
-                if not visible[receiver, tube]:
-                    continue
-                x, y, z = rx[receiver, 0], rx[receiver, 1], rx[receiver, 2]
-                sx, sy, sz = x - middle[0], y - middle[1], z - middle[2]
-                leg = math.sqrt(sx * sx + sy * sy + sz * sz)
-                sx, sy, sz = sx / leg, sy / leg, sz / leg
-                # Polarisation: h = up x s, v = s x h; straight above, x stands in for up.
-                if sx * sx + sy * sy < _STEEP * _STEEP:
-                    hx, hy, hz = 0.0, -sz, sy
-                else:
-                    hx, hy, hz = -sy, sx, 0.0
-                size = math.sqrt(hx * hx + hy * hy + hz * hz)
-                hx, hy, hz = hx / size, hy / size, hz / size
-                if horizontal:
-                    qx, qy, qz = hx, hy, hz
-                else:
-                    qx, qy, qz = sy * hz - sz * hy, sz * hx - sx * hz, sx * hy - sy * hx
-                n_s = nx * sx + ny * sy + nz * sz
-                weight = (ex * qx + ey * qy + ez * qz) * (n_s - n_d) + (qx * dx + qy * dy + qz * dz) * n_e
-                weight -= (ex * sx + ey * sy + ez * sz) * (nx * qx + ny * qy + nz * qz)
-                weight /= 2
-                if tapered:
-                    weight *= max(-4 * n_s * n_d, 0.0) / (n_s - n_d) ** 2
-                if spreading:
-                    weight /= leg
-                own = group[tube]
-                mean = 0.0
-                for corner in range(3):
-                    wx, wy, wz = x - places[tube, corner, 0], y - places[tube, corner, 1], z - places[tube, corner, 2]
-                    u[corner] = path[tube, corner] - length[receiver, own] + math.sqrt(wx * wx + wy * wy + wz * wz)
-                    mean += u[corner] / 3
-                # A bow of the path across the triangle, quadratic, is on average 3/4 of what it is in the middle.
-                bow = 0.75 * (path[tube, 3] + leg - length[receiver, own] - mean)
-                for node in range(nodes):
-                    k = wavenumber[node]
-                    real, imaginary = mean_of_phasor(k * (u[0] - mean), k * (u[1] - mean), k * (u[2] - mean))
-                    phase = k * (mean + bow)
-                    cosine, sine = math.cos(phase), math.sin(phase)
-                    out[chunk, node, receiver, own] += weight * complex(
-                        real * cosine + imaginary * sine, imaginary * cosine - real * sine
-                    )
+            sx, sy, sz = x - middle[0], y - middle[1], z - middle[2]
+            leg = math.sqrt(sx * sx + sy * sy + sz * sz)
+            sx, sy, sz = sx / leg, sy / leg, sz / leg
+            # Polarisation: h = up x s, v = s x h; straight above, x stands in for up.
+            if sx * sx + sy * sy < _STEEP * _STEEP:
+                hx, hy, hz = 0.0, -sz, sy
+            else:
+                hx, hy, hz = -sy, sx, 0.0
+            size = math.sqrt(hx * hx + hy * hy + hz * hz)
+            hx, hy, hz = hx / size, hy / size, hz / size
+            if horizontal:
+                qx, qy, qz = hx, hy, hz
+            else:
+                qx, qy, qz = sy * hz - sz * hy, sz * hx - sx * hz, sx * hy - sy * hx
+            n_s = nx * sx + ny * sy + nz * sz
+            weight = (ex * qx + ey * qy + ez * qz) * (n_s - n_d) + (qx * dx + qy * dy + qz * dz) * n_e
+            weight -= (ex * sx + ey * sy + ez * sz) * (nx * qx + ny * qy + nz * qz)
+            weight /= 2
+            if tapered:
+                weight *= max(-4 * n_s * n_d, 0.0) / (n_s - n_d) ** 2
+            if spreading:
+                weight /= leg
+            own = group[tube]
+            mean = 0.0
+            for corner in range(3):
+                wx, wy, wz = x - places[tube, corner, 0], y - places[tube, corner, 1], z - places[tube, corner, 2]
+                u[corner] = path[tube, corner] - length[receiver, own] + math.sqrt(wx * wx + wy * wy + wz * wz)
+                mean += u[corner] / 3
+            # A bow of the path across the triangle, quadratic, is on average 3/4 of what it is in the middle.
+            bow = 0.75 * (path[tube, 3] + leg - length[receiver, own] - mean)
+            for node in range(nodes):
+                k = wavenumber[node]
+                real, imaginary = mean_of_phasor(k * (u[0] - mean), k * (u[1] - mean), k * (u[2] - mean))
+                phase = k * (mean + bow)
+                cosine, sine = phasor(phase / (2 * math.pi))
+                out[chunk, node, receiver, own] += weight * complex(
+                    real * cosine + imaginary * sine, imaginary * cosine - real * sine
+                )

@@ -146,10 +146,9 @@ class Multipath:
             lengths[..., ghosts], bare[..., ghosts] = self._over_walls.at(
                 self._path[ghosts], self._part[ghosts], at, start[:, ghosts], wanted
             )
-        out = np.empty((*shape, n_echoes), dtype=np.complex128)
-        factors = [self._ends.spread(anchor.factor) for anchor in (before, after)]
-        seen = [self._ends.spread(anchor.seen.astype(np.float32)) for anchor in (before, after)]
-        weigh(bare, factors[0], factors[1], seen[0], seen[1], share, interval, at.tx_index, out)
+        out = np.empty((*shape, n_echoes), dtype=np.complex64)
+        weights = self._ends.tx_weight[at.tx_index], self._ends.rx_weight[at.tx_index]
+        weigh(bare, before.factor, after.factor, before.seen, after.seen, share, interval, line, *weights, out)
         return self._as_echoes(at.tx_index, lengths, out)
 
     def course(self, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -75,11 +75,14 @@ def crossed(wall: Wall, origins: Array, targets: Array) -> NDArray[np.bool_]:
 
     They do where their ends are on different sides of its middle plane, so a leg that ends on a face does not cross.
     """
-    first, second = height(wall, origins), height(wall, targets)
-    apart = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
-    # Where they pass the front: the fronts of a room meet without a gap, the middle planes of its slabs do not.
-    share = first / np.where(apart, first - second, 1.0)
-    return np.asarray(apart & inside(wall, origins + share[..., None] * (np.asarray(targets) - origins)))
+    first, second = np.broadcast_arrays(height(wall, origins), height(wall, targets))
+    across = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
+    if across.any():
+        # Where they pass the front: the fronts of a room meet without a gap, the middle planes of its slabs do not.
+        starts, ends = (np.broadcast_to(places, (*across.shape, 3))[across] for places in (origins, targets))
+        share = first[across] / (first - second)[across]
+        across[across] = inside(wall, starts + share[:, None] * (ends - starts))
+    return across
 
 
 def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike) -> Field:
@@ -140,13 +143,14 @@ def through_walls(scene: Scene, origins: Array, targets: Array, frequency_hz: Ar
     (node, ..., 3) complex128
         Without spreading and without the phase of the leg's length; 0 behind metal.
     """
-    origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+    origins, targets = (np.asarray(places, dtype=np.float64) for places in (origins, targets))
+    shape = np.broadcast_shapes(origins.shape, targets.shape)
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    out = np.array(np.broadcast_to(field, (len(frequency), *origins.shape)), dtype=np.complex128)
+    out = np.array(np.broadcast_to(field, (len(frequency), *shape)), dtype=np.complex128)
     for wall in scene.walls:
         legs = crossed(wall, origins, targets)
         if legs.any():
-            ways = targets[legs] - origins[legs]
+            ways = np.broadcast_to(targets, shape)[legs] - np.broadcast_to(origins, shape)[legs]
             ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
             out[:, legs] = transmit(wall, out[:, legs], ways, frequency)
     return out

@@ -128,7 +128,7 @@ class Shooter:
 def exits(surfaces: Surfaces, footprints: Footprints, rx: Array) -> NDArray[np.bool_]:
     """Whether the last leg from each footprint to each of ``rx (rx, 3)`` is free, (rx, tube)."""
     middles, normals = footprints.places[:, 3], footprints.normals[:, 3]
-    visible = np.einsum("rti,ti->rt", rx[:, None] - middles, normals) > 0
+    visible = rx @ normals.T > (middles * normals).sum(axis=1)
     receiver, tube = np.nonzero(visible)
     visible[receiver, tube] = surfaces.sees(rx[receiver], middles[tube], footprints.surface[tube])
     return visible

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.signal.phasor import phasor
+from rtradar.phasor import phasor
 
 _POWERS = 3
 """Powers of the sample number that one grid takes: all of an amplitude given at up to three frequencies."""
@@ -43,7 +43,7 @@ _CHIRPS_AT_ONCE = 48
 
 def spread_sum(
     length: NDArray[np.float64],
-    amplitude: NDArray[np.complex128],
+    amplitude: NDArray[np.complexfloating],
     powers: NDArray[np.float64],
     start_frequency: float,
     slope: float,
@@ -56,7 +56,7 @@ def spread_sum(
     ----------
     length : (chirp, rx, echo) float64
         [m]; echoes whose beat lies outside [0, sample rate) are left out.
-    amplitude : (node, chirp, rx, echo) complex128
+    amplitude : (node, chirp, rx, echo) complex
         [m], at `MOST_NODES` frequencies at most.
     powers : (power, node) float64
         Weights of the values at the nodes in the polynomial in the sample number over the number of samples.
@@ -71,11 +71,12 @@ def spread_sum(
     cubic = np.polynomial.polynomial.polyval((np.arange(samples) - half) / samples, _CUBIC).astype(np.float32)
     for first in range(0, chirps, _CHIRPS_AT_ONCE):
         some = slice(first, min(first + _CHIRPS_AT_ONCE, chirps))
-        own, sums = np.ascontiguousarray(amplitude[:, some]), out[some]
+        sums = out[some]
         sums[:] = 0
         for number, parabola in enumerate(parabolas):
             grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
-            _spread(length[some], own, parabola, start_frequency, slope, sample_rate, half, samples, gaussian, variance, grid)
+            own = length[some], amplitude[:, some]
+            _spread(*own, parabola, start_frequency, slope, sample_rate, half, samples, gaussian, variance, grid)
             summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
             if number > 0:
                 sums *= cubic

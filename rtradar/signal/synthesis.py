@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
+from rtradar.phasor import phasor
 from rtradar.radar import Radar
-from rtradar.signal.phasor import phasor
 from rtradar.signal.spreading import MOST_NODES, spread_sum
 
 MAX_BINS_IN_CHIRP = 0.1
@@ -200,7 +200,8 @@ def synthesize(
     many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES and out.dtype == np.complex64
     (spread_sum if many else _synthesize)(
         np.ascontiguousarray(echoes.length),
-        np.ascontiguousarray(echoes.amplitude, dtype=np.complex128),
+        # A slice of a block serves as it is where amplitudes are only picked.
+        echoes.amplitude if many else np.ascontiguousarray(echoes.amplitude, dtype=np.complex128),
         _powers_of_sample_number(echoes.frequency, radar),
         float(radar.start_frequency_hz),
         radar.slope_hz_per_s,
