@@ -313,7 +313,7 @@ def _stream(
             samples = synthesize(echoes, radar, radar.chirp_times(len(echoes.tx), first), dtype=np.complex64)
         if room is not None:
             with stages.time("clutter"):
-                samples += room.clutter_if(np.arange(first, first + len(samples)))
+                room.add(samples, np.arange(first, first + len(samples)))
         with stages.time("noise"):
             noise.add(samples, radar, first)
         if kept is not None:

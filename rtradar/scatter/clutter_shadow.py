@@ -74,6 +74,8 @@ class ClutterShadow:
         self.step = anchor_step(clutter.radar, ANCHORS_S)
         self.starts = np.cumsum([0, *(own.n_echoes for own in clutter.objects)])
         self._points, self._of_point = _shared_points(clutter, self.starts)
+        self._ways = self._points - self._middle
+        self._squares = np.maximum((self._ways**2).sum(axis=1), 1e-30)
         self._legs = _Legs.of(clutter, self.starts)
         self._kept: OrderedDict[int, Hidden] = OrderedDict()
 
@@ -87,7 +89,7 @@ class ClutterShadow:
         self._tracer.pose(centres, at.frames[0])
         middle = (centres.max(axis=0) + centres.min(axis=0)) / 2
         ball = float((np.linalg.norm(centres - middle, axis=1) + at.semi_axes.max(axis=1)).max())
-        near = np.flatnonzero(_passes(self._middle, self._points, middle, ball + self._reach))
+        near = np.flatnonzero(self._passes(middle, ball + self._reach))
         starts, ends, zone = self._zones(middle, ball)
         nodes = len(self._antennas)
         met = self._met(
@@ -112,6 +114,13 @@ class ClutterShadow:
                     lost = self.hidden(place)
                     out[index][:, lost.echo] -= weight * lost.share[line]
         return out
+
+    def _passes(self, place: Array, radius: float) -> NDArray[np.bool_]:
+        """Whether legs from the middle of the array to the points (point,) come nearer to a place than this."""
+        away = place - self._middle
+        along = self._ways @ away
+        share = np.clip(along / self._squares, 0.0, 1.0)
+        return np.asarray(away @ away - 2 * share * along + share**2 * self._squares < radius**2)
 
     def _zones(self, middle: Array, ball: float) -> tuple[Array, Array, NDArray[np.int64]]:
         """Ends (leg, ray, 3) of rays over the first Fresnel zones of mirror paths near the body, and which legs these are."""
@@ -226,11 +235,3 @@ def _nodes(radar: Radar) -> tuple[Array, Array, Array]:
                 weight[line, first], weight[line, first + 1] = 1 - share, share
         weights.append(weight)
     return np.stack(places), weights[0][:, : len(places)], weights[1][:, : len(places)]
-
-
-def _passes(origins: Array, targets: Array, middle: Array, radius: float) -> NDArray[np.bool_]:
-    """Whether straight legs (..., 3) come nearer to a place than this."""
-    ways = targets - origins
-    square = np.maximum((ways**2).sum(axis=-1), 1e-30)
-    share = np.clip(((middle - origins) * ways).sum(axis=-1) / square, 0.0, 1.0)
-    return np.asarray(((origins + share[..., None] * ways - middle) ** 2).sum(axis=-1) < radius**2)
