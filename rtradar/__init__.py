@@ -5,6 +5,7 @@ Everything named here loads on first use, so that ``import rtradar`` is quick.
 
 from __future__ import annotations
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from rtradar.scene import Scene
 
 __version__ = "0.1.0"
+
+# OpenMP, which runs compiled loops, keeps threads that have nothing to do spinning; they would take the cores from threads that
+# have. Read when OpenMP is loaded, with the first compiled loop that runs in parallel.
+os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {
     "BackendError": "errors",

@@ -10,6 +10,7 @@ order, below 1 um.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit, prange
@@ -24,6 +25,33 @@ _LEFT_OUT_M = 1e-6
 
 _SMALL_STEP = 0.003
 """Share of the least semi-axis: a smaller step of Newton's method is left to the receivers."""
+
+
+class Nearby(NamedTuple):
+    """Where mirror points of echoes are expected, in the axes of their parts [m]; they need not lie on the surface.
+
+    ``before, after (interval, line, 2, echo, 3)`` for the ends of the lines of transmitters, at the ends of intervals;
+    ``wanted (interval, line, echo)`` which are to be done. Of each chirp: ``interval``, ``line`` and ``share (chirp,)`` of the
+    interval that is over, and ``tx_weight (chirp, 2)``, the share of each end of the line in the transmitter.
+    """
+
+    before: NDArray[np.float32]
+    after: NDArray[np.float32]
+    wanted: NDArray[np.bool_]
+    interval: NDArray[np.int64]
+    line: NDArray[np.int64]
+    share: Array
+    tx_weight: Array
+
+    def take(self, echoes: slice) -> Nearby:
+        """Some of the echoes."""
+        before, after = (np.ascontiguousarray(at[..., echoes, :]) for at in (self.before, self.after))
+        return self._replace(before=before, after=after, wanted=np.ascontiguousarray(self.wanted[..., echoes]))
+
+    def places(self) -> Array:
+        """The same for each chirp, (chirp, echo, 3)."""
+        ends = [np.einsum("cs,cs...->c...", self.tx_weight, at[self.interval, self.line]) for at in (self.before, self.after)]
+        return np.asarray(ends[0] + self.share[:, None, None] * (ends[1] - ends[0]), dtype=np.float64)
 
 
 @njit(cache=True, error_model="numpy")
@@ -67,7 +95,7 @@ def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untype
 
 @njit(cache=True, error_model="numpy", parallel=True)
 def nearby_echoes(  # type: ignore[no-untyped-def]
-    tx, rx, middle, tx_index, out_leg, back_leg, part, centres, frames, semi_axes, start, wanted, length, amplitude, known
+    tx, rx, middle, tx_index, out_leg, back_leg, part, centres, frames, semi_axes, near, length, amplitude, known
 ):
     """Lengths and returns of echoes, starting near their mirror points.
 
@@ -85,10 +113,8 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
         What each echo goes over.
     centres, frames, semi_axes : (chirp, part, 3), (chirp, part, 3, 3), (part, 3) float64
         Poses [m].
-    start : (chirp, echo, 3) float64
-        Where the mirror point is expected, in the part's axes [m]; it need not lie on the surface.
-    wanted : (chirp, echo) bool
-        Which to do; others get the way over the part's centre and no return.
+    near : Nearby
+        Where mirror points are expected. Echoes that are not wanted get the way over the part's centre and no return.
     length, amplitude : (chirp, rx, echo) float64
         Filled: |T' - p| + |R' - p|, and the return of a perfect conductor over R1 R2 without regard to polarisation [m].
     known : (chirp, echo) bool
@@ -100,13 +126,17 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
         e, f, normal, bend = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
         local, point, to_tx, to_rx = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
         lengths, returns, left_out, least_facing = np.empty((4, receivers))
-        transmitter = tx_index[chirp]
+        transmitter, which, line = tx_index[chirp], near.interval[chirp], near.line[chirp]
+        shares = np.empty((2, 2))
+        for side in range(2):
+            shares[0, side] = (1 - near.share[chirp]) * near.tx_weight[chirp, side]
+            shares[1, side] = near.share[chirp] * near.tx_weight[chirp, side]
         for echo in range(echoes):
             own = part[echo]
             axes, frame, centre = semi_axes[own], frames[chirp, own], centres[chirp, own]
             here, there = tx[out_leg[echo], transmitter], middle[back_leg[echo], transmitter]
             heard = rx[back_leg[echo], transmitter]
-            if not wanted[chirp, echo]:
+            if not near.wanted[which, line, echo]:
                 known[chirp, echo] = True
                 there_and_back = math.sqrt(
                     (here[0] - centre[0]) ** 2 + (here[1] - centre[1]) ** 2 + (here[2] - centre[2]) ** 2
@@ -116,7 +146,10 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                     amplitude[chirp, receiver, echo] = 0.0
                 continue
             for i in range(3):
-                local[i] = start[chirp, echo, i]
+                local[i] = 0.0
+                for side in range(2):
+                    local[i] += shares[0, side] * near.before[which, line, side, echo, i]
+                    local[i] += shares[1, side] * near.after[which, line, side, echo, i]
             least = min(axes[0], min(axes[1], axes[2]))
             settled = False
             facing_tx = 0.0

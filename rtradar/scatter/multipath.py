@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_ends import ArrayEnds
 from rtradar.scatter.body_material import Surface, body_material
-from rtradar.scatter.ghost_echoes import weigh
+from rtradar.scatter.ghost_echoes import Nearby, weigh
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.path_account import PathAccount, account
@@ -132,22 +132,21 @@ class Multipath:
             length, amplitude = self._direct(chirps, at)
             return self._as_echoes(at.tx_index, length, amplitude.astype(np.complex128)[None])
         interval, share, before, after = self._around_chirps(chirps)
-        line = self._ends.line_of_tx[at.tx_index]
-        first, last = before.start[interval, line], after.start[interval, line]
-        start = np.asarray(first + share[:, None, None] * (last - first), dtype=np.float64)
+        line, tx_weight = self._ends.line_of_tx[at.tx_index], self._ends.tx_weight[at.tx_index]
+        wanted = np.any(before.seen | after.seen, axis=(2, 3))
+        near = Nearby(before.start, after.start, wanted, interval, line, share, tx_weight)
         n_direct, n_echoes = at.centres.shape[1], len(self._part)
-        length, amplitude = self._direct(chirps, at, start[:, :n_direct])
+        length, amplitude = self._direct(chirps, at, near.take(slice(n_direct)).places())
         shape = (len(self._frequency), *length.shape[:2])
         lengths, bare = np.empty((*length.shape[:2], n_echoes)), np.empty((*length.shape[:2], n_echoes))
         lengths[..., :n_direct], bare[..., :n_direct] = length, amplitude
         if n_echoes > n_direct:
             ghosts = slice(n_direct, n_echoes)
-            wanted = np.any(before.seen | after.seen, axis=(2, 3), keepdims=True)[interval, line, 0, 0, ghosts]
             lengths[..., ghosts], bare[..., ghosts] = self._over_walls.at(
-                self._path[ghosts], self._part[ghosts], at, start[:, ghosts], wanted
+                self._path[ghosts], self._part[ghosts], at, near.take(ghosts)
             )
         out = np.empty((*shape, n_echoes), dtype=np.complex64)
-        weights = self._ends.tx_weight[at.tx_index], self._ends.rx_weight[at.tx_index]
+        weights = tx_weight, self._ends.rx_weight[at.tx_index]
         weigh(bare, before.factor, after.factor, before.seen, after.seen, share, interval, line, *weights, out)
         return self._as_echoes(at.tx_index, lengths, out)
 

@@ -47,7 +47,7 @@ class PathAnchors(NamedTuple):
 
     ``factor (anchor, node, line, 2, rx_end, echo)`` complex64: co-polar field over that of the bare return, exp(+j omega t);
     of a direct echo over what `mirror` has for a conductor. ``seen (anchor, line, 2, rx_end, echo)`` bool.
-    ``start (anchor, line, echo, 3)``: mirror points in the axes of the parts [m].
+    ``start (anchor, line, 2, echo, 3)``: mirror points of both ends of the lines of Tx in the axes of the parts [m].
     """
 
     factor: NDArray[np.complex64]
@@ -123,21 +123,34 @@ def path_anchors(
 def _mirror_points(
     ends: ArrayEnds, paths: Sequence[WallPath], path: NDArray[np.int64], part: NDArray[np.int64], poses: Poses
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """World and local places (anchor, line, echo, 3), and whether there is a mirror point at all (anchor, line, echo)."""
-    anchors, lines = len(poses.centres), len(ends.tx_middle)
-    points, exists = np.empty((anchors, lines, len(path), 3)), np.empty((anchors, lines, len(path)), dtype=bool)
+    """Mirror points, and whether there is one at all.
+
+    Returns
+    -------
+    points : (anchor, line, echo, 3)
+        For the middles of the lines, world [m].
+    starts : (anchor, line, 2, echo, 3)
+        For the ends of the lines of Tx, in the axes of the parts [m].
+    exists : (anchor, line, echo) bool
+    """
+    anchors = len(poses.centres)
+    # The middle of each line of Tx and its ends, all with the middle of the receivers that hear it.
+    tx = np.concatenate([ends.tx_middle[:, None], ends.tx], axis=1)
+    rx = np.repeat(ends.rx_middle[:, None], tx.shape[1], axis=1)
+    shape = (anchors, *tx.shape[:2], len(path))
+    places, exists = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
     for number in np.unique(path):
         chosen = np.flatnonzero(path == number)
         own = part[chosen]
-        tx, rx = images(paths[number].out, ends.tx_middle), images(paths[number].back, ends.rx_middle)
-        centres, frames = (np.repeat(array[:, own], lines, axis=0) for array in (poses.centres, poses.frames))
-        found = mirror(
-            np.tile(tx, (anchors, 1)), np.tile(rx, (anchors, 1))[:, None], centres, frames, poses.semi_axes[own], points=True
-        )
-        exists[:, :, chosen] = (np.abs(found[1]) > 0).reshape(anchors, lines, len(own))
-        points[:, :, chosen] = found[2].reshape(anchors, lines, len(own), 3)
-    local = np.einsum("aeji,alej->alei", poses.frames[:, part], points - poses.centres[:, None, part])
-    return points, local, exists
+        from_tx, to_rx = images(paths[number].out, tx.reshape(-1, 3)), images(paths[number].back, rx.reshape(-1, 3))
+        centres, frames = (np.repeat(array[:, own], len(from_tx), axis=0) for array in (poses.centres, poses.frames))
+        antennas = np.tile(from_tx, (anchors, 1)), np.tile(to_rx, (anchors, 1))[:, None]
+        found = mirror(*antennas, centres, frames, poses.semi_axes[own], points=True)
+        exists[..., chosen] = (np.abs(found[1]) > 0).reshape(*shape[:3], len(own))
+        places[..., chosen, :] = found[2].reshape(*shape[:3], len(own), 3)
+    away = places[:, :, 1:] - poses.centres[:, None, None, part]
+    starts = np.einsum("aeji,alsej->alsei", poses.frames[:, part], away)
+    return places[:, :, 0], starts, exists[:, :, 0]
 
 
 class _Carried(NamedTuple):

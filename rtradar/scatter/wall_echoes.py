@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_ends import ArrayEnds
-from rtradar.scatter.ghost_echoes import nearby_echoes
+from rtradar.scatter.ghost_echoes import Nearby, nearby_echoes
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.polarization import copolar
 from rtradar.scatter.poses import ChirpPoses
@@ -43,9 +43,7 @@ class WallEchoes:
         self._rx_in_lanes = np.ascontiguousarray(np.swapaxes(self._rx, 2, 3))
         self._rx_middle = np.array([images(leg, ends.rx_middle[ends.line_of_tx]) for leg in legs])
 
-    def at(
-        self, path: NDArray[np.int64], part: NDArray[np.int64], poses: ChirpPoses, start: Array, wanted: NDArray[np.bool_]
-    ) -> tuple[Array, Array]:
+    def at(self, path: NDArray[np.int64], part: NDArray[np.int64], poses: ChirpPoses, near: Nearby) -> tuple[Array, Array]:
         """Lengths and returns.
 
         Parameters
@@ -53,10 +51,8 @@ class WallEchoes:
         path, part : (echo,) int64
             Path and body part of each echo.
         poses : ChirpPoses
-        start : (chirp, echo, 3) float64
-            Where mirror points are expected, in the axes of the parts [m].
-        wanted : (chirp, echo) bool
-            Which to do: others return nothing. The formula needs neither of both, and does all.
+        near : Nearby
+            Where mirror points are expected. Those not wanted return nothing. The formula needs neither, and does all.
 
         Returns
         -------
@@ -64,7 +60,7 @@ class WallEchoes:
             [m]; without regard to polarisation, which is a matter of the legs.
         """
         shape = (*poses.rx.shape[:2], len(path))
-        length, amplitude, known = np.empty(shape), np.empty(shape), np.empty(wanted.shape, dtype=bool)
+        length, amplitude, known = np.empty(shape), np.empty(shape), np.empty((shape[0], shape[2]), dtype=bool)
         if self._far_field:
             for number in np.unique(path):
                 own = path == number
@@ -80,8 +76,7 @@ class WallEchoes:
             self._back[path],
             part,
             *poses[3:],
-            start,
-            wanted,
+            near,
             length,
             amplitude,
             known,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.trace.clearance import clearance
@@ -99,9 +99,9 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
     return near
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, error_model="numpy")
 def _clearances(origins, targets, own, centres, frames, axes, longest, near, out):  # type: ignore[no-untyped-def]
-    for ray in prange(len(origins)):
+    for ray in range(len(origins)):
         least = 1.0
         o, t = origins[ray], targets[ray]
         d0, d1, d2 = t[0] - o[0], t[1] - o[1], t[2] - o[2]
