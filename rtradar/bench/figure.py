@@ -78,4 +78,4 @@ def _lines(axes: Any, rows: Sequence[Row], key: str, label: str, series: Sequenc
 
 def _memory(axes: Any, rows: Sequence[Row], key: str) -> None:
     axes.plot([row[key] for row in rows], [row["peak_memory_mb"] for row in rows], "s--", color="0.5", markersize=4)
-    axes.set(ylabel="peak memory [MB], dashed", ylim=(0, None))
+    axes.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(row["peak_memory_mb"] for row in rows)))

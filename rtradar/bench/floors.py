@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rtradar.bench.times import ELSEWHERE
 from rtradar.process import SPECTROGRAM_CYCLES, angle_grid, measures_angle
 from rtradar.radar import Radar
 
@@ -127,7 +128,7 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
     Returns
     -------
     dict of str to Floor
-        By the names of ``stages`` in the summary of a run.
+        By the names of ``stages`` in the summary of a run, and `ELSEWHERE`.
     """
 
     def copied(count: float) -> float:
@@ -138,6 +139,7 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
     spectra = _SAMPLE * work.windows * work.cycles * work.channels * work.samples
     doppler = max(work.windows * work.channels * work.samples / rates.doppler_ffts, copied(spectra))
     return {
+        ELSEWHERE: Floor(copied(2 * _SAMPLE * samples), "spectra kept for the windows"),
         "scatter": Floor(copied(_ECHO * echoes), "lengths and amplitudes written"),
         "signal": Floor(tones, "four multiply-adds an echo and sample, or samples written"),
         "noise": Floor(max(2 * samples / rates.normals, copied(2 * _SAMPLE * samples)), "two normals a sample"),

@@ -55,7 +55,7 @@ def rung_row(
         "whole_s": asdict(Spread.of([run.whole_s for run in runs])),
         "process_s": asdict(Spread.of([run.process_s for run in runs])),
         "warmup_s": asdict(Spread.of([run.summary["warmup_s"] for run in runs])),
-        "first_use_s": None if first is None else first_use_s(first, runs),
+        "first_use": None if first is None else first_use(first, runs),
         "peak_memory_mb": max(run.peak_memory_mb for run in runs),
         f"over_{CHEAPEST}": None if cheapest is None else paired_ratio(to_cloud, [run.to_cloud_s for run in cheapest]),
         "stages": {
@@ -67,9 +67,21 @@ def rung_row(
     return row | {"paper_over": None if baseline is None else paper_over(baseline, radar, work.chirps, row)}
 
 
-def first_use_s(first: Run, runs: list[Run]) -> float:
-    """How much longer the first process takes to the cloud than those after it [s]: compiling, and filling caches."""
-    return first.from_start_to_cloud_s - median(run.from_start_to_cloud_s for run in runs)
+def first_use(first: Run, runs: list[Run]) -> dict[str, float]:
+    """What the first process of a rung takes, with nothing compiled and no cache filled.
+
+    Returns
+    -------
+    dict of str to float
+        ``adds_s``: how much longer it takes from its start to the cloud than the median of those after it;
+        ``process_s``, ``warmup_s``: its own [s].
+    """
+    later = median(run.from_start_to_cloud_s for run in runs)
+    return {
+        "adds_s": first.from_start_to_cloud_s - later,
+        "process_s": first.process_s,
+        "warmup_s": first.summary["warmup_s"],
+    }
 
 
 def paper_over(baseline: Baseline, radar: Radar, chirps: int, row: Row) -> dict[str, float]:

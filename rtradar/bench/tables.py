@@ -74,7 +74,7 @@ def _rungs(rungs: Sequence[Row]) -> str:
             f"{row['to_cloud_s']['best']:.2f} s",
             f"{row['to_cloud_s']['median']:.2f} s",
             f"{row['whole_s']['median']:.2f} s",
-            _or_dash(row["first_use_s"], "{:.1f} s"),
+            "-" if row["first_use"] is None else f"{row['first_use']['adds_s']:.1f} s",
             f"{row['peak_memory_mb']:.0f} MB",
             _or_dash(row[f"over_{CHEAPEST}"], "{:.2f}"),
             "-" if row["paper_over"] is None else f"{row['paper_over']['to_cloud']:.3g} (IF {row['paper_over']['if']:.3g})",
