@@ -138,7 +138,7 @@ def _parser() -> argparse.ArgumentParser:
     bench.add_argument("--repeats", type=_whole, metavar="N", help="of each measurement (default: 3; with --quick 1)")
     bench.add_argument("--duration", type=_seconds, metavar="S", help="of the capture [s] (default: 3; with --quick 0.5)")
     bench.add_argument("--only", metavar="PART", help="rungs (with the paper's method and floors), or growth")
-    bench.add_argument("--quick", action="store_true", help="a look in a minute or two: little of everything")
+    bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
     bench.add_argument("--json", type=Path, metavar="FILE", help="write all that is measured there as JSON")
     bench.add_argument("--figure", type=Path, metavar="FILE", help="draw it there, as PNG")
     bench.set_defaults(command=_bench)

@@ -18,7 +18,13 @@ def tables(found: dict[str, Any]) -> str:
 
 def _blocks(found: dict[str, Any]) -> Iterator[str]:
     rungs = found["rungs"]
+    left_out = ", ".join((*OTHER_PRODUCTS, *FILES))
+    yield (
+        f"{found['settings']['motion']}, {found['machine']['cores']} cores, each run a process of its own, medians of "
+        f"{found['settings']['repeats']} after warm-up. To the cloud: all stages but {left_out}."
+    )
     if rungs:
+        yield _rates(found["rates"])
         yield _rungs(rungs)
         if found["paper"]["trouble"]:
             yield f"the paper's method was not timed: {found['paper']['trouble']}"
@@ -62,6 +68,14 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
     if growth["echoes"]:
         lines = [[str(row["echoes"]), f"{1e9 * row['signal_s'] / row['samples']:.2f} ns"] for row in growth["echoes"]]
         yield table(["echoes of a chirp and receiver", "IF alone, a sample"], lines)
+
+
+def _rates(rates: dict[str, Any]) -> str:
+    own = next(iter(rates.values()))
+    return (
+        f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, {own['normals'] / 1e6:.0f} million normals, "
+        f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
+    )
 
 
 def _rungs(rungs: Sequence[Row]) -> str:
