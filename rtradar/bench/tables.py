@@ -21,7 +21,8 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
     left_out = ", ".join((*OTHER_PRODUCTS, *FILES))
     yield (
         f"{found['settings']['motion']}, {found['machine']['cores']} cores, each run a process of its own, medians of "
-        f"{found['settings']['repeats']} after warm-up. To the cloud: all stages but {left_out}."
+        f"{found['settings']['repeats']} after warm-up. To the cloud: all stages but {left_out}. The paper's method goes to "
+        "detections; IF: its echoes and IF over ours."
     )
     if rungs:
         yield _rates(found["rates"])
