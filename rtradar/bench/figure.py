@@ -43,6 +43,9 @@ def draw(found: dict[str, Any], path: Path) -> None:
 
 def _bars(axes: Any, rungs: Sequence[Row], radar: str) -> None:
     """Stages beside each other, those that do not lead to the cloud hatched; the floor of each as a black bar in it."""
+    import matplotlib as mpl
+
+    colours = mpl.colormaps["tab20"]
     names = list(dict.fromkeys(name for row in rungs for name in row["stages"]))
     names.sort(key=lambda name: name in (*OTHER_PRODUCTS, *FILES))  # stays in order otherwise
     for number, row in enumerate(rungs):
@@ -54,14 +57,14 @@ def _bars(axes: Any, rungs: Sequence[Row], radar: str) -> None:
             label = name if not number else None
             hatch = "//" if name in (*OTHER_PRODUCTS, *FILES) else None
             place = names.index(name)
-            axes.barh(number, stage["median"], left=left, color=f"C{place % 10}", hatch=hatch, label=label, height=0.7)
+            axes.barh(number, stage["median"], left=left, color=colours(place % colours.N), hatch=hatch, label=label, height=0.7)
             if stage["floor"]:
                 axes.barh(number, stage["floor"], left=left, color="black", height=0.15)
             left += stage["median"]
     axes.barh([0], [0], color="black", label="floor")
     axes.set_yticks(range(len(rungs)), [row["fidelity"] for row in rungs])
     axes.invert_yaxis()
-    axes.set(xlabel=f"time of a run of {rungs[0]['capture_s']:.2f} s of radar, median [s]")
+    axes.set(ylabel="rung", xlabel=f"time of a run of {rungs[0]['capture_s']:.2f} s of radar, median [s]")
     axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9)
     axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 

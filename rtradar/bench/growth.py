@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from rtradar.bench.plan import Case, Plan
+from rtradar.bench.rates import best_s
 from rtradar.bench.runs import Run, Runner
 from rtradar.bench.times import Spread
 from rtradar.echoes import Echoes
@@ -21,7 +21,7 @@ ECHOES = (10, 21, 31, 42, 84, 168, 336)
 """Of one chirp and receiver: a body has 21."""
 
 _CYCLES = 33  # 25 ms of the paper's radar, which a run synthesises at once
-_REPEATS = 5
+_ECHOES_S = 0.1  # of repeats
 
 
 def _grown(runs: list[Run]) -> dict[str, Any]:
@@ -71,18 +71,13 @@ def as_toml(radar: Radar) -> str:
 
 def with_echoes(radar: Radar) -> list[dict[str, Any]]:
     """IF of a block of chirps, by itself, from more and more echoes, a row each: ``echoes``, ``samples``, ``signal_s`` (best)."""
-    rows = []
-    for count in ECHOES:
-        echoes = _echoes(radar, count)
-        times = radar.chirp_times(len(echoes.tx))
-        seconds = []
-        for _ in range(_REPEATS + 1):
-            began = time.perf_counter()
-            synthesize(echoes, radar, times, dtype=np.complex64)
-            seconds.append(time.perf_counter() - began)
-        # The first compiles.
-        rows.append({"echoes": count, "samples": len(times) * radar.n_rx * radar.samples_per_chirp, "signal_s": min(seconds[1:])})
-    return rows
+    return [_if_row(radar, _echoes(radar, count)) for count in ECHOES]
+
+
+def _if_row(radar: Radar, echoes: Echoes) -> dict[str, Any]:
+    times = radar.chirp_times(len(echoes.tx))
+    seconds = best_s(lambda: synthesize(echoes, radar, times, dtype=np.complex64), _ECHOES_S)
+    return {"echoes": len(echoes.part), "samples": len(times) * radar.n_rx * radar.samples_per_chirp, "signal_s": seconds}
 
 
 def _echoes(radar: Radar, count: int) -> Echoes:

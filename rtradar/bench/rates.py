@@ -14,7 +14,7 @@ from rtradar.bench.floors import Rates, direction_count
 from rtradar.process import SPECTROGRAM_CYCLES
 from rtradar.radar import Radar
 
-_REPEATS, _LEAST_S = 5, 0.3  # of each measurement
+_REPEATS, _LEAST_S = 5, 0.3
 _COPIED_BYTES = 1 << 28  # of each of two arrays, more than caches hold
 _CACHED_BYTES = 1 << 20  # for each core
 _NORMALS = 1 << 18  # at once, for each core
@@ -38,11 +38,11 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def _best_s(work: Callable[[], object]) -> float:
-    """Of some repeats after one to warm up [s]."""
+def best_s(work: Callable[[], object], least_s: float = _LEAST_S) -> float:
+    """Best of some repeats after one to warm up, over ``least_s`` at least, so that a disturbance does not last [s]."""
     work()
     seconds: list[float] = []
-    while len(seconds) < _REPEATS or sum(seconds) < _LEAST_S:
+    while len(seconds) < _REPEATS or sum(seconds) < least_s:
         began = time.perf_counter()
         work()
         seconds.append(time.perf_counter() - began)
@@ -53,7 +53,7 @@ def _copied_bytes() -> float:
     source, target = (np.ones(_COPIED_BYTES // 8) for _ in range(2))
     parts = list(zip(np.array_split(target, _cores()), np.array_split(source, _cores()), strict=True))
     with ThreadPoolExecutor(_cores()) as pool:
-        return 2 * _COPIED_BYTES / _best_s(lambda: list(pool.map(lambda pair: np.copyto(*pair), parts)))
+        return 2 * _COPIED_BYTES / best_s(lambda: list(pool.map(lambda pair: np.copyto(*pair), parts)))
 
 
 def _normals() -> float:
@@ -64,12 +64,12 @@ def _normals() -> float:
             stream[0].standard_normal(dtype=np.float32, out=stream[1])
 
     with ThreadPoolExecutor(_cores()) as pool:
-        return 8 * _NORMALS * _cores() / _best_s(lambda: list(pool.map(draw, streams)))
+        return 8 * _NORMALS * _cores() / best_s(lambda: list(pool.map(draw, streams)))
 
 
 def _multiply_adds() -> float:
     a, b, out = np.ones((_MATRIX, _MATRIX)), np.ones((_MATRIX, _MATRIX)), np.empty((_MATRIX, _MATRIX))
-    return _MATRIX**3 / _best_s(lambda: np.matmul(a, b, out=out))
+    return _MATRIX**3 / best_s(lambda: np.matmul(a, b, out=out))
 
 
 def _ffts(length: int) -> float:
@@ -81,6 +81,6 @@ def _ffts(length: int) -> float:
 
     def seconds(block: np.ndarray[tuple[int, ...], np.dtype[np.complex64]], axis: int) -> float:
         # Unitary, so that it can be done again and again in place.
-        return _best_s(lambda: scipy.fft.fft(block, axis=axis, norm="ortho", overwrite_x=True, workers=-1))
+        return best_s(lambda: scipy.fft.fft(block, axis=axis, norm="ortho", overwrite_x=True, workers=-1))
 
     return count / min(seconds(columns, 0), seconds(rows, 1))
