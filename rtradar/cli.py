@@ -1,4 +1,4 @@
-"""The command line: ``rtradar doctor``, ``rtradar run``, ``rtradar compare`` and ``rtradar validate``.
+"""The command line: ``rtradar doctor``, ``run``, ``compare``, ``validate`` and ``bench``.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
 and how to mend it.
@@ -127,6 +127,21 @@ def _parser() -> argparse.ArgumentParser:
     validate.add_argument("--figure", type=Path, metavar="DIR", help="draw one picture a script there")
     validate.add_argument("--readme", type=Path, metavar="FILE", help="replace the table of figures in this markdown file")
     validate.set_defaults(command=_validate)
+
+    bench = commands.add_parser("bench", help="how long every stage takes, beside other rungs, the paper's method and floors")
+    bench.add_argument("--radar", metavar="A,B,...", help="presets or TOML files (default: both presets; with --quick the first)")
+    bench.add_argument(
+        "--fidelity",
+        metavar="A,B,...",
+        help="rungs (default: analytic-paper,analytic,specular,fresnel,physical-optics; with --quick without the last two)",
+    )
+    bench.add_argument("--repeats", type=_whole, metavar="N", help="of each measurement (default: 3; with --quick 1)")
+    bench.add_argument("--duration", type=_seconds, metavar="S", help="of the capture [s] (default: 3; with --quick 0.5)")
+    bench.add_argument("--only", metavar="PART", help="rungs (with the paper's method and floors), or growth")
+    bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
+    bench.add_argument("--json", type=Path, metavar="FILE", help="write all that is measured there as JSON")
+    bench.add_argument("--figure", type=Path, metavar="FILE", help="draw it there, as PNG")
+    bench.set_defaults(command=_bench)
     return parser
 
 
@@ -207,6 +222,20 @@ def _validate(options: argparse.Namespace) -> int:
     from rtradar.validate import validate
 
     return validate(quick=options.quick, only=options.only, json_path=options.json, figures=options.figure, readme=options.readme)
+
+
+def _bench(options: argparse.Namespace) -> int:
+    from rtradar.bench import bench, plan_of
+
+    plan = plan_of(
+        radar=options.radar,
+        fidelity=options.fidelity,
+        repeats=options.repeats,
+        duration_s=options.duration,
+        quick=options.quick,
+        only=options.only,
+    )
+    return bench(plan, json_path=options.json, figure=options.figure)
 
 
 def _capture(options: argparse.Namespace) -> dict[str, Any]:

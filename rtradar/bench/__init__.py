@@ -1,0 +1,124 @@
+"""``rtradar bench``: what every stage takes and the whole, beside other rungs, the paper's method and floors measured here."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import sys
+import tempfile
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+from rtradar.bench.figure import draw
+from rtradar.bench.growth import with_channels, with_duration, with_echoes
+from rtradar.bench.paper import Baseline, measure_baseline
+from rtradar.bench.plan import CHEAPEST, Plan, plan_of, rung_cases
+from rtradar.bench.rates import measure_rates
+from rtradar.bench.rows import chirp_rows, rung_row
+from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
+from rtradar.bench.tables import tables
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+__all__ = ["Plan", "bench", "plan_of"]
+
+_VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba")
+
+
+def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = None) -> int:
+    """Measure, print the tables, and return the exit status.
+
+    Parameters
+    ----------
+    plan : Plan
+    json_path : path, optional
+        All that was measured is written there.
+    figure : path, optional
+        A picture of it is drawn there, as PNG.
+
+    Returns
+    -------
+    int
+        0, or 1 where a run fails.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be written; nothing has run then.
+    """
+    for option, path in (("--json", json_path), ("--figure", figure)):
+        if path is not None and not path.resolve().parent.is_dir():
+            raise InputError(f"{option} {path}: there is no folder '{path.resolve().parent}'; make it first")
+    try:
+        found = measure(plan)
+    except RunError as error:
+        print(f"rtradar: {error}", file=sys.stderr)
+        return 1
+    print(tables(found))
+    try:
+        if json_path is not None:
+            json_path.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        if figure is not None:
+            draw(found, figure)
+    except OSError as error:
+        raise InputError(f"cannot write '{error.filename}': {error.strerror}; give another file") from None
+    return 0
+
+
+def measure(plan: Plan) -> dict[str, Any]:
+    """All that the plan asks for, as plain values: ``settings``, ``machine``, ``rates``, ``rungs``, ``paper``, ``growth``.
+
+    Raises
+    ------
+    RunError
+        Where a run fails.
+    """
+    found: dict[str, Any] = {
+        "settings": asdict(plan) | {"motion": MOTION},
+        "machine": {
+            "system": platform.platform(),
+            "cores": os.cpu_count(),
+            "versions": {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS},
+        },
+        "rates": {},
+        "rungs": [],
+        "paper": {"trouble": "", "radars": {}},
+        "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": [], "channels": [], "echoes": []},
+    }
+    with tempfile.TemporaryDirectory(prefix="rtradar-bench-") as folder:
+        runner = Runner(Path(folder))
+        if "rungs" in plan.parts:
+            _measure_rungs(plan, runner, found)
+        if "growth" in plan.parts:
+            found["growth"]["duration"] = with_duration(plan, runner)
+            found["growth"]["channels"] = with_channels(plan, runner, Path(folder))
+            found["growth"]["echoes"] = with_echoes(Radar.load(plan.radars[0]))
+    return found
+
+
+def _measure_rungs(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
+    rates = {radar: measure_rates(Radar.load(radar)) for radar in plan.radars}
+    baselines: dict[str, Baseline | None] = {
+        radar: measure_baseline(radar, plan.repeats, quick=plan.quick) for radar in plan.radars
+    }
+    runs = runner.measure(rung_cases(plan, one_core=can_pin()), plan.repeats, "rungs")
+    cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST and not case.one_core}
+    found["rungs"] = [
+        rung_row(
+            case,
+            own,
+            first=runner.first[case.fidelity] if case.radar == plan.radars[0] and not case.one_core else None,
+            cheapest=None if case.one_core else cheapest.get(case.radar),
+            rates=rates[case.radar],
+            baseline=baselines[case.radar],
+        )
+        for case, own in runs.items()
+    ]
+    found["rates"] = {Radar.load(radar).name: asdict(own) for radar, own in rates.items()}
+    known = {Radar.load(radar).name: asdict(own) for radar, own in baselines.items() if own is not None}
+    trouble = "" if known else "there is no paper_numpy.py among the validation scripts; use a checkout, or install rtradar again"
+    found["paper"] = {"trouble": trouble, "radars": known}
+    found["growth"]["chirps"] = chirp_rows(found["rungs"])

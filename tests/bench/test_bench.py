@@ -1,0 +1,205 @@
+"""`rtradar bench` from processes, which stand-ins replace here, to JSON, tables and figure."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import rtradar.bench
+from rtradar.bench import paper, runs
+from rtradar.bench.floors import Rates
+from rtradar.bench.growth import arrays, as_toml, with_echoes
+from rtradar.bench.paper import Baseline
+from rtradar.bench.plan import Case
+from rtradar.bench.runs import Run, RunError, Runner
+from rtradar.bench.times import Spread
+from rtradar.cli import main
+from rtradar.radar import Radar
+
+CHIRPS = 1596 * 3  # three frames of the paper's radar
+RATES = Rates(1e10, 1e8, 1e10, 1e6, 1e6, 1e6, 1e6)
+BASELINE = Baseline({"echoes and IF": Spread(8.0, 8.0), "cfar": Spread(2.0, 2.0)}, Spread(10.0, 10.0), 12, 133)
+
+
+def summary(scatter_s: float) -> dict[str, Any]:
+    return {
+        "stages": {"scatter": scatter_s, "signal": 1.0, "cloud": 0.5, "angle": 0.25, "write": 0.25, "pictures": 1.0},
+        "wall_s": scatter_s + 3.5,  # half a second elsewhere
+        "warmup_s": 0.25,
+        "capture_s": 0.3,
+        "chirps": CHIRPS,
+        "windows": 9,
+        "detections": 1000,
+        "part_power_m2": {f"part {number}": 1.0 for number in range(21)},
+        "peak_memory_mb": 400.0,
+    }
+
+
+@pytest.fixture
+def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
+    """A machine without surprises; the cases that ran on it."""
+    done: list[Case] = []
+
+    def run(self: Runner, case: Case) -> Run:
+        first = not any(other.fidelity == case.fidelity for other in done)
+        done.append(case)
+        scatter = {"analytic-paper": 1.0, "analytic": 2.0, "specular": 6.0}[case.fidelity] * (5 if "77" in case.radar else 1)
+        return Run(scatter + 3.5 + 0.25 + 1.0 + (7.0 if first else 0.0), summary(scatter))
+
+    monkeypatch.setattr(Runner, "run", run)
+    monkeypatch.setattr(rtradar.bench, "measure_rates", lambda radar: RATES)
+    monkeypatch.setattr(rtradar.bench, "measure_baseline", lambda radar, repeats, quick: BASELINE)
+    monkeypatch.setattr(rtradar.bench, "can_pin", lambda: True)
+    return done
+
+
+def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2", "--only", "rungs"]
+    assert main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
+    found = json.loads((tmp_path / "b.json").read_text())
+    assert list(found) == ["settings", "machine", "rates", "rungs", "paper", "growth"]
+    assert found["settings"]["repeats"] == 2
+    assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
+    rows = found["rungs"]
+    assert [(row["radar"], row["fidelity"], row["cores"]) for row in rows] == [
+        *((radar, fidelity, "all") for radar in ("paper-12ghz", "paper-77ghz") for fidelity in found["settings"]["fidelities"]),
+        ("paper-12ghz", "analytic-paper", "one"),
+    ]
+    specular = rows[2]
+    assert specular["to_cloud_s"] == {"best": 8.0, "median": 8.0}
+    assert specular["whole_s"]["median"] == 9.5
+    assert specular["first_use"] == {"adds_s": 7.0, "process_s": 17.75, "warmup_s": 0.25}
+    assert specular["over_analytic"] == 2.0  # 8 s over 4 s
+    assert specular["paper_over"] == {"to_cloud": 30.0 / 8.0, "if": 24.0 / 7.0}
+    assert specular["stages"]["elsewhere"]["median"] == 0.5
+    assert specular["stages"]["signal"]["floor"] == pytest.approx(4 * 21 * CHIRPS * 8 * 256 / 1e10)
+    assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0, "floor": None, "rule": ""}
+    assert [row["first_use"] is None for row in rows] == [False, False, False, True, True, True, True]
+    assert found["growth"]["chirps"][0] == {
+        "radar": "paper-77ghz",
+        "of_radar": "paper-12ghz",
+        "fidelity": "analytic-paper",
+        "chirps": 1.0,
+        "to_cloud": 7.0 / 3.0,
+        "peak_memory": 1.0,
+    }
+    assert (tmp_path / "b.png").stat().st_size > 1000
+    said = capsys.readouterr()
+    assert "| paper-12ghz | `specular`" in said.out
+    assert "8.00 s" in said.out
+    assert said.err == ""  # no progress bar where there is no terminal
+
+
+def test_rungs_take_turns_after_their_first_use(machine: list[Case], capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--radar", "paper-12ghz", "--fidelity", "analytic,specular", "--repeats", "2", "--only", "rungs"]
+    assert main(["bench", *words]) == 0
+    assert [case.fidelity for case in machine] == ["analytic", "specular"] * 3
+
+
+def test_growth_with_length_channels_and_echoes(
+    machine: list[Case], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    echoes = [{"echoes": 21, "samples": 1000, "signal_s": 5e-6}]
+    monkeypatch.setattr(rtradar.bench, "with_echoes", lambda radar: echoes)
+    words = ["bench", "--quick", "--only", "growth", "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]
+    assert main(words) == 0
+    growth = json.loads((tmp_path / "b.json").read_text())["growth"]
+    assert growth["fidelity"] == "specular"
+    assert [row["duration_s"] for row in growth["duration"]] == [0.5, 1.0]
+    assert [row["channels"] for row in growth["channels"]] == [24, 48, 96, 192]
+    assert growth["echoes"] == echoes
+    assert growth["chirps"] == []
+    assert (tmp_path / "b.png").stat().st_size > 1000
+    assert "5.00 ns" in capsys.readouterr().out
+
+
+def test_without_the_validation_scripts_the_table_says_so(
+    machine: list[Case], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(rtradar.bench, "measure_baseline", paper.measure_baseline)
+    monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
+    assert main(["bench", "--quick", "--only", "rungs", "--json", str(tmp_path / "b.json")]) == 0
+    assert "the paper's method was not timed: there is no paper_numpy.py" in capsys.readouterr().out
+    assert json.loads((tmp_path / "b.json").read_text())["rungs"][0]["paper_over"] is None
+
+
+def test_the_baseline_is_timed_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "paper_numpy.py").write_text(
+        "import json, sys\n"
+        "assert sys.argv[1:5] == ['--radar', 'paper-77ghz', '--repeats', '2'] and '--cycles' in sys.argv\n"
+        "frames = [{'echoes and IF': 1.0, 'cfar': 0.5}, {'echoes and IF': 3.0, 'cfar': 0.5}]\n"
+        "found = {'cycles': 12, 'cycles_per_frame': 133, 'frames': frames}\n"
+        "open(sys.argv[sys.argv.index('--json') + 1], 'w').write(json.dumps(found))\n"
+    )
+    monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
+    found = paper.measure_baseline("paper-77ghz", 2, quick=True)
+    assert found == Baseline({"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133)
+    (tmp_path / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
+    with pytest.raises(RunError, match=r"paper_numpy.py: ArithmeticError: the abacus is broken"):
+        paper.measure_baseline("paper-77ghz", 2, quick=True)
+
+
+def test_a_run_that_fails_is_one_line_and_status_1(
+    machine: list[Case], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fails(self: Runner, case: Case) -> Run:
+        raise RunError("bench: analytic, radar paper-12ghz: rtradar: no backend works")
+
+    monkeypatch.setattr(Runner, "run", fails)
+    assert main(["bench", "--quick"]) == 1
+    assert capsys.readouterr().err == "rtradar: bench: analytic, radar paper-12ghz: rtradar: no backend works\n"
+
+
+def stand_in(folder: Path, script: str) -> str:
+    """A program in place of Python, which is told what `rtradar run` is told."""
+    program = folder / "python"
+    program.write_text(f"#!/bin/sh\n{script}\n")
+    program.chmod(program.stat().st_mode | stat.S_IXUSR)
+    return str(program)
+
+
+def test_a_process_has_caches_of_its_own_and_gives_its_summary(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    (tmp_path / "summary.json").write_text(json.dumps(summary(2.0)))
+    # The last word is the file for the summary.
+    script = f'env > {tmp_path}/env; echo "$@" > {tmp_path}/words; for last; do :; done; cp {tmp_path}/summary.json "$last"'
+    monkeypatch.setattr(runs.sys, "executable", stand_in(tmp_path, script))
+    folder = tmp_path / "caches"
+    folder.mkdir()
+    cores = os.sched_getaffinity(0) if runs.can_pin() else None
+    run = Runner(folder).run(Case("paper-77ghz", "fresnel", 0.5, one_core=runs.can_pin()))
+    assert run.to_cloud_s == 4.0
+    assert run.from_start_to_cloud_s == pytest.approx(run.process_s - 1.5)
+    environment = dict(line.split("=", 1) for line in (tmp_path / "env").read_text().splitlines() if "=" in line)
+    for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
+        assert environment[name].startswith(str(folder / "fresnel"))
+    assert "run synthetic:walk --duration 0.5 --radar paper-77ghz --fidelity fresnel" in (tmp_path / "words").read_text()
+    if runs.can_pin():
+        assert os.sched_getaffinity(0) == cores  # back on all
+    assert [item.name for item in folder.iterdir()] == ["fresnel"]  # what the run wrote is gone
+
+
+def test_a_process_that_fails_says_its_last_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(runs.sys, "executable", stand_in(tmp_path, "echo first >&2; echo 'rtradar: no' >&2; exit 2"))
+    with pytest.raises(RunError, match=r"^bench: specular, radar mine.toml: rtradar: no$"):
+        Runner(tmp_path).run(Case("mine.toml", "specular", 0.5))
+
+
+def test_arrays_of_fewer_and_more_channels_go_through_toml(tmp_path: Path) -> None:
+    radars = arrays(Radar.preset("paper-77ghz"))
+    assert [radar.n_channels for radar in radars] == [24, 48, 96, 192]
+    for radar in radars:
+        (tmp_path / "radar.toml").write_text(as_toml(radar))
+        assert Radar.load(tmp_path / "radar.toml") == radar
+    single = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
+    assert arrays(single) == [single]  # nothing to divide, no other line
+
+
+def test_echoes_are_timed_one_count_after_the_other() -> None:
+    rows = with_echoes(Radar(frame_duration_s=6e-3, samples_per_chirp=16))
+    assert [row["echoes"] for row in rows][:2] == [10, 21]
+    assert all(row["signal_s"] > 0 and row["samples"] == 33 * 12 * 8 * 16 for row in rows)

@@ -1,0 +1,56 @@
+"""What is measured, and what is refused before anything runs."""
+
+from __future__ import annotations
+
+import pytest
+
+from rtradar.bench.plan import Case, Plan, plan_of, rung_cases
+from rtradar.cli import main
+
+
+def test_quick_is_less_of_everything_unless_asked_for() -> None:
+    plan = plan_of(radar=None, fidelity="specular , fresnel", repeats=None, duration_s=0.25, quick=True, only=None)
+    assert plan == Plan(("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True)
+    assert plan.growing_durations_s == (0.25, 0.5)
+    assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0)
+
+
+def test_growth_is_of_specular_or_of_the_last_rung() -> None:
+    assert Plan().growing_fidelity == "specular"
+    assert Plan(fidelities=("analytic", "fresnel")).growing_fidelity == "fresnel"
+
+
+def test_every_rung_with_every_radar_and_the_papers_on_one_core() -> None:
+    plan = Plan(("paper-12ghz", "paper-77ghz"), ("analytic-paper", "specular"), duration_s=1.0)
+    cases = rung_cases(plan, one_core=True)
+    assert [(case.radar[6:8], case.fidelity) for case in cases[:4]] == [
+        ("12", "analytic-paper"),
+        ("12", "specular"),
+        ("77", "analytic-paper"),
+        ("77", "specular"),
+    ]
+    assert cases[4:] == [Case("paper-12ghz", "analytic-paper", 1.0, one_core=True)]
+    assert rung_cases(plan, one_core=False) == cases[:4]
+    assert not any(case.one_core for case in rung_cases(Plan(fidelities=("specular",)), one_core=True))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--radar", "paper-60ghz"], "radar 'paper-60ghz' is unknown; allowed"),
+        (["--radar", "paper-12ghz,"], "--radar paper-12ghz,: name each once"),
+        (["--fidelity", "specular,specular"], "--fidelity specular,specular: name each once"),
+        (["--fidelity", "exact"], "--fidelity exact: there is no such rung; allowed: analytic-paper"),
+        (["--repeats", "0"], "--repeats 0: it must be a whole number, at least 1"),
+        (["--repeats", "some"], "invalid whole number"),
+        (["--duration", "0.05"], "--duration 0.05: it holds no whole frame of radar 'paper-12ghz'; give at least 0.1 s"),
+        (["--only", "floors"], "--only floors: there is no such part; allowed: rungs, growth"),
+        (["--json", "nowhere/b.json"], "--json nowhere/b.json: there is no folder"),
+        (["--figure", "nowhere/b.png"], "--figure nowhere/b.png: there is no folder"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", *words]) == 2
+    err = capsys.readouterr().err
+    assert said in err
+    assert err.count("\n") == 1
