@@ -46,27 +46,34 @@ def _powers(turn, real, imaginary):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _add_constant(real, imaginary, start, block_turn, out_re, out_im):  # type: ignore[no-untyped-def]
-    """Add a tone to ``out``, block by block: the powers of its turn, times its value at the first sample of the block."""
+def _add_constant(real, imaginary, start, block_turn, now, out_re, out_im):  # type: ignore[no-untyped-def]
+    """Add a tone to ``out``, block by block: the powers of its turn, times its value at the first sample of the block.
+
+    That value goes on in float64; ``now (6,)`` takes it to the precision of all other arrays.
+    """
     for block in range(len(out_re) // _LANES):
         block_re, block_im = out_re[block * _LANES : (block + 1) * _LANES], out_im[block * _LANES : (block + 1) * _LANES]
+        now[0], now[1] = start.real, start.imag
+        re, im = now[0], now[1]
         for lane in range(_LANES):
-            block_re[lane] += start.real * real[lane] - start.imag * imaginary[lane]
-            block_im[lane] += start.real * imaginary[lane] + start.imag * real[lane]
+            block_re[lane] += re * real[lane] - im * imaginary[lane]
+            block_im[lane] += re * imaginary[lane] + im * real[lane]
         start = start * block_turn
 
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
-def _add_parabola(real, imaginary, start, block_turn, step, c0, c1, c2, out_re, out_im):  # type: ignore[no-untyped-def]
-    """Add a tone whose amplitude is c0 + c1 x + c2 x^2, x the sample number times ``step``."""
+def _add_parabola(real, imaginary, ramp, start, block_turn, step, c0, c1, c2, now, out_re, out_im):  # type: ignore[no-untyped-def]
+    """Add a tone whose amplitude is c0 + c1 x + c2 x^2, x the sample number times ``step``; ``ramp`` counts the lanes."""
     for block in range(len(out_re) // _LANES):
         block_re, block_im = out_re[block * _LANES : (block + 1) * _LANES], out_im[block * _LANES : (block + 1) * _LANES]
         first = block * _LANES * step
         # The parabola about the first sample of the block.
         d0, d1, d2 = start * (c0 + first * (c1 + first * c2)), start * (c1 + 2 * first * c2) * step, start * c2 * step * step
+        now[0], now[1], now[2], now[3], now[4], now[5] = d0.real, d0.imag, d1.real, d1.imag, d2.real, d2.imag
+        re0, im0, re1, im1, re2, im2 = now[0], now[1], now[2], now[3], now[4], now[5]
         for lane in range(_LANES):
-            re = d0.real + lane * (d1.real + lane * d2.real)
-            im = d0.imag + lane * (d1.imag + lane * d2.imag)
+            re = re0 + ramp[lane] * (re1 + ramp[lane] * re2)
+            im = im0 + ramp[lane] * (im1 + ramp[lane] * im2)
             block_re[lane] += re * real[lane] - im * imaginary[lane]
             block_im[lane] += re * imaginary[lane] + im * real[lane]
         start = start * block_turn
@@ -88,14 +95,16 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
 
 
 @njit(cache=True, error_model="numpy", parallel=True)
-def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, out):  # type: ignore[no-untyped-def]
+def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, ramp, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (chirp, rx, sample)``; samples are added up in the precision of ``ramp``, which counts the lanes."""
     chirps, receivers, samples = out.shape
     nodes, echoes = amplitude.shape[0], length.shape[2]
     # The last block may reach past the last sample.
     padded = (samples + _LANES - 1) // _LANES * _LANES
     for chirp in prange(chirps):
-        real, imaginary = np.empty(_LANES), np.empty(_LANES)
-        sum_re, sum_im = np.empty(padded), np.empty(padded)
+        real, imaginary, now = np.empty_like(ramp), np.empty_like(ramp), np.empty(6, dtype=ramp.dtype)
+        exact_re, exact_im = np.empty(_LANES), np.empty(_LANES)
+        sum_re, sum_im = np.empty(padded, dtype=ramp.dtype), np.empty(padded, dtype=ramp.dtype)
         start_re, start_im, turn_re, turn_im = np.empty(echoes), np.empty(echoes), np.empty(echoes), np.empty(echoes)
         heard, coefficient = np.empty(echoes, dtype=np.int64), np.empty(_POWERS, dtype=np.complex128)
         delay = np.empty(echoes)
@@ -125,9 +134,11 @@ def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, 
                     if lowest > 0 and not varies:
                         continue
                     start = complex(start_re[i], start_im[i])
-                    block_turn = _powers(complex(turn_re[i], turn_im[i]), real, imaginary)
+                    block_turn = _powers(complex(turn_re[i], turn_im[i]), exact_re, exact_im)
+                    for lane in range(_LANES):
+                        real[lane], imaginary[lane] = exact_re[lane], exact_im[lane]
                     if not varies:
-                        _add_constant(real, imaginary, start * own[0, echo], block_turn, sum_re, sum_im)
+                        _add_constant(real, imaginary, start * own[0, echo], block_turn, now, sum_re, sum_im)
                         continue
                     coefficient[:] = 0
                     for power in range(lowest, min(lowest + _POWERS, nodes)):
@@ -136,12 +147,14 @@ def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, 
                     _add_parabola(
                         real,
                         imaginary,
+                        ramp,
                         start,
                         block_turn,
                         1 / samples,
                         coefficient[0],
                         coefficient[1],
                         coefficient[2],
+                        now,
                         sum_re,
                         sum_im,
                     )
@@ -173,8 +186,9 @@ def synthesize(
     times : (chirp,) array_like
         Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
-        Of the samples. Phases are float64 in both, sums too - but for `MANY_ECHOES` and more, which `spread_sum` adds up in
-        complex64, to 1e-6, where amplitudes are given at 6 frequencies at most.
+        Of the samples. Phases are float64 in both. For complex64, samples are added up in float32, to 1e-6 of the sum of the
+        magnitudes: by `spread_sum` from `MANY_ECHOES` on, with at most 6 frequencies, else where amplitudes are given at 3
+        frequencies at most.
 
     Returns
     -------
@@ -198,16 +212,16 @@ def synthesize(
     _warn_of_motion_in_chirp(echoes, radar, times)
     out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
     many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES and out.dtype == np.complex64
-    (spread_sum if many else _synthesize)(
-        np.ascontiguousarray(echoes.length),
+    length, powers = np.ascontiguousarray(echoes.length), _powers_of_sample_number(echoes.frequency, radar)
+    waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
+    if many:
         # A slice of a block serves as it is where amplitudes are only picked.
-        echoes.amplitude if many else np.ascontiguousarray(echoes.amplitude, dtype=np.complex128),
-        _powers_of_sample_number(echoes.frequency, radar),
-        float(radar.start_frequency_hz),
-        radar.slope_hz_per_s,
-        radar.sample_rate_hz,
-        out,
-    )
+        spread_sum(length, echoes.amplitude, powers, *waveform, out)
+    else:
+        # More powers than those of a parabola cancel too much for float32.
+        kind = np.float32 if out.dtype == np.complex64 and len(echoes.frequency) <= _POWERS else np.float64
+        amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
+        _synthesize(length, amplitude, powers, *waveform, np.arange(_LANES, dtype=kind), out)
     return out
 
 
