@@ -15,6 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 import scipy.fft
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
@@ -167,12 +168,18 @@ def range_time(
             f"range_time: spectra have shape {chirps.shape}; radar '{radar.name}' needs (chirp, {radar.n_rx}, range)"
         )
     rows = max(1, round(step_s / radar.cycle_duration_s)) * radar.n_tx
-    parts = [chirps[begin : begin + rows] for begin in range(0, len(chirps), rows)]
-    power = [(part.real**2 + part.imag**2).mean(axis=(0, 1)) for part in parts]
+
+    def mean_power(begin: int) -> NDArray[np.floating]:
+        # Row by row: no squares of a whole block are kept.
+        parts = np.ascontiguousarray(chirps[begin : begin + rows]).view(chirps.real.dtype).reshape(-1, 2 * chirps.shape[2])
+        squares = np.einsum("ri,ri->i", parts, parts).reshape(-1, 2).sum(axis=1)
+        return np.asarray(squares / len(parts))
+
+    power = in_threads(mean_power, range(0, len(chirps), rows))
     begins = np.arange(0, len(chirps), rows)
     middles = first_chirp + (begins + np.minimum(begins + rows, len(chirps))) / 2
     kind = chirps.real.dtype
-    return np.array(power, dtype=kind).reshape(len(parts), chirps.shape[2]), middles * radar.chirp_duration_s
+    return np.array(power, dtype=kind).reshape(len(power), chirps.shape[2]), middles * radar.chirp_duration_s
 
 
 def power_map(
@@ -213,24 +220,44 @@ def power_map(
     n_cycles, _, _, n_range = cube.shape
     kind = _complex_kind(cube)
     real = np.float32 if kind == np.complex64 else np.float64
-    weights = _weights(doppler_window, n_cycles, "doppler_window").astype(real)[:, None]
+    weights = _weights(doppler_window, n_cycles, "doppler_window").astype(real)
 
-    def channel_power(tx: int, rx: int) -> NDArray[np.floating]:
-        # One channel at a time fits the cache of a core; real and imaginary squares stay interleaved till the end.
-        weighted = np.multiply(cube[:, tx, rx], weights, dtype=kind)
-        parts = scipy.fft.fft(weighted, axis=0, overwrite_x=True).view(real)
-        return np.square(parts, out=parts)
+    def add_channel(tx: int, rx: int, total: NDArray[np.floating]) -> None:
+        # One channel at a time fits the cache of a core.
+        weighted = np.empty((n_cycles, n_range), dtype=kind)
+        _weigh(cube[:, tx, rx], weights, weighted)
+        _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
 
     def tx_power(tx: int) -> NDArray[np.floating]:
-        total = channel_power(tx, 0)
-        for rx in range(1, radar.n_rx):
-            total += channel_power(tx, rx)
+        total = np.zeros((n_cycles, n_range), dtype=real)
+        for rx in range(radar.n_rx):
+            add_channel(tx, rx, total)
         return total
 
-    # The order of the sum is fixed, so the map does not depend on the number of threads.
-    squares = sum(in_threads(tx_power, range(radar.n_tx))) if channel is None else channel_power(*divmod(channel, radar.n_rx))
-    power = np.asarray(squares).reshape(n_cycles, n_range, 2).sum(axis=2)
+    power = np.zeros((n_cycles, n_range), dtype=real)
+    if channel is not None:
+        add_channel(*divmod(channel, radar.n_rx), power)
+    else:
+        # The order of the sum is fixed, so the map does not depend on the number of threads.
+        for own in in_threads(tx_power, range(radar.n_tx)):
+            power += own
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _weigh(values, weights, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (cycle, range)``: values times the weight of their cycle."""
+    for cycle in range(len(out)):
+        for place in range(out.shape[1]):
+            out[cycle, place] = values[cycle, place] * weights[cycle]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _add_power(values, total):  # type: ignore[no-untyped-def]
+    """Add squared magnitudes to ``total (cycle, range)``."""
+    for cycle in range(len(total)):
+        for place in range(total.shape[1]):
+            total[cycle, place] += values[cycle, place].real ** 2 + values[cycle, place].imag ** 2
 
 
 def _checked_if(x: ArrayLike, radar: Radar) -> NDArray[np.generic]:

@@ -16,6 +16,7 @@ from rtradar.scatter.body_material import Surface
 from rtradar.scatter.poses import chirp_poses, one_echo_a_part
 
 _NO_BISECTOR = 1e-24  # square of the sum of two opposite unit vectors, as rounding leaves it
+_LANES = 8
 
 
 def far_field_echo(
@@ -52,46 +53,57 @@ def far_field_echo(
     return length, amplitude
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@njit(cache=True, error_model="numpy", parallel=True, fastmath={"contract"})
 def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):  # type: ignore[no-untyped-def]
     chirps, receivers, parts = length.shape
     for chirp in prange(chirps):
-        sight, normal, surface = np.empty(3), np.empty(3), np.empty(3)
+        to_tx, toward = np.empty(3), np.empty(3)
+        # Receivers side by side: to each of them in the axes of the part, then length and amplitude. One array of a size that is
+        # known beforehand: of many the compiler would have to fear that they overlap.
+        lanes = np.empty((5, _LANES))
         for part in range(parts):
-            centre, frame, axes = centres[chirp, part], frames[chirp, part], semi_axes[part]
-            to_tx = tx[chirp] - centre
+            centre, frame = centres[chirp, part], frames[chirp, part]
+            a, b, c = semi_axes[part, 0], semi_axes[part, 1], semi_axes[part, 2]
+            for i in range(3):
+                to_tx[i] = 0.0
+                for j in range(3):
+                    to_tx[i] += frame[j, i] * (tx[chirp, j] - centre[j])
             norm_tx = math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
-            to_tx /= norm_tx
-            for receiver in range(receivers):
-                for i in range(3):
-                    sight[i] = rx[chirp, receiver, i] - centre[i]
-                norm = math.sqrt(sight[0] ** 2 + sight[1] ** 2 + sight[2] ** 2)
-                # |A n| for the unit normal n is the support function h; the surface point with that normal is A^2 n / h.
-                squared, support = 0.0, 0.0
-                for i in range(3):
-                    normal[i] = 0.0
-                    for j in range(3):
-                        normal[i] += frame[j, i] * (to_tx[j] + sight[j] / norm)
-                    squared += normal[i] ** 2
-                    support += (axes[i] * normal[i]) ** 2
-                if squared < _NO_BISECTOR:
-                    # Straight through: no reflection.
-                    length[chirp, receiver, part] = norm_tx + norm
-                    amplitude[chirp, receiver, part] = 0.0
-                    continue
-                support = math.sqrt(support / squared)
-                for i in range(3):
-                    normal[i] *= axes[i] ** 2 / (support * math.sqrt(squared))
-                range_tx, range_rx = 0.0, 0.0
-                for i in range(3):
-                    surface[i] = centre[i] + frame[i, 0] * normal[0] + frame[i, 1] * normal[1] + frame[i, 2] * normal[2]
-                    range_tx += (tx[chirp, i] - surface[i]) ** 2
-                    range_rx += (rx[chirp, receiver, i] - surface[i]) ** 2
-                range_tx, range_rx = math.sqrt(range_tx), math.sqrt(range_rx)
-                length[chirp, receiver, part] = range_tx + range_rx
-                # Square root of the cross-section, pi (abc)^2 / h^4: that of `rtradar.rcs.ellipsoid` without its angles.
-                root = math.sqrt(math.pi) * axes[0] * axes[1] * axes[2] / support**2
-                amplitude[chirp, receiver, part] = root / (range_tx * range_rx) if spreading else root
+            t0, t1, t2 = to_tx[0], to_tx[1], to_tx[2]
+            toward[:] = to_tx / norm_tx
+            u0, u1, u2 = toward[0], toward[1], toward[2]
+            root_volume = math.sqrt(math.pi) * a * b * c
+            for first in range(0, receivers, _LANES):
+                count = min(_LANES, receivers - first)
+                for k in range(_LANES):
+                    receiver = first + min(k, count - 1)
+                    x, y, z = (
+                        rx[chirp, receiver, 0] - centre[0],
+                        rx[chirp, receiver, 1] - centre[1],
+                        rx[chirp, receiver, 2] - centre[2],
+                    )
+                    for i in range(3):
+                        lanes[i, k] = frame[0, i] * x + frame[1, i] * y + frame[2, i] * z
+                for k in range(_LANES):
+                    r0, r1, r2 = lanes[0, k], lanes[1, k], lanes[2, k]
+                    norm = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+                    inverse = 1 / norm
+                    n0, n1, n2 = u0 + r0 * inverse, u1 + r1 * inverse, u2 + r2 * inverse
+                    squared = n0 * n0 + n1 * n1 + n2 * n2
+                    # |A n| for the unit normal n is the support function h; the surface point with that normal is A^2 n / h.
+                    support = a * a * n0 * n0 + b * b * n1 * n1 + c * c * n2 * n2
+                    scale = 1 / math.sqrt(support)
+                    s0, s1, s2 = a * a * n0 * scale, b * b * n1 * scale, c * c * n2 * scale
+                    range_tx = math.sqrt((t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2))
+                    range_rx = math.sqrt((r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2))
+                    # Square root of the cross-section, pi (abc)^2 / h^4: that of `rtradar.rcs.ellipsoid` without its angles.
+                    root = root_volume * squared / support
+                    # Straight through there is no bisector, and no reflection.
+                    there = squared >= _NO_BISECTOR
+                    lanes[3, k] = range_tx + range_rx if there else norm_tx + norm
+                    lanes[4, k] = (root / (range_tx * range_rx) if spreading else root) if there else 0.0
+                for k in range(count):
+                    length[chirp, first + k, part], amplitude[chirp, first + k, part] = lanes[3, k], lanes[4, k]
 
 
 def plane_wave_echo(
