@@ -118,9 +118,10 @@ class Products:
             spectra = self._removal.block(spectra, first)
         with stages.time("range"):
             power, times = range_time(spectra, radar, first_chirp=first, step_s=_RANGE_TIME_S)
-            store.extend("slow_time", times, range_time=power)
         with stages.time("spectrogram"):
             columns = self._spectrogram.push(spectra)
+        with stages.time("write"):
+            store.extend("slow_time", times, range_time=power)
             store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
         for _, start, window in self._windows.push(spectra):
             with stages.time("clutter removal"):

@@ -126,9 +126,12 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
     spectra = np.empty(samples.shape, dtype=np.complex64)
 
     def transform(first: int) -> None:
-        block = slice(first, first + _CHIRPS_PER_BATCH)
-        weighted = np.multiply(samples[block], weights, dtype=np.complex64, casting="same_kind")
-        spectra[block] = scipy.fft.fft(weighted, axis=2, overwrite_x=True)
+        block = spectra[first : first + _CHIRPS_PER_BATCH]
+        _taper(samples[first : first + len(block)], weights, block)
+        # Where it stands, if SciPy can.
+        done = scipy.fft.fft(block, axis=2, overwrite_x=True)
+        if not np.shares_memory(done, block):
+            block[...] = done
 
     in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
     return spectra
@@ -242,6 +245,15 @@ def power_map(
         for own in in_threads(tx_power, range(radar.n_tx)):
             power += own
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _taper(values, weights, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (chirp, rx, sample)``: values times the weight of their sample."""
+    for chirp in range(len(out)):
+        for receiver in range(out.shape[1]):
+            for sample in range(out.shape[2]):
+                out[chirp, receiver, sample] = values[chirp, receiver, sample] * weights[sample]
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})

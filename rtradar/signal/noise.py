@@ -6,10 +6,14 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
+
+_CYCLES_AT_ONCE = 4
+"""By one thread: to hand out each by itself takes a tenth of its time."""
 
 
 @dataclass(frozen=True)
@@ -49,10 +53,19 @@ class Noise:
         sigma = np.float32(math.sqrt(self.power / 2))
 
         def fill(first: int) -> None:
-            part = samples[first : first + radar.n_tx]
-            stream = np.random.Generator(np.random.SFC64([self.seed, (first_chirp + first) // radar.n_tx]))
-            values = stream.standard_normal((*part.shape, 2), dtype=np.float32)
-            values *= sigma
-            part += values.view(np.complex64)[..., 0]
+            for begin in range(first, min(first + _CYCLES_AT_ONCE * radar.n_tx, len(samples)), radar.n_tx):
+                part = samples[begin : begin + radar.n_tx]
+                stream = np.random.Generator(np.random.SFC64([self.seed, (first_chirp + begin) // radar.n_tx]))
+                _add(stream.standard_normal((*part.shape, 2), dtype=np.float32), sigma, part)
 
-        in_threads(fill, range(0, len(samples), radar.n_tx))
+        in_threads(fill, range(0, len(samples), _CYCLES_AT_ONCE * radar.n_tx))
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def _add(values, scale, out):  # type: ignore[no-untyped-def]
+    """Add values (chirp, rx, sample, 2), real and imaginary, times scale to ``out (chirp, rx, sample)``."""
+    for chirp in range(out.shape[0]):
+        for receiver in range(out.shape[1]):
+            for sample in range(out.shape[2]):
+                own = values[chirp, receiver, sample]
+                out[chirp, receiver, sample] += complex(scale * own[0], scale * own[1])

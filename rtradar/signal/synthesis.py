@@ -239,10 +239,13 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     # Neighbours, for what is fast soon leaves the band.
     first = np.unique(np.linspace(0, len(same) - 2, _INSTANTS).astype(np.int64))
     before, after = same[first], same[first + 1]
-    heard = np.ones((len(before), *echoes.length.shape[1:]), dtype=bool)
-    for chirps in (before, after):
-        heard &= (echoes.amplitude[:, chirps] != 0).any(axis=0) & _in_band(echoes.length[chirps], radar)
-    rate = np.abs(echoes.length[after] - echoes.length[before]) / (times[after] - times[before])[:, None, None]
+    # The ends of the line of receivers: those in between see no other speed.
+    ends = [0, -1]
+    lengths = [echoes.length[chirps][:, ends] for chirps in (before, after)]
+    heard = np.ones(lengths[0].shape, dtype=bool)
+    for chirps, length in zip((before, after), lengths, strict=True):
+        heard &= (echoes.amplitude[:, chirps][:, :, ends] != 0).any(axis=0) & _in_band(length, radar)
+    rate = np.abs(lengths[1] - lengths[0]) / (times[after] - times[before])[:, None, None]
     bins = float(np.where(heard, rate, 0.0).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(
