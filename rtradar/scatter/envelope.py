@@ -16,11 +16,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.scatter.first_come import FirstCome
+
 PIECES = 8
 """Parts of the interval between two anchors where it is divided the most: 1.25 ms of 10 ms."""
 
 _KEPT_ANCHORS = 2048
 """Anchors remembered, so that the pass that measures power and the pass that makes the signal trace once (some 50 MB)."""
+
+_PASSING = 32
+"""Of later ones: a block of chirps and what lies around it."""
 
 
 class Sample(NamedTuple):
@@ -61,16 +66,12 @@ class Envelope:
 
     def __init__(self, sample: Callable[[float, NDArray[np.int64], float | None], Sample], parts: int, tolerance: float) -> None:
         self._sample, self._parts, self._tolerance = sample, np.arange(parts), tolerance
-        self._anchors: OrderedDict[int, Sample] = OrderedDict()
+        self._anchors: FirstCome[int, Sample] = FirstCome(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def anchor(self, index: int) -> Sample:
         """All parts at one anchor."""
-        if index not in self._anchors:
-            self._anchors[index] = self._sample(float(index), self._parts, None)
-            if len(self._anchors) > _KEPT_ANCHORS:
-                self._anchors.popitem(last=False)
-        return self._anchors[index]
+        return self._anchors.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> Course:
         """From one anchor to the next: a cubic from place to place, its slopes those of the parabola through three."""

@@ -23,12 +23,19 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import array_nodes
+from rtradar.scatter.first_come import FirstCome
 from rtradar.scatter.fresnel_zone import zone_rays, zone_shares
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import anchor_step
 from rtradar.trace.body_tracer import BodyTracer
 
-_KEPT_INTERVALS = 512
+_KEPT_ANCHORS = 1024
+"""Anchors remembered, 10 s of them in some 40 MB, so that the pass that measures power and the pass that makes the signal trace
+once; longer recordings trace again from there on."""
+
+_PASSING = 32
+"""Anchors, and intervals between them, that are held at a time: a block of chirps and what lies around it."""
+
 _FINE, _FINE_FREQUENCY_HZ = 8, 14e9
 """Anchors to 10 ms where the share bends, at that frequency; Fresnel zones are as narrow as the root of the wavelength."""
 
@@ -153,7 +160,7 @@ class ZoneShares:
         self._nodes = array_nodes(radar, _TX_NODES, _RX_NODES)
         self._step = anchor_step(radar)
         self._fine = min(round(_FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5), self._step)
-        self._anchors: OrderedDict[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = OrderedDict()
+        self._anchors: FirstCome[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = FirstCome(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, Interval] = OrderedDict()
 
     def at(self, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
@@ -205,13 +212,13 @@ class ZoneShares:
     def _anchor(self, number: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """Who hides whom at an anchor (part, part), and shares (frequency, pair, part)."""
         number = max(number, 0)
-        if number not in self._anchors:
+
+        def find() -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
             time = self._time(number * self._step)
             hiders = self._hiders(time)
-            self._anchors[number] = hiders, self.shares(np.array([time]), hiders)[0]
-            if len(self._anchors) > _KEPT_INTERVALS:
-                self._anchors.popitem(last=False)
-        return self._anchors[number]
+            return hiders, self.shares(np.array([time]), hiders)[0]
+
+        return self._anchors.get(number, find)
 
     def _interval(self, number: int) -> Interval:
         if number in self._intervals:
@@ -226,7 +233,7 @@ class ZoneShares:
             times = np.array([self._time((number + i / self._fine) * self._step) for i in range(1, self._fine)])
             between[:] = self.shares(times, (anchors[1][0] | anchors[2][0]) & fine[:, None])[..., fine]
         self._intervals[number] = Interval(fine, around[1:3].copy(), between)
-        if len(self._intervals) > _KEPT_INTERVALS:
+        if len(self._intervals) > _PASSING:
             self._intervals.popitem(last=False)
         return self._intervals[number]
 
