@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,9 @@ SUBDIVISIONS = 4
 
 _LEAST_RAYS = 4096
 """Traced at once, with idle ones among them: what Dr.Jit keeps for itself would else grow with the most that ever came."""
+
+_LANES = 16
+"""Of float32 in the widest vectors: rows of a whole number of them are aligned, and for others Dr.Jit compiles another kernel."""
 
 
 class UnitSphere:
@@ -48,7 +52,7 @@ class UnitSphere:
                 found.append(bool(self._scene.ray_test(ray)))
             return np.array(found)
         count = rays.shape[1]
-        padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
+        padded = np.zeros((7, max(math.ceil(count / _LANES) * _LANES, _LEAST_RAYS)), dtype=np.float32)
         padded[:, :count] = rays
         padded[3, count:] = 1  # from the middle, no way at all
         ray = mi.Ray3f(mi.Point3f(padded[:3]), mi.Vector3f(padded[3:6]))

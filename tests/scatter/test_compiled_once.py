@@ -1,0 +1,32 @@
+"""Nothing is compiled again once a rung has done its first frame."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.motion import place
+from rtradar.scatter import build_rung
+from rtradar.trace.backend import Backend
+
+RADAR = rt.Radar.preset("paper-12ghz")
+
+
+@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
+def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str) -> None:
+    if backend.kind == "scalar":
+        pytest.skip("the scalar backend has no kernels")
+    import drjit as dr
+
+    body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0, duration_s=0.7), heading_deg=70.0))
+    rung = build_rung(fidelity, RADAR, body, variant=backend.kind)
+    frame = 3 * RADAR.chirps_per_frame
+    rung.echoes(np.arange(frame))
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+        dr.kernel_history_clear()
+        rung.echoes(np.arange(frame, 2 * frame))
+        kernels = [entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT]
+    assert len(kernels) > 0
+    assert [entry["hash"] for entry in kernels if not entry["cache_hit"]] == []
