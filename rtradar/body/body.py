@@ -9,6 +9,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.ellipsoids import Ellipsoids
@@ -156,7 +157,8 @@ class Body:
         positions, quaternions = self.motion.at(times)
         parents = np.array(self.motion.parents[1:])
         centres = (positions[:, 1:] + positions[:, parents]) / 2
-        frames = _matrices(quaternions[:, 1:]) @ self._rest_frames
+        frames = np.empty((*quaternions[:, 1:].shape[:2], 3, 3))
+        _turn(quaternions[:, 1:], self._rest_frames, frames)
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
@@ -175,23 +177,19 @@ class Body:
         return np.stack([across, np.cross(along, across), along], axis=2)
 
 
-def _matrices(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4), scalar last."""
-    x, y, z, w = (quaternions[..., k] for k in range(4))
-    matrices = np.empty((*quaternions.shape[:-1], 3, 3))
-    matrices[..., 0, 0], matrices[..., 0, 1], matrices[..., 0, 2] = (
-        1 - 2 * (y * y + z * z),
-        2 * (x * y - z * w),
-        2 * (x * z + y * w),
-    )
-    matrices[..., 1, 0], matrices[..., 1, 1], matrices[..., 1, 2] = (
-        2 * (x * y + z * w),
-        1 - 2 * (x * x + z * z),
-        2 * (y * z - x * w),
-    )
-    matrices[..., 2, 0], matrices[..., 2, 1], matrices[..., 2, 2] = (
-        2 * (x * z - y * w),
-        2 * (y * z + x * w),
-        1 - 2 * (x * x + y * y),
-    )
-    return matrices
+@njit(cache=True, error_model="numpy", fastmath={"contract"})
+def _turn(quaternions, rest, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (time, part, 3, 3)``: rest (part, 3, 3) turned by unit quaternions (time, part, 4), scalar last."""
+    for time in range(out.shape[0]):
+        for part in range(out.shape[1]):
+            q = quaternions[time, part]
+            x, y, z, w = q[0], q[1], q[2], q[3]
+            a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
+            d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
+            g, h, k = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+            own, turned = rest[part], out[time, part]
+            for column in range(3):
+                u, v, s = own[0, column], own[1, column], own[2, column]
+                turned[0, column] = a * u + b * v + c * s
+                turned[1, column] = d * u + e * v + f * s
+                turned[2, column] = g * u + h * v + k * s
