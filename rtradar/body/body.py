@@ -157,8 +157,8 @@ class Body:
         positions, quaternions = self.motion.at(times)
         parents = np.array(self.motion.parents[1:])
         centres = (positions[:, 1:] + positions[:, parents]) / 2
-        frames = np.empty((*quaternions[:, 1:].shape[:2], 3, 3))
-        _turn(quaternions[:, 1:], self._rest_frames, frames)
+        frames = np.empty((len(quaternions), len(self.semi_axes), 3, 3))
+        _turn(quaternions, self._rest_frames, frames)
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
@@ -179,10 +179,13 @@ class Body:
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def _turn(quaternions, rest, out):  # type: ignore[no-untyped-def]
-    """Fill ``out (time, part, 3, 3)``: rest (part, 3, 3) turned by unit quaternions (time, part, 4), scalar last."""
+    """Fill ``out (time, part, 3, 3)``: rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last.
+
+    The first joint is the root, which has no bone.
+    """
     for time in range(out.shape[0]):
         for part in range(out.shape[1]):
-            q = quaternions[time, part]
+            q = quaternions[time, part + 1]
             x, y, z, w = q[0], q[1], q[2], q[3]
             a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
             d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)

@@ -67,7 +67,7 @@ def _laid_out(spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[
     """Power of each cell (cell, sine) read at its own sines (cell, angle), summed by range bin."""
     total = np.zeros((radar.samples_per_chirp, sines.shape[1]))
     bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
-    _add_up(power, sines, spectra.sines[0], spectra.sines[1] - spectra.sines[0], bins, total)
+    _add_up(power, np.ascontiguousarray(sines), spectra.sines[0], spectra.sines[1] - spectra.sines[0], bins, total)
     return total
 
 

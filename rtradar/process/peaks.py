@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.process.angle import refine
@@ -59,34 +59,38 @@ def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     return Peaks(*refine(sines, power, index), real)
 
 
-@njit(cache=True, parallel=True)
+@njit(cache=True, error_model="numpy")
 def _highest(power, below, above, index, count):  # type: ignore[no-untyped-def]
     """Fill index (cell, peak) with the maxima, the strongest first and again where there are no more, and count (cell,)."""
-    sines = power.shape[1]
-    for cell in prange(len(power)):
-        own, best = power[cell], index[cell]
-        highest = own.max()
-        floor, found, others = highest * below, 0, 0
-        best[:] = own.argmax()
+    sines, peaks = power.shape[1], index.shape[1]
+    for cell in range(len(power)):
+        own, best, found = power[cell], index[cell], 0
+        top = 0
+        for sine in range(1, sines):
+            if own[sine] > own[top]:
+                top = sine
+        highest = own[top]
+        best[:] = top
         for sine in range(sines):
             value = own[sine]
-            rises = sine == 0 or value > own[sine - 1]
-            if not (value > 0 and value >= floor and rises and (sine == sines - 1 or value >= own[sine + 1])):
+            rises, falls = sine == 0 or value > own[sine - 1], sine == sines - 1 or value >= own[sine + 1]
+            if not (value > 0 and value >= highest * below and rises and falls):
                 continue
-            # The median, which takes longest, matters only where there is more than the highest.
-            if value < highest and others == 0:
-                floor = max(floor, min(highest, np.median(own) * above))
-                others = 1
-                if value < floor:
+            # That far above the median: as far above half of the spectrum. Only what is not the highest is asked about.
+            if value < highest:
+                lower = 0
+                for other in range(sines):
+                    lower += own[other] * above <= value
+                if 2 * lower <= sines:
                     continue
             place = found
             while place > 0 and value > own[best[place - 1]]:
                 place -= 1
-            if place < len(best):
-                for later in range(len(best) - 1, place, -1):
+            if place < peaks:
+                for later in range(peaks - 1, place, -1):
                     best[later] = best[later - 1]
                 best[place] = sine
-                found = min(found + 1, len(best))
-        for none in range(found, len(best)):
+                found = min(found + 1, peaks)
+        for none in range(found, peaks):
             best[none] = best[0]
         count[cell] = found

@@ -269,7 +269,8 @@ def mirror(
     length, amplitude = np.empty(shape), np.empty(shape)
     point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
     if start is None:
-        start = np.broadcast_to(np.nan, (*centres.shape,))
+        start = np.full(centres.shape, np.nan)
+    start = np.ascontiguousarray(start, dtype=np.float64)
     kernel = _mirror_parallel if len(tx) >= _PARALLEL_CHIRPS else _mirror_serial
     kernel(tx, rx, centres, frames, semi_axes, start, polarization == "h", spreading, length, amplitude, point)
     return length, amplitude, point
