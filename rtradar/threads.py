@@ -24,3 +24,8 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
     return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="rtradar")
+
+
+# Threads do not follow into a forked process: there they are started anew.
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)
