@@ -1,6 +1,6 @@
 """The whole chain: a recording in, maps and clouds out, streamed; and several rungs of the ladder side by side."""
 
-from rtradar.pipeline.chain import Result, run
+from rtradar.pipeline.chain import Result, clouds_of, run
 from rtradar.pipeline.compare import Comparison, compare
 
-__all__ = ["Comparison", "Result", "compare", "run"]
+__all__ = ["Comparison", "Result", "clouds_of", "compare", "run"]

@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.pipeline.products import Clouds
+from rtradar.pipeline.cloud_maker import Clouds
 from rtradar.radar import Radar
 from rtradar.report import (
     draw_range_angle,

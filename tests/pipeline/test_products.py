@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline import products
+from rtradar.pipeline import cloud_maker, products
 from rtradar.pipeline.timing import Stages
 from rtradar.process import clutter_removal
 
@@ -19,7 +19,7 @@ RADAR = rt.Radar(
 
 
 def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(products, "_PIECE_BYTES", 1)
+    monkeypatch.setattr(cloud_maker, "_PIECE_BYTES", 1)
     random = np.random.default_rng(0)
     chirps = np.arange(800)
     tone = np.exp(2j * np.pi * 0.1 * chirps)[:, None, None] * np.ones((1, 4, 1)) * (np.arange(64) == 20)
@@ -36,7 +36,7 @@ def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
         clouds = made.finish()
         with h5py.File(tmp_path / f"{name}.h5") as maps:
             found.append({key: maps[key][:] for key in maps} | {"rdt": clouds.rdt.points, "xyz": clouds.spatial.points})
-    assert len(found[0]["rdt"]) == products.CLOUD_POINTS
+    assert len(found[0]["rdt"]) == cloud_maker.CLOUD_POINTS
     assert found[0].keys() == found[1].keys()
     for key, values in found[0].items():
         np.testing.assert_array_equal(found[1][key], values, err_msg=key)

@@ -1,0 +1,128 @@
+"""From range spectra, block by block, to detections, their angles and the clouds, in constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, UniformSample, spatial_points
+from rtradar.pipeline.timing import Stages
+from rtradar.process import (
+    AngleSpectra,
+    ClutterRemoval,
+    SlidingWindows,
+    angle_spectra,
+    cell_spectra,
+    measures_angle,
+    os_cfar,
+    power_map,
+)
+from rtradar.radar import Radar
+
+CLOUD_POINTS = 3000
+"""Points in the RDT cloud (paper, section 3.2.4)."""
+
+SPATIAL_POINTS = 30_000
+"""Most points in the spatial cloud: about 3 s of a walk at 12 GHz; of more a uniform sample, so that memory does not grow."""
+
+RANGE_TIME_S = 5e-3
+"""Step of the range-time map, which pieces of a block are whole numbers of."""
+
+_PIECE_BYTES = 8e6
+"""IF samples at once: some of it stays in a processor's cache, and threads still have enough to share."""
+
+
+class Clouds(NamedTuple):
+    """``rdt``: the range-Doppler-time cloud; ``spatial``: points in the room; ``n_spatial``: points it was sampled from."""
+
+    rdt: RdtCloudResult
+    spatial: SpatialCloud
+    n_spatial: int
+
+
+class Window(NamedTuple):
+    """One processing window: its centre [s], ``power`` and detections ``mask`` (range, velocity), spectra over angle if any."""
+
+    middle_s: float
+    power: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+    angles: AngleSpectra | None
+
+
+class CloudMaker:
+    """The clouds of one capture, made of its range spectra.
+
+    Parameters
+    ----------
+    radar : Radar
+    pfa : float
+        False-alarm rate of OS-CFAR.
+    seed : int
+        Of the sampling of clouds.
+    stages : Stages
+        Where the time goes.
+    removal : ClutterRemoval
+        Applied before Doppler.
+
+    Attributes
+    ----------
+    piece : int
+        Chirps to take at once, so that memory stays low.
+    """
+
+    def __init__(self, radar: Radar, *, pfa: float, seed: int, stages: Stages, removal: ClutterRemoval) -> None:
+        self._radar, self._pfa, self._stages, self._removal = radar, pfa, stages, removal
+        self._sliding = SlidingWindows(radar)
+        self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
+        step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
+        step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
+        self.piece = step * max(1, int(_PIECE_BYTES / step_bytes))
+
+    def take(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles."""
+        for _ in self.windows(self.without_clutter(spectra, first)):
+            pass
+
+    def without_clutter(self, spectra: NDArray[np.complex64], first: int) -> NDArray[np.complex64]:
+        """The next chirps less what stands still, as far as one can tell without the whole window."""
+        with self._stages.time("clutter removal"):
+            return self._removal.block(spectra, first)
+
+    def windows(self, spectra: NDArray[np.complex64]) -> Iterator[Window]:
+        """The windows that end with these chirps, given once each, after their detections have gone into the clouds."""
+        radar, stages = self._radar, self._stages
+        for _, start, window in self._sliding.push(spectra):
+            with stages.time("clutter removal"):
+                cube = self._removal.window(window)
+            with stages.time("doppler"):
+                power = power_map(cube, radar)
+            with stages.time("cfar"):
+                mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
+            middle = float(radar.window_times(np.array([start]))[0])
+            with stages.time("cloud"):
+                self._rdt.push(mask, middle)
+            angles = None
+            if measures_angle(radar):
+                with stages.time("angle"):
+                    angles = window_angles(cube, mask, radar)
+                    found = spatial_points(angles, radar, middle)
+                    self._spatial.add(np.column_stack([found.points, found.velocity, found.power, found.time]))
+            yield Window(middle, power, mask, angles)
+
+    def finish(self) -> Clouds:
+        """The clouds of all windows so far."""
+        with self._stages.time("cloud"):
+            rdt = self._rdt.finish()
+            rows = self._spatial.rows()
+            rows = rows[np.argsort(rows[:, 5], kind="stable")]
+        return Clouds(rdt, SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5]), self._spatial.n_seen)
+
+
+def window_angles(cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], radar: Radar) -> AngleSpectra:
+    """Angle spectra of the detected cells of one window."""
+    rows, columns = np.nonzero(mask)
+    velocity = radar.velocity_mps(radar.cycles_per_frame)
+    return angle_spectra(cell_spectra(cube, radar, rows, columns), radar, radar.range_m[rows], velocity[columns])
