@@ -1,4 +1,4 @@
-"""The two ways rtradar says no: bad input, and a machine that cannot do what was asked."""
+"""The ways rtradar says no: bad input, and machines that cannot do what was asked."""
 
 
 class InputError(ValueError):
@@ -13,6 +13,13 @@ class BackendError(RuntimeError):
     """No ray-tracing backend of the kind asked for works on this machine.
 
     The message is one line that names the cure. The command line prints it and exits with status 1.
+    """
+
+
+class CampaignError(RuntimeError):
+    """Workers or their scheduler were lost.
+
+    The message is one line that says how to go on. The command line prints it and exits with status 1.
     """
 
 

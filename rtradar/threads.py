@@ -8,7 +8,22 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from typing import TypeVar
 
+THREADS_VARIABLE = "RTRADAR_THREADS"
+"""Environment variable that limits the threads of this process, where it shares the cores with others of its kind."""
+
 _Result = TypeVar("_Result")
+
+
+def thread_limit() -> int | None:
+    """Threads this process may use, where the environment says so."""
+    named = os.environ.get(THREADS_VARIABLE, "")
+    return int(named) if named.isdigit() and int(named) > 0 else None
+
+
+def environment_of(threads: int) -> dict[str, str]:
+    """Environment that holds a new process to that many threads: ours, those of compiled loops, and of linear algebra."""
+    own = THREADS_VARIABLE, "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+    return dict.fromkeys(own, str(threads))
 
 
 def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
@@ -23,7 +38,7 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(os.cpu_count(), thread_name_prefix="rtradar")
+    return ThreadPoolExecutor(thread_limit() or os.cpu_count(), thread_name_prefix="rtradar")
 
 
 # Threads do not follow into a forked process: there they are started anew.

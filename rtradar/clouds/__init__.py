@@ -1,5 +1,6 @@
 """Point clouds from detections."""
 
+from rtradar.clouds.collection import Collection, Sample
 from rtradar.clouds.files import RDT_AXES, RDT_UNITS, atomic_file, save_cloud_npz, save_ply
 from rtradar.clouds.rdt import RdtCloud, RdtCloudResult, rdt_isosurface, sample_centres
 from rtradar.clouds.sampling import UniformSample
@@ -8,8 +9,10 @@ from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_point
 __all__ = [
     "RDT_AXES",
     "RDT_UNITS",
+    "Collection",
     "RdtCloud",
     "RdtCloudResult",
+    "Sample",
     "SpatialCloud",
     "UniformSample",
     "atomic_file",

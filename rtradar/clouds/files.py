@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -40,7 +41,8 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         Where the folder is missing or cannot be written.
     """
     target = Path(path)
-    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    # Not by the process alone: on a shared disk another machine may write the same file.
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
     try:
         file = open(beside, "wb")  # noqa: SIM115 - closed below, before the file is moved
     except OSError as error:

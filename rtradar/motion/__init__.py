@@ -2,7 +2,7 @@
 
 from rtradar.motion.load import load_motion
 from rtradar.motion.motion import Motion
-from rtradar.motion.placement import place
+from rtradar.motion.placement import cut, place
 from rtradar.motion.synthetic import ACTIVITIES, synthetic_motion
 
-__all__ = ["ACTIVITIES", "Motion", "load_motion", "place", "synthetic_motion"]
+__all__ = ["ACTIVITIES", "Motion", "cut", "load_motion", "place", "synthetic_motion"]

@@ -65,9 +65,9 @@ def place(
     """
     _check(motion, start_s, duration_s, heading_deg)
     length = motion.duration_s - start_s if duration_s is None else min(duration_s, motion.duration_s - start_s)
-    cut = _cut(motion, start_s, length)
-    nodes = to_nodes(cut)
-    inside = (cut.frame_times >= -1e-9) & (cut.frame_times <= length + 1e-9)
+    part = cut(motion, start_s, length)
+    nodes = to_nodes(part)
+    inside = (part.frame_times >= -1e-9) & (part.frame_times <= length + 1e-9)
     if not inside.any():  # an interval between two frames
         inside[:] = True
     roots = nodes.root_positions[inside]
@@ -79,7 +79,7 @@ def place(
     along = facing if direction is None else direction
     yaw = math.pi - math.atan2(along[1], along[0]) + math.radians(heading_deg)
     middle = roots.mean(axis=0)
-    return cut.shifted([-middle[0], -middle[1], 0.0]).turned(yaw)
+    return part.shifted([-middle[0], -middle[1], 0.0]).turned(yaw)
 
 
 def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg: float) -> None:
@@ -98,7 +98,8 @@ def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg
         raise InputError(f"heading {heading_deg} degrees; it must be finite")
 
 
-def _cut(motion: Motion, start_s: float, length_s: float) -> Motion:
+def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
+    """An interval inside a recording, with the frames that `place` needs and no more; ``start_s`` becomes time zero."""
     frames = len(motion.root_positions)
     begin = (start_s - motion.first_frame_s) * motion.rate_hz
     end = begin + length_s * motion.rate_hz

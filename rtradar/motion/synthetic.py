@@ -45,6 +45,7 @@ def synthetic_motion(
     side: str = "left",
     amplitude: float = 1.0,
     rate_hz: float = 120.0,
+    take: int = 0,
 ) -> Motion:
     """A synthetic actor that faces the radar (-x), on the floor z = 0.
 
@@ -70,6 +71,8 @@ def synthetic_motion(
         Step length, kick height, reach, width of the jumps.
     rate_hz : float
         Frames per second of the result.
+    take : int
+        Another one of the same subject begins elsewhere in the movement.
 
     Raises
     ------
@@ -80,8 +83,9 @@ def synthetic_motion(
         raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
     if side not in ("left", "right"):
         raise InputError(f"side {side!r}; allowed are left and right")
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InputError(f"seed {seed!r}; it must be a whole number, zero or more")
+    for name, number in (("seed", seed), ("take", take)):
+        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
+            raise InputError(f"{name} {number!r}; it must be a whole number, zero or more")
     given = {
         "duration_s": duration_s,
         "height_m": height_m,
@@ -94,8 +98,10 @@ def synthetic_motion(
         low, high = _RANGES[name]
         if not (math.isfinite(value) and low <= value <= high) or value == 0:
             raise InputError(f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}")
-    rng = np.random.default_rng([int(seed), list(ACTIVITIES).index(activity)])
-    traits = draw_traits(rng, height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
+    own = [int(seed), list(ACTIVITIES).index(activity)]
+    traits = draw_traits(np.random.default_rng(own), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
+    if take:
+        traits = dataclasses.replace(traits, phase=float(np.random.default_rng([*own, int(take)]).uniform()))
     t = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
     pose = ACTIVITIES[activity](t, duration_s, traits)
     root = pose.root - [0.0, 0.0, lowering(pose, height_m)]

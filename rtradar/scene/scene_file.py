@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,9 +12,9 @@ from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.scene import Scene
+from rtradar.scene.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 from rtradar.scene.walls import ROOM_SIDES, Surface, Wall, room_walls
 
-Table = Mapping[str, Any]
 Made = TypeVar("Made")
 
 _TEXTS = ("name", "description")
@@ -24,8 +23,6 @@ _SURFACE = ("material", "thickness_m"), ("roughness_m",)
 _WALL = ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m"), ("roughness_m",)
 _FURNITURE = ("name", "mesh", "material", "position_m"), ("yaw_deg", "scale", "metres_per_unit", "sheet")
 _MATERIAL = ("source", "low_hz", "high_hz", "a"), ("b", "c", "d")
-_MOST_BYTES = 1_000_000
-_MOST_PIECES = 1000
 
 
 def read_scene(path: Path) -> Scene:
@@ -36,41 +33,29 @@ def read_scene(path: Path) -> Scene:
     InputError
         Where the file cannot be read, is not TOML, or anything in it has no meaning.
     """
-    where = f"scene file '{path}'"
-    try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{where} is larger than {_MOST_BYTES / 1e6:g} MB: it is no scene")
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise InputError(f"{where}: {error.strerror}; give a TOML file or the name of a scene") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{where} is not TOML: {shown(str(error))[1:-1]}") from None
-    except InputError:
-        raise
-    except ValueError as error:  # a null character in the path, an integer of too many digits
-        raise InputError(f"{where} cannot be used: {shown(str(error))[1:-1]}") from None
+    table = read_toml(path, "scene", "give a TOML file or the name of a scene")
     try:
         return _scene(table, path)
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        raise InputError(f"scene file '{path}': {error}") from None
 
 
 def _scene(table: Table, path: Path) -> Scene:
-    _check_keys("", table, (), (*_TEXTS, *_TABLES))
+    check_keys("", table, (), (*_TEXTS, *_TABLES))
     for key in _TEXTS:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
             raise InputError(f"{key} = {shown(table[key])}; it must be a string of one line")
-    materials = {**MATERIALS, **_own_materials(_table("materials", table))}
+    materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
     walls = [*(_room(table["room"], materials) if "room" in table else ()), *_walls(table, materials)]
     furniture = _furniture(table, materials, path.parent)
     fields: dict[str, Any] = {}
     if "radar" in table:
-        radar = _table("radar", table)
-        _check_keys("[radar] ", radar, ("position_m",), ())
+        radar = table_at("radar", table)
+        check_keys("[radar] ", radar, ("position_m",), ())
         fields["radar_position_m"] = radar["position_m"]
     if "person" in table:
-        person = _table("person", table)
-        _check_keys("[person] ", person, (), ("position_m", "heading_deg"))
+        person = table_at("person", table)
+        check_keys("[person] ", person, (), ("position_m", "heading_deg"))
         fields |= {"person_" + key if key == "position_m" else key: value for key, value in person.items()}
     texts = {key: table[key] for key in _TEXTS if key in table}
     scene = Scene(**{"name": path.stem, **texts}, walls=tuple(walls), furniture=tuple(furniture), **fields)
@@ -83,8 +68,8 @@ def _own_materials(table: Table) -> dict[str, Material]:
     found = {}
     for name in table:
         check_text("[materials]", "a name", name)
-        constants = _table(name, table, "materials.")
-        _check_keys(f"[materials.{name}] ", constants, *_MATERIAL)
+        constants = table_at(name, table, "materials.")
+        check_keys(f"[materials.{name}] ", constants, *_MATERIAL)
         found[name] = own_material(name, **constants)
     return found
 
@@ -92,15 +77,15 @@ def _own_materials(table: Table) -> dict[str, Material]:
 def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     if not isinstance(table, dict):
         raise InputError(f"room = {shown(table)}; it must be a table: [room]")
-    _check_keys("[room] ", table, ("size_m", "corner_m"), ("walls", *ROOM_SIDES))
+    check_keys("[room] ", table, ("size_m", "corner_m"), ("walls", *ROOM_SIDES))
     surfaces = {}
     for side in ROOM_SIDES:
         key = side if side in table or side in ("floor", "ceiling") else "walls"
         if key not in table:
             wanted = f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
             raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
-        surface = _table(key, table, "room.")
-        _check_keys(f"[room.{key}] ", surface, *_SURFACE)
+        surface = table_at(key, table, "room.")
+        check_keys(f"[room.{key}] ", surface, *_SURFACE)
         chosen = _material(f"[room.{key}] ", surface["material"], materials)
         surfaces[side] = Surface(**{**surface, "material": chosen})
     return room_walls(table["size_m"], table["corner_m"], surfaces)
@@ -108,20 +93,20 @@ def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
 
 def _walls(table: Table, materials: Mapping[str, Material]) -> list[Wall]:
     def wall(where: str, piece: Table) -> Wall:
-        _check_keys(where, piece, *_WALL)
+        check_keys(where, piece, *_WALL)
         return _within(where, lambda: Wall(**{**piece, "material": _material("", piece["material"], materials)}))
 
-    return [wall(where, piece) for where, piece in _list("walls", table)]
+    return [wall(where, piece) for where, piece in tables_at("walls", table)]
 
 
 def _furniture(table: Table, materials: Mapping[str, Material], folder: Path) -> list[Furniture]:
     def furniture(where: str, piece: Table) -> Furniture:
-        _check_keys(where, piece, *_FURNITURE)
+        check_keys(where, piece, *_FURNITURE)
         mesh = _mesh(where, piece["mesh"], folder)
         chosen = _material(where, piece["material"], materials)
         return _within(where, lambda: Furniture(**{**piece, "mesh": mesh, "material": chosen}))
 
-    return [furniture(where, piece) for where, piece in _list("furniture", table)]
+    return [furniture(where, piece) for where, piece in tables_at("furniture", table)]
 
 
 def _mesh(where: str, value: object, folder: Path) -> str | Path:
@@ -147,33 +132,6 @@ def _material(where: str, value: object, materials: Mapping[str, Material]) -> M
             f"{where}material = {shown(value)} is unknown; allowed: {allowed}, or a table [materials.NAME] of your own"
         )
     return materials[value]
-
-
-def _table(key: str, table: Table, parent: str = "") -> Table:
-    value = table.get(key, {})
-    if not isinstance(value, dict):
-        raise InputError(f"{parent}{shown(key)[1:-1]} = {shown(value)}; it must be a table: [{parent}{shown(key)[1:-1]}]")
-    return value
-
-
-def _list(key: str, table: Table) -> list[tuple[str, Table]]:
-    """Tables of a list, each with its place in the file."""
-    value = table.get(key, [])
-    if not isinstance(value, list) or not all(isinstance(piece, dict) for piece in value):
-        raise InputError(f"{key} = {shown(value)}; it must be a list of tables: [[{key}]] once for each")
-    if len(value) > _MOST_PIECES:
-        raise InputError(f"[[{key}]] stands there {len(value)} times; {_MOST_PIECES} are allowed")
-    return [(f"[[{key}]] number {number} ", piece) for number, piece in enumerate(value, start=1)]
-
-
-def _check_keys(where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]) -> None:
-    allowed = (*needed, *optional)
-    for key in table:
-        if key not in allowed:
-            raise InputError(f"{where}unknown key {shown(key)}; allowed: {', '.join(allowed)}")
-    for key in needed:
-        if key not in table:
-            raise InputError(f"{where}{key} is missing; needed: {', '.join(needed)}")
 
 
 def _within(where: str, make: Callable[[], Made]) -> Made:

@@ -15,6 +15,7 @@ from types import ModuleType
 from typing import Literal
 
 from rtradar.errors import BackendError, InputError
+from rtradar.threads import thread_limit
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
 from rtradar.trace.verdict import Verdict, judge
 
@@ -122,10 +123,20 @@ def use(backend: Backend) -> ModuleType:
 
         if mi.variant() != backend.variant:
             mi.set_variant(backend.variant)
+            _limit_threads(backend.kind)
     except ImportError as error:
         reason = str(error).splitlines()[0]
         raise BackendError(f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor") from error
     return mi
+
+
+def _limit_threads(kind: Kind) -> None:
+    """Hold Dr.Jit to the threads of this process, where they are limited; it takes all cores otherwise."""
+    limit = thread_limit()
+    if kind == "llvm" and limit is not None:
+        import drjit as dr
+
+        dr.set_thread_count(limit)
 
 
 def available() -> tuple[Kind, ...]:

@@ -1,0 +1,76 @@
+"""Where samples are made: a Dask cluster on this machine, or one that is there already."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rtradar.errors import InputError
+from rtradar.threads import environment_of
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+_PATIENCE_S = 30
+"""How long a scheduler may take to answer, and its first worker to come."""
+
+
+@contextmanager
+def dask_client(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
+    """A client of a cluster with at least one worker.
+
+    Parameters
+    ----------
+    workers : int, optional
+        Processes on this machine, of one task each, that share its cores; as many as there are cores if left out.
+    scheduler : str, optional
+        Address of a scheduler that is there already, such as ``tcp://host:8786``; its workers are taken as they are.
+
+    Raises
+    ------
+    InputError
+        Where Dask is not installed, or there is no scheduler or no worker.
+    """
+    try:
+        import dask
+        from dask.system import CPU_COUNT
+        from distributed import Client, LocalCluster
+    except ImportError as error:
+        raise InputError(f"data sets are built on Dask ({error}); install it: pip install 'rtradar[campaign]'") from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said in one line, and once
+    if scheduler is not None:
+        try:
+            client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
+        except (OSError, ValueError, TypeError) as error:
+            why = str(error).splitlines()[0] if str(error) else type(error).__name__
+            raise InputError(f"--scheduler {scheduler}: nothing answers there ({why}); start one: dask scheduler") from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=_PATIENCE_S)
+            except TimeoutError:
+                raise InputError(f"--scheduler {scheduler} has no workers; start some: dask worker {scheduler}") from None
+            yield client
+        return
+    count = workers or CPU_COUNT
+    environment = environment_of(max(1, CPU_COUNT // count))
+    settings = {
+        # A process that is forked inherits locks of Dr.Jit's threads, but not the threads.
+        "distributed.worker.multiprocessing-method": "spawn",
+        "distributed.nanny.pre-spawn-environ": environment,  # linear algebra looks as it is loaded
+        "distributed.nanny.environ": environment,
+    }
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=0,  # a worker that is held for want of memory would never say so
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
