@@ -1,4 +1,4 @@
-"""The command line: ``rtradar doctor``, ``run``, ``compare``, ``validate`` and ``bench``.
+"""The command line: ``rtradar doctor``, ``run``, ``compare``, ``dataset``, ``validate`` and ``bench``.
 
 Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
 and how to mend it.
@@ -15,7 +15,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any, NoReturn, TextIO
 
-from rtradar.errors import BackendError, InputError
+from rtradar.errors import BackendError, CampaignError, InputError
 from rtradar.radar import PRESETS
 
 _SYNTHETIC = "synthetic:"
@@ -45,7 +45,7 @@ def main(arguments: list[str] | None = None) -> int:
         status: int = options.command(options)
     except InputError as error:
         return _fail(2, error)
-    except BackendError as error:
+    except (BackendError, CampaignError) as error:
         return _fail(1, error)
     except KeyboardInterrupt:
         return _fail(1, "stopped by the user; nothing was left half-written")
@@ -119,6 +119,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     _add_capture(compare)
     compare.set_defaults(command=_compare)
+
+    dataset = commands.add_parser("dataset", help="labelled point clouds of many recordings, radars, scenes and fidelities")
+    build = dataset.add_subparsers(required=True, metavar="COMMAND", parser_class=_OneLineParser).add_parser(
+        "build", help="make the samples of a collection that are missing or damaged; started again it goes on"
+    )
+    build.add_argument("spec", type=Path, metavar="SPEC.toml", help="what the collection shall hold")
+    build.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the collection")
+    build.add_argument("--plan", action="store_true", help="make a sample of each kind, and say how long the others will take")
+    place = build.add_mutually_exclusive_group()
+    place.add_argument("--workers", type=_count, metavar="N", help="processes that share the cores (default: one a core)")
+    place.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler to use, such as tcp://host:8786")
+    build.add_argument("--json", type=Path, metavar="FILE", help="write what was made there as JSON")
+    build.set_defaults(command=_dataset_build)
 
     validate = commands.add_parser("validate", help="hold every claim against its reference; 1 where one fails")
     validate.add_argument("--quick", action="store_true", help="fewer cases of each claim")
@@ -218,6 +231,18 @@ def _compare(options: argparse.Namespace) -> int:
     return 0
 
 
+def _dataset_build(options: argparse.Namespace) -> int:
+    _check_json_folder(options.json)
+    from rtradar.campaign import build, in_words
+
+    report = build(options.spec, options.out, plan_only=options.plan, workers=options.workers, scheduler=options.scheduler)
+    if options.json is not None:
+        _write_json(options.json, report)
+    print(in_words(report))
+    print(f"see {options.out}")
+    return 0
+
+
 def _validate(options: argparse.Namespace) -> int:
     from rtradar.validate import validate
 
@@ -240,9 +265,7 @@ def _bench(options: argparse.Namespace) -> int:
 
 def _capture(options: argparse.Namespace) -> dict[str, Any]:
     """What `run` and `compare` take alike."""
-    # A JSON file that cannot be written is found out before the work, not after it.
-    if options.json is not None and not options.json.resolve().parent.is_dir():
-        raise InputError(f"--json {options.json}: there is no folder '{options.json.resolve().parent}'; make it first")
+    _check_json_folder(options.json)
     from rtradar.motion import load_motion, synthetic_motion
     from rtradar.radar import Radar
     from rtradar.scene import Scene
@@ -271,6 +294,12 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
         "variant": options.variant,
         "spreading": not options.no_spreading,
     }
+
+
+def _check_json_folder(path: Path | None) -> None:
+    """A JSON file that cannot be written is found out before the work, not after it."""
+    if path is not None and not path.resolve().parent.is_dir():
+        raise InputError(f"--json {path}: there is no folder '{path.resolve().parent}'; make it first")
 
 
 def _write_json(path: Path, content: dict[str, Any]) -> None:
@@ -308,10 +337,18 @@ def _whole(text: str) -> int:
     return value
 
 
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise ValueError
+    return value
+
+
 for _kind, _name in (
     (_number, "finite number"),
     (_seconds, "number of seconds, not negative"),
     (_decibels, "number of decibels, or inf"),
     (_whole, "whole number, not negative"),
+    (_count, "whole number, at least 1"),
 ):
     _kind.__name__ = _name  # argparse says "invalid <name> value"

@@ -134,8 +134,8 @@ def _told(found: Sequence[Recipe], outcome: Outcome) -> str:
 
 
 def _first_of_each_kind(missing: Sequence[Recipe], workers: int) -> list[Recipe]:
-    """As many as keep all workers busy, so that they are measured as they will run."""
-    most = math.ceil(workers / len({recipe.kind for recipe in missing}))
+    """As many as keep all workers busy, so that they are measured as they will run, and their second ones: the first are slow."""
+    most = 2 * math.ceil(workers / len({recipe.kind for recipe in missing}))
     seen: Counter[tuple[str, str, str]] = Counter()
     chosen = []
     for recipe in missing:
@@ -146,17 +146,13 @@ def _first_of_each_kind(missing: Sequence[Recipe], workers: int) -> list[Recipe]
 
 
 def _estimate(missing: Sequence[Recipe], good: Sequence[Outcome], workers: int) -> dict[str, float]:
-    """Time and bytes of what is still missing: each kind costs as its measured samples do, in proportion to the interval."""
+    """Time and bytes of what is still missing: of each kind the quickest that was measured, times the interval."""
     measured = {outcome.identity: outcome for outcome in good}
-    spent: defaultdict[tuple[str, str, str], float] = defaultdict(float)
-    length: defaultdict[tuple[str, str, str], float] = defaultdict(float)
-    left = []
+    rates: defaultdict[tuple[str, str, str], list[float]] = defaultdict(list)
     for recipe in missing:
         if recipe.identity in measured:
-            spent[recipe.kind] += measured[recipe.identity].work_s
-            length[recipe.kind] += recipe.interval_s
-        else:
-            left.append(recipe)
-    seconds = sum(recipe.interval_s * spent[recipe.kind] / length[recipe.kind] for recipe in left)
+            rates[recipe.kind].append(measured[recipe.identity].work_s / recipe.interval_s)
+    left = [recipe for recipe in missing if recipe.identity not in measured]
+    seconds = sum(recipe.interval_s * min(rates[recipe.kind]) for recipe in left)
     size = sum(outcome.size for outcome in good) / max(len(good), 1)
     return {"estimated_s": seconds / max(workers, 1), "estimated_bytes": size * len(left)}
