@@ -233,9 +233,11 @@ def _compare(options: argparse.Namespace) -> int:
 
 def _dataset_build(options: argparse.Namespace) -> int:
     _check_json_folder(options.json)
-    from rtradar.campaign import build, in_words
+    from rtradar.campaign import build_dataset, in_words
 
-    report = build(options.spec, options.out, plan_only=options.plan, workers=options.workers, scheduler=options.scheduler)
+    report = build_dataset(
+        options.spec, options.out, plan_only=options.plan, workers=options.workers, scheduler=options.scheduler
+    )
     if options.json is not None:
         _write_json(options.json, report)
     print(in_words(report))

@@ -51,7 +51,7 @@ class Store:
         return cls(folder, tuple(missing), len(found) - len(missing), damaged)
 
 
-def build(
+def build_dataset(
     spec: Path, out: Path, *, plan_only: bool = False, workers: int | None = None, scheduler: str | None = None
 ) -> dict[str, Any]:
     """Make the samples of a data set that are missing or damaged.

@@ -39,7 +39,9 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise InputError(f"data sets are built on Dask ({error}); install it: pip install 'rtradar[campaign]'") from None
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what goes wrong is said in one line, and once
+    # What goes wrong is said in one line, and once; some of Dask's loggers have a level of their own.
+    for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]:
+        logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
@@ -68,7 +70,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
             threads_per_worker=1,
             processes=True,
             memory_limit=0,  # a worker that is held for want of memory would never say so
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL,
         ) as cluster,
         Client(cluster, set_as_default=False) as client,

@@ -7,12 +7,12 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
 from functools import lru_cache
-from importlib.metadata import version
 from typing import Any, NamedTuple
 
 import numpy as np
 from tqdm import tqdm
 
+from rtradar import __version__
 from rtradar.campaign.sample import Recipe, digest, scene_digest
 from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec
 from rtradar.errors import InputError
@@ -45,7 +45,7 @@ def recipes(spec: Spec) -> list[Recipe]:
     # Reading takes a second for a long recording.
     for recorded in tqdm(spec.recordings, desc="reading recordings", unit="file", disable=None):
         intervals += _intervals(spec, recorded)
-    common = {"pfa": spec.pfa, "clutter_removal": spec.clutter_removal, "version": version("rtradar")}
+    common = {"pfa": spec.pfa, "clutter_removal": spec.clutter_removal, "version": __version__}
     found = [_recipe(interval, setting, common) for interval in intervals for setting in spec.settings]
     twice = [identity for identity, count in Counter(recipe.identity for recipe in found).items() if count > 1]
     if twice:

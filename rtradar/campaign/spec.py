@@ -5,6 +5,7 @@
     seed = 0                          # of all that is drawn
     pfa = 1e-6                        # of OS-CFAR
     clutter_removal = "none"
+    folder = "."                      # of the recordings, from the folder of this file; ${NAME} is what the environment says
 
     [windows]                         # which intervals of each recording
     start_s = 0.0
@@ -36,7 +37,7 @@
     count = 100                       # of takes, or seeds = [0, 1, 2]
     subjects = 20                     # take k is of subject k modulo 20, who is one and the same person in all activities
 
-    [[recordings]]                    # paths are relative to the folder of this file
+    [[recordings]]
     file = "07_05.amc"
     skeleton = "07.asf"
     label = "walk"
@@ -49,6 +50,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,7 +77,7 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 }
 """What is drawn: the range where the file gives none, and the least and the most that it may give."""
 
-_TOP = ("seed", "pfa", "clutter_removal", "windows", "each", "drawn", "synthetic", "recordings")
+_TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
 _EACH = ("radar", "scene", "fidelity", "heading_deg", "snr_db", "person_position_m", "radar_position_m")
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *WINDOW_KEYS)
@@ -157,7 +159,8 @@ def _spec(table: Table, folder: Path) -> Spec:
     check_keys("[windows] ", windows_table, (), WINDOW_KEYS)
     windows = Windows.read("[windows]", windows_table)
     actors = tuple(_actor(where, piece) for where, piece in tables_at("synthetic", table))
-    recordings = tuple(_recorded(where, piece, windows_table, folder) for where, piece in tables_at("recordings", table))
+    beside = _folder(table, folder)
+    recordings = tuple(_recorded(where, piece, windows_table, beside) for where, piece in tables_at("recordings", table))
     if not actors and not recordings:
         raise InputError("there is neither [[synthetic]] nor [[recordings]]; give one of them")
     labels = [actor.label for actor in actors]
@@ -179,6 +182,16 @@ def _spec(table: Table, folder: Path) -> Spec:
         actors=actors,
         recordings=recordings,
     )
+
+
+def _folder(table: Table, beside: Path) -> Path:
+    named = check_text("data set", "folder", table.get("folder", "."))
+    there = os.path.expandvars(named)
+    if "$" in there:
+        raise InputError(f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings")
+    if not (beside / there).is_dir():
+        raise InputError(f"folder = {shown(named)}: there is no such folder")
+    return beside / there
 
 
 def _settings(each: Table, folder: Path) -> tuple[Setting, ...]:
@@ -256,7 +269,7 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> Recorde
     skeleton = check_text(where.strip(), "skeleton", table["skeleton"]) if "skeleton" in table else None
     for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
         if name is not None and not (folder / name).is_file():
-            raise InputError(f"{where}{key} = {shown(name)}: there is no such file; paths are relative to the data set file")
+            raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")
     own = {key: value for key, value in table.items() if key in WINDOW_KEYS}
     return Recorded(
         name=texts["file"],

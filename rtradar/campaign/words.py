@@ -9,7 +9,7 @@ _MOST_SHOWN = 8
 
 
 def in_words(report: Mapping[str, Any]) -> str:
-    """A few lines for people of what `rtradar.campaign.build` reports."""
+    """A few lines for people of what `rtradar.campaign.build_dataset` reports."""
     lines = [f"{report['samples']} samples"]
     for key, counted in report["by"].items():
         shown = [f"{name} {count}" for name, count in list(counted.items())[:_MOST_SHOWN]]

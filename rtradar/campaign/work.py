@@ -49,7 +49,6 @@ def work(client: Client, missing: Sequence[Recipe], folder: Path, made: Callable
     from distributed import CancelledError, KilledWorker, as_completed
     from distributed.comm.core import CommClosedError
 
-    at_once = max(_AT_LEAST, _QUEUED * len(client.scheduler_info(n_workers=-1)["workers"]))
     waiting = iter(missing)
 
     def submit(number: int) -> list[Any]:
@@ -61,6 +60,7 @@ def work(client: Client, missing: Sequence[Recipe], folder: Path, made: Callable
     done: list[Outcome] = []
     with tqdm(total=len(missing), desc="samples", unit="sample", disable=None) as bar:
         try:
+            at_once = max(_AT_LEAST, _QUEUED * len(client.scheduler_info(n_workers=-1)["workers"]))
             futures = as_completed(submit(at_once), loop=client.loop)
             for future in futures:
                 done.append(future.result())
@@ -87,7 +87,7 @@ def make_and_store(recipe: Recipe, folder: str, made: Callable[[Recipe], Made]) 
     with _one_at_a_time:
         try:
             sample, spatial, work_s = made(recipe)
-        except InputError as error:
+        except (InputError, OSError) as error:  # such as a mesh file that this machine has not
             return Outcome(recipe.identity, 0.0, 0, str(error))
     return Outcome(recipe.identity, work_s, write_sample(Path(folder), recipe.identity, sample, spatial))
 

@@ -137,8 +137,11 @@ class Collection:
     def _read(self, index: int, name: str) -> Any:
         path = sample_path(self._folder, self._ids[index])
         try:
-            with np.load(path, allow_pickle=False) as archive:  # the archive's own checksum is that of each array
-                values = archive[name]
+            # Not all of the file: the archive has a checksum of each array, and the comment is the end of the file.
+            with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as entry:
+                if len(archive.comment) != _DIGEST:
+                    raise ValueError
+                values = np.lib.format.read_array(entry, allow_pickle=False)
             return json.loads(values.tobytes()) if name == "about" else values
         except _DAMAGE:
             raise InputError(f"sample '{path}' is damaged; mend the collection with: rtradar dataset build") from None

@@ -1,0 +1,170 @@
+"""From a specification to samples: how many, what is drawn, and names that stay."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtradar.campaign.plan import counts, recipes
+from rtradar.campaign.sample import Recipe
+from rtradar.campaign.spec import read_spec
+from rtradar.errors import InputError
+
+HEAD = """
+[windows]
+duration_s = 1.0
+[drawn]
+heading_deg = [-30, 30]
+snr_db = [10, 30]
+offset_x_m = [-0.5, 0.5]
+"""
+BVH = (
+    """HIERARCHY
+ROOT hips
+{
+  OFFSET 0 0 0
+  CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation
+  End Site
+  {
+    OFFSET 0 100 0
+  }
+}
+MOTION
+Frames: 31
+Frame Time: 0.1
+"""
+    + "0 90 0 0 0 0\n" * 31
+)
+
+
+def planned(folder: Path, text: str, seed: int = 0) -> list[Recipe]:
+    path = folder / "set.toml"
+    path.write_text(f"seed = {seed}\n{text}")
+    return recipes(read_spec(path))
+
+
+def actors(count: int, *labels: str) -> str:
+    return "".join(f'[[synthetic]]\nlabel = "{label}"\ncount = {count}\nsubjects = 3\n' for label in labels)
+
+
+def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
+    (folder / "walk.bvh").write_text(BVH.replace("0 90 0 0 0 0\n", f"{moved} 90 0 0 0 0\n", 1))
+    own = "".join(f"{key} = {value}\n" for key, value in keys.items())
+    return f'[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\nsubject = "her"\nlicence = "CC0"\n{own}'
+
+
+def test_every_take_meets_every_setting(tmp_path: Path) -> None:
+    each = '[each]\nradar = ["paper-12ghz", "paper-77ghz"]\nfidelity = ["analytic", "specular"]\n'
+    found = planned(tmp_path, HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5))
+    assert len(found) == (5 + 5 + 5) * 4  # 3 s every 0.5 s: five intervals of 1 s
+    told = counts(found)
+    assert told["label"] == {"kick": 20, "walk": 40}
+    assert told["source"] == {"recorded": 20, "synthetic": 40}
+    assert told["radar"] == {"paper-12ghz": 30, "paper-77ghz": 30}
+    assert told["fidelity"] == {"analytic": 30, "specular": 30}
+    assert told["subject"] == {"her": 20, "synthetic-0": 16, "synthetic-1": 16, "synthetic-2": 8}
+
+
+def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
+    found = planned(tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk"))
+    by_take: dict[str, list[Recipe]] = {}
+    for recipe in found:
+        by_take.setdefault(recipe.parameters["recording"], []).append(recipe)
+    assert len(by_take) == 4
+    for one, other in by_take.values():
+        differs = {key for key in one.parameters if one.parameters[key] != other.parameters[key]}
+        assert differs == {"fidelity"}
+
+
+def test_ids_do_not_depend_on_what_else_there_is_or_where(tmp_path: Path) -> None:
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    few = {recipe.identity for recipe in planned(tmp_path, HEAD + actors(3, "walk") + recording(tmp_path))}
+    many = {recipe.identity for recipe in planned(other, HEAD + actors(9, "kick", "walk") + recording(other, hop_s=0.5))}
+    assert len(few) == 4
+    assert few < many
+
+
+def test_an_id_is_of_all_that_a_sample_follows_from(tmp_path: Path) -> None:
+    texts = [
+        HEAD + actors(1, "walk"),
+        HEAD + actors(1, "kick"),
+        "pfa = 1e-5\n" + HEAD + actors(1, "walk"),
+        HEAD.replace("30]", "31]") + actors(1, "walk"),
+        HEAD.replace("1.0", "1.1") + actors(1, "walk"),
+        HEAD + actors(1, "walk") + '[each]\nscene = ["living-room"]',
+        HEAD + recording(tmp_path),
+    ]
+    found = [planned(tmp_path, text)[0].identity for text in texts]
+    found += [planned(tmp_path, texts[0], seed=1)[0].identity]
+    found += [planned(tmp_path, HEAD + recording(tmp_path, moved=1))[0].identity]
+    assert len(set(found)) == len(found)
+
+
+def test_an_id_is_the_same_tomorrow() -> None:
+    recipe = Recipe("walk", {"b": [1, 2.5], "a": "x"}, None, None)  # type: ignore[arg-type]
+    assert recipe.identity == "d0a8e28dc6775d9616b6"
+
+
+def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
+    found = planned(tmp_path, HEAD + actors(60, "walk", "kick"))
+    for key, (low, high) in {
+        "heading_deg": (-30, 30),
+        "snr_db": (10, 30),
+        "tempo": (0.8, 1.25),
+        "amplitude": (0.8, 1.1),
+        "build": (0.8, 1.25),
+        "height_m": (1.55, 1.95),
+    }.items():
+        values = {label: np.array([r.parameters[key] for r in found if r.label == label]) for label in ("walk", "kick")}
+        for drawn in values.values():
+            assert drawn.min() >= low
+            assert drawn.max() <= high
+        if key not in ("build", "height_m"):  # which are those of the same three people
+            # Means of 60 uniform values each: five standard deviations of their difference.
+            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * (high - low) / np.sqrt(12) * np.sqrt(2 / 60)
+
+
+def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
+    bodies: dict[str, set[tuple[float, float]]] = {}
+    for recipe in planned(tmp_path, HEAD + actors(6, "walk", "punch")):
+        bodies.setdefault(recipe.parameters["subject"], set()).add((recipe.parameters["build"], recipe.parameters["height_m"]))
+    assert len(bodies) == 3
+    assert all(len(body) == 1 for body in bodies.values())
+    assert len(set.union(*bodies.values())) == 3
+
+
+def test_a_range_that_changes_moves_no_other(tmp_path: Path) -> None:
+    (one,) = planned(tmp_path, HEAD + actors(1, "walk"))
+    (other,) = planned(tmp_path, HEAD + "tempo = [1.0, 1.0]\n" + actors(1, "walk"))
+    assert {key for key in one.parameters if one.parameters[key] != other.parameters[key]} == {"tempo"}
+
+
+def test_parameters_are_plain_json_and_tell_what_a_reader_needs(tmp_path: Path) -> None:
+    for recipe in planned(tmp_path, HEAD + actors(1, "walk") + recording(tmp_path)):
+        assert json.loads(json.dumps(dict(recipe.parameters))) == recipe.parameters
+        needed = "recording subject source start_s duration_s radar scene fidelity snr_db heading_deg seed licence version"
+        assert set(needed.split()) <= set(recipe.parameters)
+
+
+def test_what_is_sent_of_a_recording_is_what_its_interval_needs(tmp_path: Path) -> None:
+    (recipe,) = planned(tmp_path, HEAD.replace("1.0", "0.2") + recording(tmp_path, start_s=1.0))
+    packed = recipe.packed()
+    assert packed.identity == recipe.identity
+    assert packed.motion is not None
+    assert packed.motion.duration_s == 0.2
+
+
+def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"recording 'walk.bvh' from 0 s stands there twice; leave one out"):
+        planned(tmp_path, HEAD + recording(tmp_path) * 2)
+
+
+def test_a_recording_that_cannot_be_read_is_named(tmp_path: Path) -> None:
+    text = HEAD + recording(tmp_path)
+    (tmp_path / "walk.bvh").write_text("nothing")
+    with pytest.raises(InputError, match=r"walk\.bvh"):
+        planned(tmp_path, text)

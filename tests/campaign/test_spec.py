@@ -1,0 +1,164 @@
+"""What a data set file may say, and one line that names the key about everything else."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from rtradar.campaign.spec import read_spec
+from rtradar.campaign.windows import Windows
+from rtradar.errors import InputError
+
+SMALL = """
+[windows]
+duration_s = 2.0
+[[synthetic]]
+label = "walk"
+count = 3
+"""
+RECORDING = """
+[[recordings]]
+file = "walk.bvh"
+label = "walk"
+subject = "her"
+licence = "CC0"
+"""
+
+
+def write(folder: Path, text: str) -> Path:
+    path = folder / "set.toml"
+    path.write_text(text)
+    return path
+
+
+def test_what_is_left_out_has_a_value(tmp_path: Path) -> None:
+    spec = read_spec(write(tmp_path, SMALL))
+    assert (spec.seed, spec.pfa, spec.clutter_removal) == (0, 1e-6, "none")
+    (setting,) = spec.settings
+    assert (setting.radar.name, setting.scene.name, setting.fidelity) == ("paper-12ghz", "free-space", "specular")
+    assert spec.drawn["snr_db"] == (20.0, 20.0)
+    assert spec.actors[0].seeds == (0, 1, 2)
+    assert spec.actors[0].subjects == tuple(range(10))
+
+
+def test_every_combination_is_a_setting(tmp_path: Path) -> None:
+    each = """
+[each]
+radar = ["paper-12ghz", "paper-77ghz"]
+fidelity = ["analytic", "specular"]
+snr_db = [10.0, 20, 30]
+person_position_m = [[0, 0], [0.5, 0.5]]
+radar_position_m = [[-4, 1, 1]]
+"""
+    settings = read_spec(write(tmp_path, SMALL + each)).settings
+    assert len(settings) == 2 * 2 * 3 * 2
+    assert {setting.scene.person_position_m for setting in settings} == {(0.0, 0.0), (0.5, 0.5)}
+    assert {setting.scene.radar_position_m for setting in settings} == {(-4.0, 1.0, 1.0)}
+
+
+def test_files_are_sought_beside_the_data_set_file(tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_text("")
+    (tmp_path / "mine.toml").write_text("samples_per_chirp = 128")
+    spec = read_spec(write(tmp_path, RECORDING + '[each]\nradar = ["mine.toml"]'))
+    assert spec.recordings[0].path == tmp_path / "walk.bvh"
+    assert spec.recordings[0].windows == Windows()
+    assert spec.settings[0].radar.samples_per_chirp == 128
+
+
+def test_recordings_may_lie_where_the_environment_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "far").mkdir()
+    (tmp_path / "far" / "walk.bvh").write_text("")
+    monkeypatch.setenv("RTRADAR_FAR", str(tmp_path / "far"))
+    spec = read_spec(write(tmp_path, 'folder = "${RTRADAR_FAR}"' + RECORDING))
+    assert spec.recordings[0].path == tmp_path / "far" / "walk.bvh"
+
+
+def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_text("")
+    spec = read_spec(write(tmp_path, "[windows]\nduration_s = 2.0\nhop_s = 1.0" + RECORDING + "start_s = 0.5\nend_s = 4.0"))
+    assert spec.recordings[0].windows == Windows(0.5, 2.0, 1.0, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "neither [[synthetic]] nor [[recordings]]"),
+        ("colour = 1" + SMALL, "unknown key 'colour'; allowed: seed, pfa"),
+        ("seed = 1.5" + SMALL, "seed = 1.5; it must be a whole number"),
+        ("seed = true" + SMALL, "seed = True; it must be a whole number"),
+        ("pfa = 2" + SMALL, "pfa = 2; it must be a number"),
+        ('clutter_removal = "magic"' + SMALL, "clutter_removal = 'magic'; allowed: none, mean"),
+        ("windows = 3", "windows = 3; it must be a table"),
+        (SMALL + "colour = 1", "[[synthetic]] number 1 unknown key 'colour'"),
+        (SMALL + "seeds = [1]", "give count or seeds, one of them"),
+        (SMALL.replace("count = 3", ""), "give count or seeds, one of them"),
+        (SMALL.replace("count = 3", "count = 0"), "count = 0; it must be at least 1"),
+        (SMALL.replace("count = 3", "seeds = [1, 1]"), "seeds = [1, 1]; it must be a list of different whole numbers"),
+        (SMALL.replace("count = 3", 'seeds = ["a"]'), "seeds = 'a'; it must be a whole number"),
+        (SMALL.replace("walk", "dance"), "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack"),
+        (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' stands there twice"),
+        (SMALL.replace("duration_s = 2.0", ""), "duration_s is missing; synthetic actors have no end"),
+        (SMALL.replace("duration_s = 2.0", "duration_s = -1"), "duration_s = -1; it must be a number"),
+        (SMALL.replace("duration_s = 2.0", "hop_s = 1"), "hop_s needs duration_s"),
+        (SMALL.replace("duration_s = 2.0", "duration_s = 2\nend_s = 1"), "end_s = 1 leaves no room"),
+        (SMALL.replace("duration_s = 2.0", "duration_s = 2\nlength = 1"), "[windows] unknown key 'length'"),
+        (SMALL + "[each]\ncolour = [1]", "[each] unknown key 'colour'"),
+        (SMALL + "[each]\nradar = 'paper-12ghz'", "[each] radar = 'paper-12ghz'; it must be a list"),
+        (SMALL + "[each]\nradar = []", "[each] radar = []; it must be a list, not empty"),
+        (SMALL + "[each]\nradar = ['paper-13ghz']", "[each] radar: radar 'paper-13ghz' is unknown"),
+        (SMALL + "[each]\nradar = ['none.toml']", "No such file"),
+        (SMALL + "[each]\nradar = [1]", "[each]: radar = 1; it must be a string"),
+        (SMALL + "[each]\nscene = ['moon']", "[each] scene: scene 'moon' is unknown"),
+        (SMALL + "[each]\nfidelity = ['perfect']", "fidelity = 'perfect' is unknown; allowed: analytic-paper"),
+        (SMALL + "[each]\nsnr_db = [1, 1]", "a value stands there twice"),
+        (SMALL + "[each]\nsnr_db = ['loud']", "snr_db = 'loud'; it must be a number"),
+        (SMALL + "[each]\nperson_position_m = [[0]]", "person_position_m = [0]; it must be 2 numbers"),
+        (SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]", "snr_db stands under [each] and under [drawn]"),
+        (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
+        (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range: [least, most]"),
+        (SMALL + "[drawn]\ntempo = [1.2, 0.8]", "[drawn] tempo = [1.2, 0.8]; the least must come first"),
+        (SMALL + "[drawn]\ntempo = [1.2, 9]", "[drawn]: tempo = 9; it must be a number from 0.4 to 2"),
+        (RECORDING, "[[recordings]] number 1 file = 'walk.bvh': there is no such file"),
+        (RECORDING.replace("licence", "license"), "unknown key 'license'; allowed: file, label, subject, licence"),
+        (RECORDING.replace('licence = "CC0"', ""), "licence is missing; needed: file"),
+        (RECORDING.replace('"her"', "7"), "[[recordings]] number 1: subject = 7; it must be a string"),
+        ('folder = "none"' + SMALL, "folder = 'none': there is no such folder"),
+        ('folder = "${RTRADAR_NOWHERE}"' + SMALL, "the environment has no such variable"),
+        ("[", "is not TOML"),
+    ],
+)
+def test_nonsense_is_refused_in_one_line_that_names_the_key(tmp_path: Path, text: str, says: str) -> None:
+    with pytest.raises(InputError) as caught:
+        read_spec(write(tmp_path, text))
+    message = str(caught.value)
+    assert says in message
+    assert message.startswith("data set file '")
+    assert "\n" not in message
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"data set file '.*none.toml': No such file or directory; give a TOML file"):
+        read_spec(tmp_path / "none.toml")
+
+
+@pytest.mark.parametrize(
+    ("windows", "length_s", "expected"),
+    [
+        (Windows(), 3.0, [(0.0, 3.0)]),
+        (Windows(start_s=1.0), 3.0, [(1.0, 2.0)]),
+        (Windows(duration_s=2.0), 3.0, [(0.0, 2.0)]),
+        (Windows(0.5, 1.0, 1.0), 3.5, [(0.5, 1.0), (1.5, 1.0), (2.5, 1.0)]),
+        (Windows(0.5, 1.0, 1.0), 3.4, [(0.5, 1.0), (1.5, 1.0)]),
+        (Windows(0.0, 0.3, 0.1), 0.6, [(0.0, 0.3), (0.1, 0.3), (0.2, 0.3), (0.3, 0.3)]),  # 0.6 - 0.3 is less than 3 x 0.1
+        (Windows(0.0, 1.0, 0.5, 2.0), 9.0, [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]),
+    ],
+)
+def test_intervals_fill_the_recording(windows: Windows, length_s: float, expected: list[tuple[float, float]]) -> None:
+    assert windows.of("walk", length_s) == expected
+
+
+@pytest.mark.parametrize("windows", [Windows(duration_s=3.0), Windows(start_s=2.5), Windows(end_s=2.5), Windows(2.0, 1.0, 0.5)])
+def test_a_recording_that_is_too_short_is_named(windows: Windows) -> None:
+    with pytest.raises(InputError, match=r"recording 'walk' has 2 s, too short"):
+        windows.of("walk", 2.0)

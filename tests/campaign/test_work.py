@@ -1,0 +1,261 @@
+"""Work on a cluster: what is missing is made, whatever dies meanwhile, and nothing else."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import cloudpickle
+import numpy as np
+import pytest
+from distributed import Client, LocalCluster
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from rtradar import __version__
+from rtradar.campaign import build as building
+from rtradar.campaign.build import Store, build_dataset
+from rtradar.campaign.cluster import dask_client
+from rtradar.campaign.sample import Made, Recipe
+from rtradar.campaign.work import make_and_store, work
+from rtradar.clouds import Collection, Sample
+from rtradar.clouds.collection import sample_path, sweep, write_index
+from rtradar.errors import CampaignError, InputError
+
+RECIPES = [
+    Recipe(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
+    for number in range(9)
+]
+TINY = """
+[windows]
+duration_s = 0.2
+[each]
+radar = ["small.toml"]
+fidelity = ["analytic"]
+[[synthetic]]
+label = "walk"
+count = 2
+"""
+RADAR = """
+tx_y = 2
+tx_z = 0
+rx_y = 4
+rx_z = 0
+chirp_duration_s = 250e-6
+samples_per_chirp = 128
+frame_duration_s = 0.05
+"""
+
+
+def fake(recipe: Recipe) -> Made:
+    """A cloud that follows from the recipe, at no cost."""
+    points = np.random.default_rng(recipe.parameters["number"]).random((4, 3))
+    return Made(Sample(points, recipe.label, recipe.parameters), points, 0.5)
+
+
+def deadly(recipe: Recipe) -> Made:
+    """The same, but the process dies of signal 9 the first time."""
+    mark = Path(recipe.parameters["mark"])
+    if not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return fake(recipe)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def client() -> Iterator[Client]:
+    """A cluster inside this process."""
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+        yield client
+
+
+@pytest.fixture
+def here(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`build_dataset` works inside this process."""
+
+    @contextmanager
+    def same(workers: Any, scheduler: Any) -> Iterator[Client]:
+        yield client
+
+    monkeypatch.setattr(building, "dask_client", same)
+
+
+def test_what_is_missing_is_made_once(client: Client, tmp_path: Path) -> None:
+    for recipe in RECIPES[:4]:
+        make_and_store(recipe, str(tmp_path), fake)
+    before = {name: (tmp_path / name).stat().st_mtime_ns for name in contents(tmp_path)}
+    store = Store.look(RECIPES, tmp_path)
+    assert (store.whole, store.damaged, len(store.missing)) == (4, 0, 5)
+    done = work(client, store.missing, tmp_path, fake)
+    assert sorted(outcome.identity for outcome in done) == sorted(recipe.identity for recipe in store.missing)
+    assert {outcome.size for outcome in done} == {sample_path(tmp_path, RECIPES[5].identity).stat().st_size}
+    assert Store.look(RECIPES, tmp_path).missing == ()
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in before} == before
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=15)
+@given(order=st.permutations(RECIPES), killed=st.integers(0, 9), spoiled=st.integers(0, 8), cut=st.integers(0, 600))
+def test_order_kills_and_damage_leave_the_same_bytes(
+    tmp_path_factory: pytest.TempPathFactory, order: list[Recipe], killed: int, spoiled: int, cut: int
+) -> None:
+    undisturbed, folder = (tmp_path_factory.mktemp(name) for name in ("undisturbed", "disturbed"))
+    for recipe in RECIPES:
+        make_and_store(recipe, str(undisturbed), fake)
+    for recipe in order[:killed]:  # a run that ends early, with one file half-written
+        make_and_store(recipe, str(folder), fake)
+    (folder / f".{order[-1].identity}.npz.0123.part").write_bytes(b"half")
+    path = sample_path(folder, order[spoiled].identity)
+    if path.exists():
+        path.write_bytes(path.read_bytes()[:cut])
+    sweep(folder)
+    for recipe in Store.look(order, folder).missing:
+        make_and_store(recipe, str(folder), fake)
+    assert contents(folder) == contents(undisturbed)
+
+
+def test_a_damaged_sample_is_found_and_made_anew(tmp_path: Path) -> None:
+    for recipe in RECIPES[:2]:
+        make_and_store(recipe, str(tmp_path), fake)
+    path = sample_path(tmp_path, RECIPES[0].identity)
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-10])
+    store = Store.look(RECIPES[:2], tmp_path)
+    assert (store.whole, store.damaged) == (1, 1)
+    make_and_store(store.missing[0], str(tmp_path), fake)
+    assert path.read_bytes() == whole
+
+
+def test_a_sample_that_cannot_be_made_does_not_stop_the_others(client: Client, tmp_path: Path) -> None:
+    def picky(recipe: Recipe) -> Made:
+        if recipe.parameters["number"] == 3:
+            raise InputError("the person stands in the wall")
+        return fake(recipe)
+
+    done = work(client, RECIPES, tmp_path, picky)
+    assert [outcome.trouble for outcome in done if outcome.trouble] == ["the person stands in the wall"]
+    assert len(contents(tmp_path)) == 8
+
+
+def test_a_folder_that_cannot_be_written_stops_it_in_one_line(client: Client, tmp_path: Path) -> None:
+    with pytest.raises(
+        InputError, match=r"cannot write .*; 0 of 9 samples were made and are kept: run the same command"
+    ) as caught:
+        work(client, RECIPES, tmp_path / "none", fake)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_worker_of_another_version_makes_nothing(tmp_path: Path) -> None:
+    outcome = make_and_store(Recipe("walk", {"version": "0.0"}, None, None), str(tmp_path), fake)  # type: ignore[arg-type]
+    assert f"this worker has rtradar {__version__}, not 0.0" in outcome.trouble
+    assert not contents(tmp_path)
+
+
+def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(RADAR)
+    (tmp_path / "set.toml").write_text(TINY)
+    out = tmp_path / "new" / "out"
+    planned = build_dataset(tmp_path / "set.toml", out, plan_only=True)
+    assert (planned["samples"], planned["whole"], planned["made"], planned["missing"]) == (2, 0, 2, 0)
+    assert planned["by"]["label"] == {"walk": 2}
+    assert planned["estimated_s"] == 0
+    first = contents(out)
+    again = build_dataset(tmp_path / "set.toml", out)
+    assert (again["whole"], again["made"], again["workers"]) == (2, 0, 0)
+    sample_path(out, Collection(out).ids[0]).write_bytes(b"spoiled")
+    (out / ".x.npz.12.part").write_bytes(b"left by a killed writer")
+    mended = build_dataset(tmp_path / "set.toml", out)
+    assert (mended["whole"], mended["damaged"], mended["made"]) == (1, 1, 1)
+    assert contents(out) == first
+    found = Collection(out)
+    assert len(found) == 2
+    sample = found[0]
+    assert (sample.label, sample.points.shape) == ("walk", (3000, 3))
+    assert sample.provenance["detections"] > 0
+    assert 0 < len(found.spatial(0)) <= 3000
+
+
+def test_a_plan_estimates_what_it_does_not_make(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "small.toml").write_text(RADAR)
+    text = TINY.replace("count = 2", "count = 7").replace('["analytic"]', '["analytic", "specular"]')
+    (tmp_path / "set.toml").write_text(text)
+
+    def timed(recipe: Recipe) -> Made:
+        points = np.zeros((10, 3))
+        seconds = 1.0 if recipe.parameters["fidelity"] == "analytic" else 5.0
+        return Made(Sample(points, recipe.label, {}), points, seconds)
+
+    monkeypatch.setattr(building, "make", timed)
+    report = build_dataset(tmp_path / "set.toml", tmp_path / "out", plan_only=True)
+    assert (report["samples"], report["made"], report["missing"]) == (14, 4, 10)  # two of each fidelity
+    assert report["estimated_s"] == pytest.approx(5 * 1.0 + 5 * 5.0)
+    assert report["estimated_bytes"] == pytest.approx(10 * report["bytes"] / 4)
+
+
+def test_samples_that_cannot_be_made_are_told_in_one_line(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "small.toml").write_text(RADAR)
+    (tmp_path / "set.toml").write_text(TINY + "[drawn]\noffset_x_m = [-4.0, -4.0]\noffset_y_m = [1.0, 1.0]")
+    with pytest.raises(
+        InputError, match=r"2 of 2 samples cannot be made, the other 0 are there; the first of them, .*synthetic:walk"
+    ):
+        build_dataset(tmp_path / "set.toml", tmp_path / "out")
+
+
+@pytest.mark.slow
+def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import the tests
+    request.addfinalizer(lambda: cloudpickle.unregister_pickle_by_value(sys.modules[__name__]))
+    marked = [
+        Recipe(recipe.label, {**recipe.parameters, "mark": str(tmp_path / "mark")}, None, None)  # type: ignore[arg-type]
+        for recipe in RECIPES
+    ]
+    killed, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
+    for folder in (killed, undisturbed):
+        folder.mkdir()
+    with dask_client(workers=1) as client:
+        done = work(client, marked, killed, deadly)
+    assert (tmp_path / "mark").exists()
+    assert sorted(outcome.identity for outcome in done) == sorted(recipe.identity for recipe in marked)
+    for recipe in marked:
+        make_and_store(recipe, str(undisturbed), fake)
+    sweep(killed)
+    assert contents(killed) == contents(undisturbed)
+    write_index(killed, [recipe.identity for recipe in marked])
+    assert len(Collection(killed)) == len(marked)
+
+
+def test_no_scheduler_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rtradar.campaign.cluster._PATIENCE_S", 0.2)
+    with (
+        pytest.raises(InputError, match=r"--scheduler tcp://127.0.0.1:1: nothing answers there"),
+        dask_client(scheduler="tcp://127.0.0.1:1"),
+    ):
+        pass
+
+
+def test_a_scheduler_that_is_lost_is_said_in_one_line(tmp_path: Path) -> None:
+    address = tmp_path / "scheduler.json"
+    command = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
+    scheduler = subprocess.Popen([sys.executable, *command, "--scheduler-file", str(address)], stderr=subprocess.DEVNULL)
+    try:
+        with Client(scheduler_file=str(address), set_as_default=False) as client:
+            # There are no workers: it waits until the scheduler dies.
+            threading.Timer(0.2, scheduler.kill).start()
+            with pytest.raises(CampaignError, match=r"the scheduler was lost; 0 of 9 samples were made and are kept"):
+                work(client, RECIPES, tmp_path, fake)
+    finally:
+        scheduler.kill()
+        scheduler.wait()
