@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from rtradar.errors import InputError
-from rtradar.threads import environment_of
+from rtradar.threads import environment_of, thread_limit
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -24,7 +24,8 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
     Parameters
     ----------
     workers : int, optional
-        Processes on this machine, of one task each, that share its cores; as many as there are cores if left out.
+        Processes on this machine, of one task each, that share its cores (or have as many threads each as `RTRADAR_THREADS`
+        says); as many as there are cores if left out.
     scheduler : str, optional
         Address of a scheduler that is there already, such as ``tcp://host:8786``; its workers are taken as they are.
 
@@ -56,7 +57,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
             yield client
         return
     count = workers or CPU_COUNT
-    environment = environment_of(max(1, CPU_COUNT // count))
+    environment = environment_of(thread_limit() or max(1, CPU_COUNT // count))
     settings = {
         # A process that is forked inherits locks of Dr.Jit's threads, but not the threads.
         "distributed.worker.multiprocessing-method": "spawn",
