@@ -43,7 +43,7 @@ def recipes(spec: Spec) -> list[Recipe]:
     """
     intervals = [*(interval for actor in spec.actors for interval in _takes(spec, actor))]
     # Reading takes a second for a long recording.
-    for recorded in tqdm(spec.recordings, desc="reading recordings", unit="file", disable=None):
+    for recorded in tqdm(spec.recordings, desc="reading recordings", unit="file", disable=None if spec.recordings else True):
         intervals += _intervals(spec, recorded)
     common = {"pfa": spec.pfa, "clutter_removal": spec.clutter_removal, "version": __version__}
     found = [_recipe(interval, setting, common) for interval in intervals for setting in spec.settings]

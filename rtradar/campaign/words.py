@@ -15,17 +15,18 @@ def in_words(report: Mapping[str, Any]) -> str:
         shown = [f"{name} {count}" for name, count in list(counted.items())[:_MOST_SHOWN]]
         more = [f"and {len(counted) - _MOST_SHOWN} more"] if len(counted) > _MOST_SHOWN else []
         lines.append(f"  by {key}: {', '.join(shown + more)}")
+    workers = f"{report['workers']} worker{'' if report['workers'] == 1 else 's'}"
     damaged = f", {report['damaged']} were damaged" if report["damaged"] else ""
     there = f"{report['whole']} were there{damaged}"
     if report["made"]:
         there += (
-            f", {report['made']} made in {_time(report['wall_s'])} by {report['workers']} workers "
+            f", {report['made']} made in {_time(report['wall_s'])} by {workers} "
             f"({report['work_s']:.1f} s and {_size(report['bytes'] / report['made'])} each)"
         )
     lines.append(there)
     if "estimated_s" in report:
         lines.append(
-            f"{report['missing']} are missing: about {_time(report['estimated_s'])} on {report['workers']} workers, "
+            f"{report['missing']} are missing: about {_time(report['estimated_s'])} on {workers}, "
             f"and {_size(report['estimated_bytes'])}"
             if report["missing"]
             else "none is missing"

@@ -1,0 +1,125 @@
+"""``rtradar dataset build``: what it says, and how it says no."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from distributed import Client, LocalCluster
+
+from rtradar.campaign import in_words
+from rtradar.campaign.sample import Made, Recipe
+from rtradar.cli import main
+from rtradar.clouds import Sample
+
+SPEC = """
+[windows]
+duration_s = 1.0
+[[synthetic]]
+label = "walk"
+count = 12
+subjects = 12
+"""
+
+
+def fake(recipe: Recipe) -> Made:
+    return Made(Sample(np.zeros((3, 3)), recipe.label, recipe.parameters), np.zeros((0, 3)), 2.0)
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Clouds that cost nothing, made inside this process."""
+    with (
+        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
+        Client(cluster, set_as_default=False) as client,
+    ):
+
+        @contextmanager
+        def same(workers: object, scheduler: object) -> Iterator[Client]:
+            yield client
+
+        monkeypatch.setattr("rtradar.campaign.build.dask_client", same)
+        monkeypatch.setattr("rtradar.campaign.build.make", fake)
+        yield
+
+
+def test_a_plan_then_the_whole(here: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "set.toml").write_text(SPEC)
+    words = [
+        "dataset",
+        "build",
+        str(tmp_path / "set.toml"),
+        "--out",
+        str(tmp_path / "out"),
+        "--json",
+        str(tmp_path / "told.json"),
+    ]
+    assert main([*words, "--plan"]) == 0
+    said = capsys.readouterr().out
+    assert "12 samples\n  by label: walk 12\n" in said
+    assert "synthetic-8 1, and 4 more" not in said  # eight are shown, by name: 0, 1, 10, 11, 2, 3, 4, 5
+    assert "synthetic-5 1, and 4 more" in said
+    assert "10 are missing: about 20 s on 1 worker," in said
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert (told["samples"], told["made"], told["missing"], told["estimated_s"]) == (12, 2, 10, 20.0)
+    assert main(words) == 0
+    assert "2 were there, 10 made" in capsys.readouterr().out
+    assert len(list((tmp_path / "out").glob("*.npz"))) == 12
+
+
+def test_large_figures_are_said_in_large_units() -> None:
+    report = {
+        "samples": 9,
+        "by": {},
+        "whole": 1,
+        "damaged": 2,
+        "made": 4,
+        "missing": 4,
+        "bytes": 4e9,
+        "work_s": 3.0,
+        "wall_s": 600.0,
+        "workers": 2,
+        "estimated_s": 36000.0,
+        "estimated_bytes": 2.5e9,
+    }
+    said = in_words(report)
+    assert "1 were there, 2 were damaged, 4 made in 10 min by 2 workers (3.0 s and 1.0 GB each)" in said
+    assert "4 are missing: about 10.0 h on 2 workers, and 2.5 GB" in said
+
+
+@pytest.mark.parametrize(
+    ("text", "options", "named"),
+    [
+        ("colour = 1", [], "colour"),
+        (SPEC, ["--workers", "0"], "--workers"),
+        (SPEC, ["--workers", "2", "--scheduler", "tcp://host:1"], "--scheduler"),
+        (SPEC, ["--json", "/none/told.json"], "--json"),
+        (SPEC + '[each]\nradar = ["none.toml"]', [], "none.toml"),
+    ],
+)
+def test_bad_input_gets_one_clear_line_and_leaves_nothing(
+    text: str, options: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "set.toml").write_text(text)
+    assert main(["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out"), *options]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert said.err.count("\n") == 1
+    assert named in said.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_without_dask_it_says_what_to_install(tmp_path: Path) -> None:
+    (tmp_path / "set.toml").write_text(SPEC)
+    words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
+    code = f"import sys; sys.modules['dask'] = None; from rtradar.cli import main; sys.exit(main({words}))"
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert found.returncode == 2
+    assert found.stderr.count("\n") == 1
+    assert "pip install 'rtradar[campaign]'" in found.stderr
