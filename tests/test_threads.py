@@ -1,4 +1,4 @@
-"""Threads that stay."""
+"""Threads that stay, and can be limited by the environment of the process."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ import sys
 
 import pytest
 
-from rtradar.threads import in_threads
+from rtradar.threads import THREADS_VARIABLE, environment_of, in_threads, thread_limit
+
+COUNT = """
+import numba, rtradar.threads
+from rtradar.trace.backend import select, use
+use(select("llvm"))
+import drjit
+print(rtradar.threads._pool()._max_workers, numba.get_num_threads(), drjit.thread_count())
+"""
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
@@ -36,3 +44,21 @@ if child == 0:
 raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
     assert subprocess.run([sys.executable, "-W", "ignore", "-c", program], timeout=60, check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("named", "limit"), [("3", 3), ("", None), ("0", None), ("many", None), ("-1", None)])
+def test_the_environment_limits_threads(monkeypatch: pytest.MonkeyPatch, named: str, limit: int | None) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, named)
+    assert thread_limit() == limit
+
+
+def test_no_environment_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(THREADS_VARIABLE, raising=False)
+    assert thread_limit() is None
+
+
+@pytest.mark.slow
+def test_every_kind_of_thread_is_limited() -> None:
+    environment = {**os.environ, **environment_of(1)}
+    found = subprocess.run([sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True)
+    assert found.stdout.split() == ["1", "1", "1"]

@@ -101,10 +101,15 @@ def build_dataset(
     done: list[Outcome] = []
     count = 0
     if store.missing:
-        with dask_client(workers, scheduler) as client:
-            count = len(client.scheduler_info(n_workers=-1)["workers"])
-            chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
-            done = work(client, chosen, folder, made=make)
+        try:
+            with dask_client(workers, scheduler) as client:
+                count = len(client.scheduler_info(n_workers=-1)["workers"])
+                chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
+                done = work(client, chosen, folder, made=make)
+        except BaseException:
+            if scheduler is None:  # its workers are gone; those of others may still write
+                sweep(folder)
+            raise
         sweep(folder)
     troubles = [outcome for outcome in done if outcome.trouble]
     good = [outcome for outcome in done if not outcome.trouble]

@@ -72,7 +72,9 @@ class Recipe:
         """The same with no more of the recording than its interval needs, to be sent to where it is made."""
         if self.motion is None:
             return self
-        return replace(self, motion=cut(self.motion, self.parameters["start_s"], self.interval_s))
+        start_s = self.parameters["start_s"]
+        # An interval to the end is rounded, and may be a little longer than what is there.
+        return replace(self, motion=cut(self.motion, start_s, min(self.interval_s, self.motion.duration_s - start_s)))
 
 
 class Made(NamedTuple):

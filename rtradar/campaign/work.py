@@ -71,6 +71,10 @@ def work(client: Client, missing: Sequence[Recipe], folder: Path, made: Callable
                 f"{error.allowed_failures + 1} workers died one after the other at the same sample, for want of memory perhaps; "
                 f"{_kept(done, missing)}, with fewer --workers"
             ) from None
+        except ImportError as error:
+            raise CampaignError(
+                f"a worker cannot load what it needs ({error}); install the same 'rtradar[campaign]' there"
+            ) from None
         except (CancelledError, CommClosedError, TimeoutError, OSError):
             raise CampaignError(f"the scheduler was lost; {_kept(done, missing)}") from None
         except InputError as error:

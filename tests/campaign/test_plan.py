@@ -158,6 +158,20 @@ def test_what_is_sent_of_a_recording_is_what_its_interval_needs(tmp_path: Path) 
     assert packed.motion.duration_s == 0.2
 
 
+def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
+    text = recording(tmp_path)
+    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace("31", "30")  # 29 / 15 s = 1.93333...
+    (tmp_path / "walk.bvh").write_text(third.rstrip().rpartition("\n")[0] + "\n")
+    (recipe,) = planned(tmp_path, text)
+    packed = recipe.packed().motion
+    assert packed is not None
+    assert recipe.interval_s == 1.933333
+    assert packed.duration_s == pytest.approx(29 / 15, abs=1e-6)
+    (later,) = planned(tmp_path, text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666"))
+    assert later.interval_s == 1.666667
+    assert later.packed().motion is not None
+
+
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"recording 'walk.bvh' from 0 s stands there twice; leave one out"):
         planned(tmp_path, HEAD + recording(tmp_path) * 2)

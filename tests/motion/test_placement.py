@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtradar.errors import InputError
-from rtradar.motion import Motion, place, synthetic_motion
+from rtradar.motion import Motion, cut, place, synthetic_motion
 from rtradar.motion.names import NODES
 from rtradar.motion.placement import MARGIN_FRAMES, hip_headings, median_heading, walk_direction
 
@@ -35,6 +35,14 @@ def test_placement_undoes_any_yaw_and_shift(yaw: float, x: float, y: float) -> N
         motion = synthetic_motion(activity)
         expected = place(motion).positions
         np.testing.assert_allclose(place(motion.turned(yaw).shifted([x, y, 0])).positions, expected, atol=1e-9)
+
+
+def test_a_part_of_a_recording_is_placed_like_the_whole(walk: Motion) -> None:
+    part = cut(walk, 1.0, 0.5)
+    assert len(part.root_positions) < len(walk.root_positions) / 2
+    whole, placed = place(walk, 1.0, 0.5), place(part, 0.0, 0.5)
+    np.testing.assert_array_equal(placed.positions, whole.positions)
+    assert (placed.duration_s, placed.first_frame_s) == (whole.duration_s, whole.first_frame_s)
 
 
 def test_walk_moves_toward_the_radar(walk: Motion) -> None:

@@ -164,6 +164,15 @@ def test_seed_is_the_subject() -> None:
     assert np.abs(first - other).max() > 0.01
 
 
+def test_another_take_of_a_subject_begins_elsewhere_in_the_same_movement() -> None:
+    first, again, other = (synthetic_motion("kick", seed=3, take=take) for take in (0, 0, 7))
+    np.testing.assert_array_equal(first.rotations, again.rotations)
+    np.testing.assert_array_equal(first.rotations, synthetic_motion("kick", seed=3).rotations)
+    assert not np.array_equal(first.rotations, other.rotations)
+    # Kicks come later or earlier, but are the same kicks.
+    assert speeds(first, "l_toe").max() == pytest.approx(speeds(other, "l_toe").max(), rel=0.01)
+
+
 def test_height_and_build() -> None:
     tall = synthetic_motion("punch", height_m=1.9, build=1.2)
     assert tall.girth == pytest.approx(1.2 * 1.9 / 1.75)

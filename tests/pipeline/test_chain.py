@@ -14,6 +14,7 @@ import zarr
 
 import rtradar as rt
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.pipeline import clouds_of
 
 RADAR = rt.Radar(
     name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
@@ -47,6 +48,16 @@ def test_only_the_noise_depends_on_the_seed(tmp_path: Path) -> None:
     _, other = run(tmp_path / "c", seed=2)
     np.testing.assert_array_equal(first, again)
     assert not np.isclose(first, other).any(axis=None)
+
+
+@pytest.mark.parametrize("options", [{}, {"fidelity": "specular", "heading_deg": 20.0, "clutter_removal": "mean", "seed": 3}])
+def test_clouds_alone_are_those_of_a_run(tmp_path: Path, options: dict[str, Any]) -> None:
+    taken = {"fidelity": "analytic", "start_s": 0.1, "duration_s": 0.2, **options}
+    result = rt.run(MOTION, RADAR, out=tmp_path, **taken)
+    clouds, _ = clouds_of(MOTION, RADAR, **taken)
+    np.testing.assert_array_equal(clouds.rdt.points, result.points)
+    with np.load(tmp_path / "cloud_xyz.npz") as spatial:
+        np.testing.assert_array_equal(clouds.spatial.points, spatial["points"])
 
 
 def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:
