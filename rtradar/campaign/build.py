@@ -15,7 +15,7 @@ from tqdm import tqdm
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.plan import counts, recipes
 from rtradar.campaign.sample import Recipe, make
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.campaign.work import Outcome, work
 from rtradar.clouds.collection import is_whole, sample_path, sweep, write_index
 from rtradar.errors import InputError
@@ -63,7 +63,7 @@ def build_dataset(
     out : path
         Folder of the collection; workers on other machines must see it under the same name.
     plan_only : bool
-        Whether to make only some samples of each kind, one a worker at most, and to estimate the rest by them.
+        Whether to make only a few samples of each kind (radar, scene, fidelity), and to estimate the others by them.
     workers : int, optional
         Processes on this machine; as many as there are cores if left out.
     scheduler : str, optional

@@ -10,7 +10,7 @@ import pytest
 
 from rtradar.campaign.plan import counts, recipes
 from rtradar.campaign.sample import Recipe
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import read_spec
 from rtradar.errors import InputError
 
 HEAD = """

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import copy
 from pathlib import Path
+from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from rtradar.campaign.spec import read_spec
+from rtradar.campaign.spec_file import _spec, read_spec
 from rtradar.campaign.windows import Windows
 from rtradar.errors import InputError
 
@@ -135,6 +139,66 @@ def test_nonsense_is_refused_in_one_line_that_names_the_key(tmp_path: Path, text
     assert says in message
     assert message.startswith("data set file '")
     assert "\n" not in message
+
+
+WHOLE: dict[str, Any] = {
+    "seed": 1,
+    "pfa": 1e-5,
+    "clutter_removal": "mean",
+    "folder": ".",
+    "windows": {"start_s": 0.0, "duration_s": 1.0, "hop_s": 1.0, "end_s": 3.0},
+    "each": {
+        "radar": ["paper-12ghz"],
+        "scene": ["free-space"],
+        "fidelity": ["analytic"],
+        "heading_deg": [0.0],
+        "person_position_m": [[0.0, 0.0]],
+        "radar_position_m": [[-4.0, 1.0, 1.0]],
+    },
+    "drawn": {"snr_db": [10.0, 20.0], "tempo": [0.9, 1.1]},
+    "synthetic": [{"label": "walk", "count": 2, "subjects": 2}, {"label": "kick", "seeds": [1], "subjects": [5]}],
+    "recordings": [{"file": "walk.bvh", "label": "walk", "subject": "her", "licence": "CC0", "start_s": 0.5}],
+}
+junk = st.recursive(
+    st.none()
+    | st.booleans()
+    | st.integers()
+    | st.floats()
+    | st.text(max_size=5)
+    | st.sampled_from(["walk", "${HOME}", "../x.toml"]),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+    max_leaves=4,
+)
+
+
+def places(value: object, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """The way to every value inside."""
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    return [way for key, inner in items for way in [(*here, key), *places(inner, (*here, key))]]
+
+
+def test_the_whole_is_understood(tmp_path: Path) -> None:
+    (tmp_path / "walk.bvh").write_text("")
+    assert len(_spec(WHOLE, tmp_path).actors) == 2
+
+
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(way=st.sampled_from(places(WHOLE)), value=junk)
+def test_whatever_stands_where_a_value_should_gets_one_line_or_is_one(
+    tmp_path: Path, way: tuple[Any, ...], value: object
+) -> None:
+    (tmp_path / "walk.bvh").write_text("")
+    table = copy.deepcopy(WHOLE)
+    inside: Any = table
+    for key in way[:-1]:
+        inside = inside[key]
+    inside[way[-1]] = value
+    said = ""
+    try:
+        _spec(table, tmp_path)
+    except InputError as error:
+        said = str(error)
+    assert "\n" not in said
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
