@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -65,6 +66,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         "distributed.nanny.environ": environment,
     }
     with (
+        _environment_kept(),  # Dask puts what it starts workers with into that of this process
         dask.config.set(settings),
         LocalCluster(
             n_workers=count,
@@ -77,3 +79,15 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+@contextmanager
+def _environment_kept() -> Iterator[None]:
+    """Let the environment of this process be afterwards what it was."""
+    before = dict(os.environ)
+    try:
+        yield
+    finally:
+        for name in os.environ.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)

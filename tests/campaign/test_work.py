@@ -225,9 +225,11 @@ def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pyte
     killed, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"
     for folder in (killed, undisturbed):
         folder.mkdir()
+    environment = dict(os.environ)
     with dask_client(workers=1) as client:
         done = work(client, marked, killed, deadly)
     assert (tmp_path / "mark").exists()
+    assert os.environ == environment
     assert sorted(outcome.identity for outcome in done) == sorted(recipe.identity for recipe in marked)
     for recipe in marked:
         make_and_store(recipe, str(undisturbed), fake)
