@@ -41,8 +41,8 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         from distributed import Client, LocalCluster
     except ImportError as error:
         raise InputError(f"data sets are built on Dask ({error}); install it: pip install 'rtradar[campaign]'") from None
-    # What goes wrong is said in one line, and once; some of Dask's loggers have a level of their own.
-    for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] == "distributed"]:
+    # What goes wrong is said in one line, and once. Loggers of Dask and of what it talks through have levels of their own.
+    for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("asyncio", "distributed", "tornado")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
