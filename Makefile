@@ -34,8 +34,8 @@ clean:
 
 # A stamp stands for one set of packages; it is renewed when what it was made from changes.
 $(VENV)/.installed: EXTRAS :=
-$(VENV)/.installed-test: EXTRAS := [test,campaign]
-$(VENV)/.installed-lint: EXTRAS := [test,dev,campaign]
+$(VENV)/.installed-test: EXTRAS := [campaign,learn,test]
+$(VENV)/.installed-lint: EXTRAS := [campaign,learn,test,dev]
 $(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-lint: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) --editable ".$(EXTRAS)"
 	@touch $@

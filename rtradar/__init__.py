@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rtradar import process, rcs, signal
+    from rtradar import classify, process, rcs, signal
     from rtradar.body import Body, Ellipsoids
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, InputError, ValidityWarning
@@ -44,7 +44,7 @@ _HOME = {
     "scattering_length": "scatter",
     "synthetic_motion": "motion",
 }
-_MODULES = ("process", "rcs", "signal")
+_MODULES = ("classify", "process", "rcs", "signal")
 
 __all__ = [
     "BackendError",
@@ -58,6 +58,7 @@ __all__ = [
     "Result",
     "Scene",
     "ValidityWarning",
+    "classify",
     "compare",
     "load_motion",
     "process",

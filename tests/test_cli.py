@@ -249,6 +249,6 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_import_is_quick_and_light() -> None:
-    heavy = ["numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh", "torch", "dask"]
+    heavy = ["numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh", "torch", "dask", "sklearn"]
     code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"

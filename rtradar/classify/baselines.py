@@ -1,0 +1,82 @@
+"""What simpler means reach on the same splits: a network that does no better has learnt nothing that takes a network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.ensemble import RandomForestClassifier
+from sklearn.neighbors import NearestCentroid
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+from tqdm import tqdm
+
+from rtradar.classify.features import metadata_features, rdt_features, spatial_features
+from rtradar.classify.outcome import Outcome, outcome_of
+from rtradar.classify.source import Clouds
+from rtradar.classify.splits import make_splits, values_of
+from rtradar.classify.study import Study, classes_of, fingerprint
+from rtradar.errors import InputError
+
+
+def _centroid(seed: int) -> BaseEstimator:
+    return make_pipeline(StandardScaler(), NearestCentroid())
+
+
+def _forest(seed: int) -> BaseEstimator:
+    return RandomForestClassifier(n_estimators=300, random_state=seed)
+
+
+BASELINES: dict[str, tuple[Callable[[Clouds], NDArray[np.float64]], Callable[[int], BaseEstimator]]] = {
+    "nearest centroid, RDT cloud": (rdt_features, _centroid),
+    "random forest, RDT cloud": (rdt_features, _forest),
+    "nearest centroid, spatial cloud": (spatial_features, _centroid),
+    "random forest, spatial cloud": (spatial_features, _forest),
+    "random forest, metadata alone": (metadata_features, _forest),
+}
+"""Features and classifier of each; the last should be at chance, or the data set gives its classes away."""
+
+
+def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
+    """Answers of every baseline to the splits of a study, those of them that are trained.
+
+    Parameters
+    ----------
+    clouds : Clouds
+        Those of the study.
+    study : Study
+
+    Returns
+    -------
+    dict
+        From the name in `BASELINES` to an `Outcome` for each split.
+
+    Raises
+    ------
+    InputError
+        Where the clouds are not those of the study.
+    """
+    plan = study.plan
+    if fingerprint(clouds) != plan["fingerprint"]:
+        raise InputError(f"the clouds are not those that '{study.folder}' learnt from; name their folder (--data)")
+    trained = {outcome.name for outcome in study.outcomes}
+    splits = make_splits(clouds, plan["split"], folds=plan["folds"], seed=plan["seed"])
+    splits = [split for split in splits if split.name in trained]
+    values = values_of(clouds, plan["split"])
+    _, truth = classes_of(clouds)
+    found: dict[str, list[Outcome]] = {}
+    made: dict[Callable[[Clouds], NDArray[np.float64]], NDArray[np.float64]] = {}
+    with tqdm(BASELINES.items(), unit="baseline", disable=None) as bar:
+        for name, (features_of, make) in bar:
+            bar.set_description(name)
+            if features_of not in made:
+                made[features_of] = features_of(clouds)
+            features = made[features_of]
+            found[name] = []
+            for split in splits:
+                model = make(plan["seed"])
+                predicted = model.fit(features[split.train], truth[split.train]).predict(features[split.test])
+                found[name].append(outcome_of(clouds, split, values, truth, predicted))
+    return found

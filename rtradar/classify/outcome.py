@@ -1,0 +1,94 @@
+"""What came of one training and its test, as plain values."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.classify.source import Clouds
+from rtradar.classify.splits import Split
+from rtradar.clouds import atomic_file
+from rtradar.errors import InputError
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A classifier's answers for the test clouds of one split.
+
+    Parameters
+    ----------
+    name, trained_on : str
+        Those of the `Split`.
+    indices : (test,) int64
+        Of the clouds.
+    truth, predicted : (test,) int64
+        Places among the classes.
+    tested_on : (test,) str
+        Value of the column that the scheme ``across`` compares; empty strings otherwise.
+    recordings : (test,) str
+        That each cloud comes from; clouds of one recording are no independent evidence.
+    history : list of dict
+        An epoch each, see `rtradar.classify.training.train_network`; empty for what has no epochs.
+    """
+
+    name: str
+    trained_on: str
+    indices: NDArray[np.int64]
+    truth: NDArray[np.int64]
+    predicted: NDArray[np.int64]
+    tested_on: NDArray[np.str_]
+    recordings: NDArray[np.str_]
+    history: list[dict[str, float]] = field(default_factory=list)
+
+    @property
+    def accuracy(self) -> float:
+        """Share of right answers."""
+        return float(np.mean(self.truth == self.predicted))
+
+    @property
+    def seconds(self) -> float:
+        """Time of the training."""
+        return sum(row["seconds"] for row in self.history)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values by the names of the fields."""
+        fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+
+
+def outcome_of(
+    clouds: Clouds,
+    split: Split,
+    values: NDArray[np.str_],
+    truth: NDArray[np.int64],
+    predicted: NDArray[np.int64],
+    history: Sequence[dict[str, float]] = (),
+) -> Outcome:
+    """Answers ``predicted (test,)`` to a split; ``truth (cloud,)``, ``values (cloud,)`` as of `values_of`."""
+    test = split.test
+    recordings = clouds.column("recording")[test].astype(str)
+    return Outcome(split.name, split.trained_on, test, truth[test], predicted, values[test], recordings, list(history))
+
+
+def save_outcome(path: Path, outcome: Outcome) -> None:
+    """Write it as JSON, whole or not at all."""
+    with atomic_file(path) as file:
+        file.write((json.dumps(outcome.as_dict()) + "\n").encode())
+
+
+def load_outcome(path: Path) -> Outcome:
+    """Read it; InputError where that is not possible."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        kinds = {"indices": np.int64, "truth": np.int64, "predicted": np.int64, "tested_on": np.str_, "recordings": np.str_}
+        for name, kind in kinds.items():
+            content[name] = np.array(content[name], dtype=kind)
+        return Outcome(**content)
+    except (OSError, ValueError, KeyError, TypeError):
+        raise InputError(f"'{path}' is damaged; remove it and train again: what is done is kept in its checkpoint") from None

@@ -1,0 +1,244 @@
+"""A folder of trainings: one recipe, one way to split one data set, as many trainings as that has."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from rtradar.classify.checkpoint import load_checkpoint
+from rtradar.classify.outcome import Outcome, load_outcome, outcome_of, save_outcome
+from rtradar.classify.pointnet import PointNet
+from rtradar.classify.prepare import stack_clouds
+from rtradar.classify.recipes import Recipe
+from rtradar.classify.source import Clouds
+from rtradar.classify.splits import chosen, make_splits, values_of
+from rtradar.classify.training import Examples, check_points, predict, train_network
+from rtradar.clouds import atomic_file
+from rtradar.errors import InputError
+
+_PLAN_KEYS = ("data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings")
+_PLAN, _CHECKPOINT, _OUTCOME = "plan.json", "checkpoint.pt", "outcome.json"
+
+
+@dataclass(frozen=True)
+class Study:
+    """What lies in a folder of trainings.
+
+    Parameters
+    ----------
+    folder : path
+    plan : dict
+        ``data`` (folder of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and provenance), ``classes``,
+        ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names).
+    outcomes : list of Outcome
+        Of the trainings that are done, in their order.
+    """
+
+    folder: Path
+    plan: dict[str, Any]
+    outcomes: list[Outcome]
+
+    @property
+    def title(self) -> str:
+        """For tables."""
+        return f"{self.plan['recipe']['name']}, {self.plan['recipe']['points']} points"
+
+
+def train_study(
+    clouds: Clouds,
+    out: Path,
+    recipe: Recipe,
+    *,
+    data: str = "",
+    split: str = "folds",
+    folds: int | None = None,
+    seed: int = 0,
+    only: Sequence[int] | None = None,
+    device: torch.device | None = None,
+) -> Study:
+    """Train what is not trained yet.
+
+    Parameters
+    ----------
+    clouds : Clouds
+    out : path
+        Made if it is not there; a folder of the same plan is taken up where it was left.
+    recipe : Recipe
+    data : str
+        Where the clouds are, for the plan.
+    split, folds, seed
+        As of `rtradar.classify.splits.make_splits`; the seed is that of the trainings too.
+    only : sequence of int, optional
+        Numbers of the trainings, from 1; default: all.
+    device : torch.device, optional
+        Default: the CPU.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        Where the folder holds another plan or cannot be written, or the split is not possible.
+    """
+    splits = make_splits(clouds, split, folds=folds, seed=seed)
+    numbers = chosen(splits, only)
+    names, truth = classes_of(clouds)
+    plan = {
+        "data": data,
+        "clouds": len(clouds),
+        "fingerprint": fingerprint(clouds),
+        "classes": list(names),
+        "recipe": recipe.as_dict(),
+        "split": split,
+        "folds": folds,
+        "seed": seed,
+        "trainings": [one.name for one in splits],
+    }
+    _check_plan(out, plan)
+    values = values_of(clouds, split)
+    missing = [number for number in numbers if not (training_folder(out, number) / _OUTCOME).exists()]
+    if missing:
+        examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
+        check_points(examples, recipe)
+    _write_plan(out, plan)
+    with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:
+        bar.update((len(numbers) - len(missing)) * recipe.epochs_run)
+        for number in missing:
+            one, folder = splits[number], training_folder(out, number)
+            folder.mkdir(exist_ok=True)
+            for leftover in folder.glob(".*.part"):  # of one that was killed while it wrote
+                leftover.unlink(missing_ok=True)
+            start = bar.n
+
+            def show(epoch: int, row: dict[str, float], start: int = start, name: str = one.name) -> None:
+                bar.set_description(name)
+                bar.set_postfix_str(f"loss {row['train_loss']:.2f}, test {row['test_accuracy']:.0%}", refresh=False)
+                bar.update(start + epoch - bar.n)
+
+            train, test = examples.of(one.train), examples.of(one.test)
+            network, history = train_network(
+                train, test, recipe, seed=seed, device=device, checkpoint=folder / _CHECKPOINT, on_epoch=show
+            )
+            predicted = predict(network, test, recipe).argmax(axis=1)
+            save_outcome(folder / _OUTCOME, outcome_of(clouds, one, values, truth, predicted, history))
+    return load_study(out)
+
+
+def load_study(folder: Path) -> Study:
+    """Read the plan and what is done; InputError where there is none of it."""
+    plan = _read_plan(folder)
+    names = plan["trainings"]
+    paths = [training_folder(folder, number) / _OUTCOME for number in range(len(names))]
+    outcomes = [load_outcome(path) for path in paths if path.exists()]
+    if not outcomes:
+        raise InputError(f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on")
+    return Study(folder, plan, outcomes)
+
+
+def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple[str, ...]]:
+    """A trained network, to ask about other clouds.
+
+    Parameters
+    ----------
+    folder : path
+        Of the trainings.
+    number : int
+        Of the training, from 1.
+
+    Returns
+    -------
+    network : PointNet
+        Ready for answers, see `rtradar.classify.training.predict`.
+    recipe : Recipe
+        How clouds are drawn and scaled for it.
+    classes : tuple of str
+        Names of what it answers.
+
+    Raises
+    ------
+    InputError
+        Where there is no such training, or its checkpoint cannot be read safely.
+    """
+    plan = _read_plan(folder)
+    recipe, classes = Recipe(**plan["recipe"]), tuple(plan["classes"])
+    path = training_folder(folder, number - 1) / _CHECKPOINT
+    network = PointNet(len(classes), recipe)
+    try:
+        network.load_state_dict(load_checkpoint(path).network)
+    except (RuntimeError, TypeError, AttributeError):
+        raise InputError(f"'{path}' is of another network than '{folder / _PLAN}' says; train anew, in another folder") from None
+    return network.eval(), recipe, classes
+
+
+def classes_of(clouds: Clouds) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Names of the classes in alphabetical order, and the place among them of every cloud, (cloud,)."""
+    names, places = np.unique(clouds.labels, return_inverse=True)
+    if len(names) < 2:
+        raise InputError(f"all {len(clouds)} clouds show the same activity ({', '.join(names)}); it takes two to tell them apart")
+    return tuple(names.tolist()), places.astype(np.int64)
+
+
+def fingerprint(clouds: Clouds) -> str:
+    """Changes when the clouds, their order, their labels or their intervals do."""
+    columns = [clouds.labels, *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed"))]
+    rows = "\n".join("\t".join(map(str, row)) for row in zip(*(column.tolist() for column in columns), strict=True))
+    return hashlib.sha256(rows.encode()).hexdigest()[:16]
+
+
+def training_folder(out: Path, number: int) -> Path:
+    """Where training ``number``, from 0, is kept."""
+    return out / f"training-{number + 1:02d}"
+
+
+def _check_plan(out: Path, plan: dict[str, Any]) -> None:
+    """Raise where the folder holds another plan; where the data lie may change."""
+    path = out / _PLAN
+    if not path.exists():
+        return
+    try:
+        there = json.loads(path.read_text(encoding="utf-8"))
+        other = next((name for name, value in plan.items() if name != "data" and there.get(name) != value), None)
+    except (OSError, ValueError, AttributeError):
+        raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
+    if other is not None:
+        was, now = _difference(there.get(other), plan[other])
+        raise InputError(f"'{out}' holds other trainings ({other}: {was}, not {now}); give another folder (--out)")
+
+
+def _write_plan(out: Path, plan: dict[str, Any]) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+    with atomic_file(out / _PLAN) as file:
+        file.write((json.dumps(plan, indent=1) + "\n").encode())
+
+
+def _read_plan(folder: Path) -> dict[str, Any]:
+    try:
+        plan = json.loads((folder / _PLAN).read_text(encoding="utf-8"))
+        Recipe(**plan["recipe"])
+        return {name: plan[name] for name in _PLAN_KEYS}
+    except OSError as error:
+        raise InputError(f"'{folder}' holds no trainings ({_PLAN}: {error.strerror}); make them with: rtradar train") from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"'{folder / _PLAN}' is damaged; train into another folder") from None
+
+
+def _difference(was: Any, now: Any) -> tuple[Any, Any]:
+    """What is not the same, of dictionaries only the first entry."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        name = next(name for name in {**was, **now} if was.get(name) != now.get(name))
+        return f"{name} {was.get(name)}", f"{now.get(name)}"
+    return was, now

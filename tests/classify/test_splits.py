@@ -1,0 +1,155 @@
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from rtradar.classify.splits import Split, check, chosen, make_splits, moments_of, values_of
+from rtradar.errors import InputError
+
+
+class Table:
+    """Labels and provenance alone."""
+
+    def __init__(self, rows: list[dict[str, Any]]) -> None:
+        self._rows = rows
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        return np.array([row["label"] for row in self._rows])
+
+    def column(self, name: str) -> NDArray[Any]:
+        return np.array([row[name] for row in self._rows])
+
+    def points(self, index: int) -> NDArray[np.float64]:
+        raise AssertionError("a split reads no clouds")
+
+    spatial = points
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> Table:
+    """Recordings of one subject, label and source each, with intervals that may be the same or overlap, seen by several rungs."""
+    rows = []
+    for number in range(draw(st.integers(4, 14))):
+        recording = {
+            "recording": f"recording-{number}",
+            "label": draw(st.sampled_from(["kick", "walk"])),
+            "subject": draw(st.sampled_from("abcd")),
+            "source": draw(st.sampled_from(["synthetic", "recorded"])),
+        }
+        for _ in range(draw(st.integers(1, 4))):
+            interval = {"start_s": draw(st.sampled_from([0.0, 0.5, 1.0, 2.0])), "duration_s": draw(st.sampled_from([0.5, 1.0]))}
+            seen_by = draw(st.lists(st.sampled_from(["analytic", "specular"]), min_size=1, max_size=3))
+            rows += [recording | interval | {"fidelity": fidelity} for fidelity in seen_by]
+    return Table(draw(st.permutations(rows)))
+
+
+@given(
+    table=tables(),
+    scheme=st.sampled_from(["folds", "recording", "subject", "recorded", "across:fidelity"]),
+    folds=st.sampled_from([None, 2, 3]),
+    seed=st.integers(0, 5),
+)
+def test_no_moment_of_a_recording_is_on_both_sides(table: Table, scheme: str, folds: int | None, seed: int) -> None:
+    try:
+        splits = make_splits(table, scheme, folds=folds, seed=seed)
+    except InputError:
+        return  # too few recordings for it, and said so
+    recording, start = table.column("recording"), table.column("start_s")
+    end, kept_apart = start + table.column("duration_s"), {"subject": "subject", "recording": "recording", "recorded": "source"}
+    for split in splits:
+        assert not set(split.train) & set(split.test)
+        for one in split.train:
+            same = split.test[recording[split.test] == recording[one]]
+            assert not ((start[same] < end[one]) & (start[one] < end[same])).any()
+        if scheme in kept_apart:
+            column = table.column(kept_apart[scheme])
+            assert not set(column[split.train]) & set(column[split.test])
+        if scheme == "across:fidelity":
+            assert set(table.column("fidelity")[split.train]) == {split.trained_on}
+            assert not set(recording[split.train]) & set(recording[split.test])
+    if scheme not in ("recorded", "across:fidelity"):
+        assert sorted(np.concatenate([split.test for split in splits]).tolist()) == list(range(len(table)))
+
+
+def test_the_papers_folds_are_stratified(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=100)
+    splits = make_splits(clouds, "folds")
+    assert [len(split.test) for split in splits] == [30] * 10
+    for split in splits:
+        assert set(Counter(clouds.labels[split.test].tolist()).values()) == {10}
+
+
+def test_the_seed_decides(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=20)
+    first, again, other = (make_splits(clouds, "folds", seed=seed) for seed in (1, 1, 2))
+    assert all(np.array_equal(one.test, two.test) for one, two in zip(first, again, strict=True))
+    assert not all(np.array_equal(one.test, two.test) for one, two in zip(first, other, strict=True))
+
+
+def test_across_learns_from_every_value_and_asks_about_all(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=6, views=2)
+    splits = make_splits(clouds, "across:fidelity", folds=3)
+    assert [split.trained_on for split in splits] == ["analytic"] * 3 + ["specular"] * 3
+    fidelity = clouds.column("fidelity")
+    assert all(set(fidelity[split.test]) == {"analytic", "specular"} for split in splits)
+    assert all(np.array_equal(one.test, two.test) for one, two in zip(splits[:3], splits[3:], strict=True))
+    assert set(values_of(clouds, "across:fidelity,scene")) == {"analytic / free-space", "specular / free-space"}
+
+
+def test_intervals_that_overlap_are_one_moment() -> None:
+    rows = [
+        {"recording": name, "start_s": start, "duration_s": 1.0, "label": "walk"}
+        for name, start in [("a", 0.0), ("b", 0.0), ("a", 0.9), ("a", 1.8), ("a", 2.8), ("a", 0.0)]
+    ]
+    moments = moments_of(Table(rows))
+    assert moments[0] == moments[2] == moments[3] == moments[5]
+    assert len({moments[0], moments[1], moments[4]}) == 3
+
+
+def test_a_leak_is_never_handed_out() -> None:
+    split = Split("fold 1", np.array([0, 1]), np.array([2, 3]))
+    labels = np.array(["walk"] * 4)
+    check(split, np.array([0, 1, 2, 3]), labels)
+    with pytest.raises(InputError, match="1 intervals are on both sides, the first is that of cloud 1"):
+        check(split, np.array([0, 2, 2, 3]), labels)
+    with pytest.raises(InputError, match="no training cloud shows kick"):
+        check(split, np.arange(4), np.array(["walk", "walk", "kick", "walk"]))
+    with pytest.raises(InputError, match="no test clouds"):
+        check(Split("fold 1", np.array([0]), np.array([], dtype=np.int64)), np.arange(4), labels)
+
+
+@pytest.mark.parametrize(
+    ("scheme", "folds", "said"),
+    [
+        ("folds", 1, "--folds 1"), ("folds", 999, "--folds 999"), ("people", None, "split 'people' is unknown"),
+        ("across:colour", None, "no column 'colour'"),
+    ],
+)  # fmt: skip
+def test_splits_that_cannot_be_are_refused(made_up: Callable[..., Any], scheme: str, folds: int | None, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        make_splits(made_up(), scheme, folds=folds)
+
+
+def test_one_source_cannot_be_split_by_source() -> None:
+    row = {"recording": "a", "start_s": 0.0, "duration_s": 1.0, "label": "walk", "source": "synthetic"}
+    with pytest.raises(InputError, match="no cloud has source 'recorded'"):
+        make_splits(Table([row]), "recorded")
+
+
+def test_trainings_are_chosen_by_number(made_up: Callable[..., Any]) -> None:
+    splits = make_splits(made_up(), "folds", folds=3)
+    assert chosen(splits, None) == [0, 1, 2]
+    assert chosen(splits, [3, 1, 3]) == [0, 2]
+    with pytest.raises(InputError, match="--fold 4: there are 3"):
+        chosen(splits, [4])
