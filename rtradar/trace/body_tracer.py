@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene
+from rtradar.trace.rays import rays_of
 from rtradar.trace.sightlines import DOUBTFUL, clearances, outline_rays
 from rtradar.trace.unit_sphere import SUBDIVISIONS, UnitSphere
 
@@ -138,8 +139,7 @@ class BodyTracer:
         import drjit as dr
 
         mi = self._mi
-        origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, directions))
-        found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)), coherent=False)
+        found = self._scene.ray_intersect_preliminary(rays_of(mi, starts, directions), coherent=False)
         instance = dr.reinterpret_array(mi.UInt32, found.instance)
         dr.eval(found.t, found.prim_index, found.prim_uv, instance)
         distance = found.t.numpy().astype(np.float64)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.rays import rays_of
 
 _LIFT_OF_PART = 1e-3
 """Of the largest semi-axis: the traced triangles of a part lie up to 0.07 % outside it, and must not stop rays that leave it."""
@@ -73,8 +74,7 @@ def first_hits(
     """Number (ray,) of what vector variants meet first, without meaning where the distance (ray,) is infinite."""
     import drjit as dr
 
-    origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, directions))
-    found = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)), coherent=False)
+    found = scene.ray_intersect_preliminary(rays_of(mi, starts, directions), coherent=False)
     met = dr.reinterpret_array(mi.UInt32, getattr(found, what))
     dr.eval(found.t, met)
     return met.numpy(), found.t.numpy().astype(np.float64)

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.trace.rays import rays_of
+
 _NEAR = 1e-4
 """A hit nearer to the point than this share of the mesh's size is the point: float32 knows no better at shared edges."""
 
@@ -58,8 +60,7 @@ class MeshTracer:
             return distance, np.array([int(hit.prim_index) if hit.is_valid() else -1 for hit in found])
         import drjit as dr
 
-        origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, ways))
-        found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction)), coherent=True)
+        found = self._scene.ray_intersect_preliminary(rays_of(mi, starts, ways), coherent=True)
         dr.eval(found.t, found.prim_index)
         distance = found.t.numpy().astype(np.float64)
         return distance, np.where(np.isfinite(distance), found.prim_index.numpy().astype(np.int64), -1)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.scene import Scene
+from rtradar.trace.rays import rays_of
 
 CLEAR_M = 1e-3
 """Both ends of a leg are drawn in by this, so that a point on a surface is not hidden by that surface: a thousand times what
@@ -89,7 +90,4 @@ class RoomTracer:
                 ray.maxt = limit
                 found.append(bool(self._scene.ray_test(ray)))
             return np.array(found)
-        origin, direction = (np.ascontiguousarray(array.T, dtype=np.float32) for array in (starts, ways))
-        ray = mi.Ray3f(mi.Point3f(origin), mi.Vector3f(direction))
-        ray.maxt = mi.Float(np.ascontiguousarray(reach, dtype=np.float32))
-        return np.asarray(self._scene.ray_test(ray, coherent=False).numpy())
+        return np.asarray(self._scene.ray_test(rays_of(mi, starts, ways, reach), coherent=False).numpy())

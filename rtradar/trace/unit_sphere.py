@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
+from rtradar.trace.rays import rays_of
 
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
 _LEAST_RAYS = 4096
 """Traced at once, with idle ones among them: what Dr.Jit keeps for itself would else grow with the most that ever came."""
-
-_LANES = 16
-"""Of float32 in the widest vectors. Dr.Jit compiles one kernel for rows that begin where a vector may, another for others."""
 
 
 class UnitSphere:
@@ -52,16 +49,8 @@ class UnitSphere:
                 found.append(bool(self._scene.ray_test(ray)))
             return np.array(found)
         count = rays.shape[1]
-        padded = _aligned_zeros(7, max(math.ceil(count / _LANES) * _LANES, _LEAST_RAYS))
+        padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
         padded[:, :count] = rays
         padded[3, count:] = 1  # from the middle, no way at all
-        ray = mi.Ray3f(mi.Point3f(padded[:3]), mi.Vector3f(padded[3:6]))
-        ray.maxt = mi.Float(padded[6])
+        ray = rays_of(mi, padded[:3].T, padded[3:6].T, padded[6])
         return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())[:count]
-
-
-def _aligned_zeros(rows: int, columns: int) -> NDArray[np.float32]:
-    """Zeros (row, column), each row beginning at a multiple of `_LANES` numbers in memory if the columns are such a multiple."""
-    memory = np.zeros(rows * columns + _LANES, dtype=np.float32)
-    first = -(memory.ctypes.data // memory.itemsize) % _LANES
-    return memory[first : first + rows * columns].reshape(rows, columns)

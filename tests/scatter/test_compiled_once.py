@@ -14,7 +14,7 @@ from rtradar.trace.backend import Backend
 RADAR = rt.Radar.preset("paper-12ghz")
 
 
-@pytest.mark.parametrize("fidelity", ["specular", "fresnel"])
+@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
 def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str) -> None:
     if backend.kind == "scalar":
         pytest.skip("the scalar backend has no kernels")
