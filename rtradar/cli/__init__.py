@@ -1,0 +1,69 @@
+"""The command line: ``rtradar doctor``, ``run``, ``compare``, ``dataset``, ``train``, ``evaluate``, ``validate`` and ``bench``.
+
+Each module here adds commands to the parser; what they do stands in the packages that they call, imported on use.
+
+Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
+and how to mend it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import warnings
+from importlib.metadata import version
+from typing import TextIO
+
+from rtradar.cli import captures, checks, classifiers, datasets
+from rtradar.cli.values import OneLineParser, fail
+from rtradar.errors import BackendError, CampaignError, InputError
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line; the exit status is returned.
+
+    Parameters
+    ----------
+    arguments : list of str, optional
+        Instead of those of the process.
+    """
+    warnings.showwarning = _show_warning
+    try:
+        options = _parser().parse_args(arguments)
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    try:
+        status: int = options.command(options)
+    except InputError as error:
+        return fail(2, error)
+    except (BackendError, CampaignError) as error:
+        return fail(1, error)
+    except KeyboardInterrupt:
+        return fail(1, "stopped by the user; nothing was left half-written")
+    except MemoryError as error:
+        return fail(1, f"out of memory ({str(error) or 'no more to be had'}); nothing was left half-written")
+    except BrokenPipeError:
+        return 1
+    return status
+
+
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
+    print(f"rtradar: warning: {message}", file=file or sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = OneLineParser(
+        prog="rtradar", description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds."
+    )
+    parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)
+    for module in (captures, datasets, classifiers, checks):
+        module.add(commands)
+    return parser

@@ -1,0 +1,99 @@
+"""Values on the command line, and JSON for machines."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from rtradar.errors import InputError
+
+if TYPE_CHECKING:
+    Subcommands = argparse._SubParsersAction[argparse.ArgumentParser]  # argparse gives it no public name
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Says what is wrong in one line, as everything else here does."""
+
+    def error(self, message: str) -> NoReturn:
+        """End with status 2."""
+        self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
+
+
+def fail(status: int, why: object) -> int:
+    """Say in one line on stderr what went wrong; the exit status is returned."""
+    print("rtradar: " + " ".join(str(why).split()), file=sys.stderr)
+    return status
+
+
+def check_json_folder(path: Path | None) -> None:
+    """A JSON file that cannot be written is found out before the work, not after it."""
+    if path is not None and not path.resolve().parent.is_dir():
+        raise InputError(f"--json {path}: there is no folder '{path.resolve().parent}'; make it first")
+
+
+def write_json(path: Path, content: dict[str, Any]) -> None:
+    """Write what a command found where ``--json`` asks for it."""
+    try:
+        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
+
+
+def number(text: str) -> float:
+    """Finite."""
+    value = float(text)
+    if not math.isfinite(value):
+        raise ValueError
+    return value
+
+
+def seconds(text: str) -> float:
+    """At least 0 [s]."""
+    value = number(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def decibels(text: str) -> float:
+    """May be inf [dB]."""
+    value = float(text)
+    if math.isnan(value) or value == -math.inf:
+        raise ValueError
+    return value
+
+
+def whole(text: str) -> int:
+    """At least 0."""
+    value = int(text)
+    if value < 0:
+        raise ValueError
+    return value
+
+
+def numbers(text: str) -> list[int]:
+    """At least 0 each, parted by commas."""
+    return [whole(part) for part in text.split(",")]
+
+
+def count(text: str) -> int:
+    """At least 1."""
+    value = int(text)
+    if value < 1:
+        raise ValueError
+    return value
+
+
+for _kind, _name in (
+    (number, "finite number"),
+    (seconds, "number of seconds, not negative"),
+    (decibels, "number of decibels, or inf"),
+    (whole, "whole number, not negative"),
+    (numbers, "list of whole numbers, such as 1,2,3"),
+    (count, "whole number, at least 1"),
+):
+    _kind.__name__ = _name  # argparse says "invalid <name> value"
