@@ -37,7 +37,7 @@ class Study:
     ----------
     folder : path
     plan : dict
-        ``data`` (folder of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and provenance), ``classes``,
+        ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and provenance), ``classes``,
         ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names).
     outcomes : list of Outcome
         Of the trainings that are done, in their order.
@@ -58,7 +58,7 @@ def train_study(
     out: Path,
     recipe: Recipe,
     *,
-    data: str = "",
+    data: Sequence[str] = (),
     split: str = "folds",
     folds: int | None = None,
     seed: int = 0,
@@ -73,8 +73,8 @@ def train_study(
     out : path
         Made if it is not there; a folder of the same plan is taken up where it was left.
     recipe : Recipe
-    data : str
-        Where the clouds are, for the plan.
+    data : sequence of str
+        Folders where the clouds are, for the plan.
     split, folds, seed
         As of `rtradar.classify.splits.make_splits`; the seed is that of the trainings too.
     only : sequence of int, optional
@@ -95,7 +95,7 @@ def train_study(
     numbers = chosen(splits, only)
     names, truth = classes_of(clouds)
     plan = {
-        "data": data,
+        "data": list(data),
         "clouds": len(clouds),
         "fingerprint": fingerprint(clouds),
         "classes": list(names),

@@ -22,7 +22,9 @@ def add(commands: Subcommands) -> None:
 
 
 def _add_train(train: argparse.ArgumentParser) -> None:
-    train.add_argument("data", type=Path, metavar="DIR", help="a folder of clouds, as rtradar dataset build leaves it")
+    train.add_argument(
+        "data", type=Path, nargs="+", metavar="DIR", help="folders of clouds, as rtradar dataset build leaves them"
+    )
     train.add_argument(
         "--out", type=Path, required=True, metavar="OUT", help="folder for the trainings; one that is there is gone on with"
     )
@@ -56,7 +58,9 @@ def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
     evaluate.add_argument(
         "--baselines", action="store_true", help="also simple classifiers, on the clouds and the split of the first"
     )
-    evaluate.add_argument("--data", type=Path, metavar="DIR", help="of --baselines: the clouds (default: where they were)")
+    evaluate.add_argument(
+        "--data", type=Path, nargs="+", metavar="DIR", help="of --baselines: the clouds (default: where they were)"
+    )
     evaluate.add_argument("--out", type=Path, metavar="DIR", help="folder for tables and pictures (default: the first OUT)")
     evaluate.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
@@ -81,10 +85,10 @@ def _train(options: argparse.Namespace) -> int:
     )
     try:
         study = train_study(
-            Collection(options.data),
+            Collection(*options.data),
             options.out,
             recipe,
-            data=str(options.data.resolve()),
+            data=[str(folder.resolve()) for folder in options.data],
             split=options.split,
             folds=options.folds,
             seed=options.seed,
@@ -109,7 +113,7 @@ def _evaluate(options: argparse.Namespace) -> int:
         from rtradar.classify.baselines import judge_baselines
         from rtradar.clouds.collection import Collection
 
-        baselines = judge_baselines(Collection(options.data or studies[0].plan["data"]), studies[0])
+        baselines = judge_baselines(Collection(*(options.data or studies[0].plan["data"])), studies[0])
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
     out = options.out or options.trained[0]

@@ -55,28 +55,34 @@ class Sample:
 
 
 class Collection:
-    """Clouds of a folder; each is read when it is asked for. They stand in the order of their ids.
+    """Clouds of a folder, or of several; each is read when it is asked for. They stand folder by folder, by their ids.
 
     Parameters
     ----------
-    folder : path
-        As `rtradar dataset build` leaves it.
+    *folders : path
+        As `rtradar dataset build` leaves them; at least one.
 
     Raises
     ------
     InputError
-        Where there is none, or samples are missing or damaged.
+        Where there is none, samples are missing or damaged, or one is in two folders.
     """
 
-    def __init__(self, folder: str | Path) -> None:
-        self._folder = Path(folder)
-        self._ids = read_index(self._folder)
-        missing = [identity for identity in self._ids if not sample_path(self._folder, identity).is_file()]
-        if missing:
-            raise InputError(
-                f"collection '{self._folder}': {len(missing)} of {len(self._ids)} samples are missing; "
-                "finish it with: rtradar dataset build"
-            )
+    def __init__(self, *folders: str | Path) -> None:
+        if not folders:
+            raise InputError("no folder of clouds; give at least one that rtradar dataset build made")
+        found = {Path(folder): read_index(Path(folder)) for folder in folders}
+        self._name = ", ".join(f"'{folder}'" for folder in found)
+        self._paths = [sample_path(folder, identity) for folder, ids in found.items() for identity in ids]
+        self._ids = tuple(path.stem for path in self._paths)
+        for folder, ids in found.items():
+            if missing := [identity for identity in ids if not sample_path(folder, identity).is_file()]:
+                raise InputError(
+                    f"collection '{folder}': {len(missing)} of {len(ids)} samples are missing; "
+                    "finish it with: rtradar dataset build"
+                )
+        if len(once := set(self._ids)) < len(self._ids):
+            raise InputError(f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; leave one out")
         self._about = [self._read(index, "about") for index in range(len(self._ids))]
 
     def __len__(self) -> int:
@@ -106,7 +112,7 @@ class Collection:
         """
         if not any(name in about["provenance"] for about in self._about):
             known = sorted({key for about in self._about for key in about["provenance"]})
-            raise InputError(f"collection '{self._folder}': no sample has '{name}'; there are: {', '.join(known)}")
+            raise InputError(f"collection {self._name}: no sample has '{name}'; there are: {', '.join(known)}")
         values = [about["provenance"].get(name) for about in self._about]
         if all(isinstance(value, int | float | str) for value in values):
             return np.array(values)
@@ -135,7 +141,7 @@ class Collection:
         return np.asarray(self._read(index, "spatial"))
 
     def _read(self, index: int, name: str) -> Any:
-        path = sample_path(self._folder, self._ids[index])
+        path = self._paths[index]
         try:
             # Not all of the file: the archive has a checksum of each array, and the comment is the end of the file.
             with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as entry:

@@ -60,6 +60,29 @@ def test_a_column_of_lists_is_one_dimensional(tmp_path: Path) -> None:
     assert Collection(tmp_path).column("place").shape == (2,)
 
 
+def test_folders_are_joined_one_after_the_other(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    other = tmp_path_factory.mktemp("other")
+    write_sample(other, "A", sample(3, start_s=2.0, tempo=1.5), SPATIAL)
+    write_index(other, ["A"])
+    found = Collection(folder, other)
+    assert found.ids == ("a", "b", "c", "A")
+    assert found.column("subject").tolist() == ["s1", "s0", "s2", "s3"]
+    assert found.column("tempo").tolist() == [None, None, None, 1.5]
+    np.testing.assert_array_equal(found.points(3), sample(3).points)
+    with pytest.raises(InputError, match="no sample has 'colour'"):
+        found.column("colour")
+
+
+def test_a_sample_in_two_folders_is_refused(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    other = tmp_path_factory.mktemp("other")
+    write_sample(other, "b", sample(0), SPATIAL)
+    write_index(other, ["b"])
+    with pytest.raises(InputError, match="1 samples are in more than one"):
+        Collection(folder, other)
+    with pytest.raises(InputError, match="at least one"):
+        Collection()
+
+
 def test_nothing_is_read_of_the_clouds_until_it_is_asked_for(folder: Path) -> None:
     found = Collection(folder)
     for path in folder.glob("*.npz"):
