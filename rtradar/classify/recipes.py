@@ -139,7 +139,7 @@ PAPER = Recipe("paper")
 LEAN = Recipe(
     "lean",
     batch=16,
-    epochs=60,
+    epochs=30,
     rate=2e-3,
     schedule="one-cycle",
     weight_decay=1e-2,

@@ -39,7 +39,7 @@ def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument("--folds", type=whole, metavar="N", help="(default: 10; across: 5; fewer where a class has fewer groups)")
     train.add_argument("--fold", type=numbers, metavar="N,M,...", help="only these trainings, from 1 (default: all)")
     train.add_argument("--points", type=whole, metavar="N", help="of each cloud (default: 1000)")
-    train.add_argument("--epochs", type=whole, metavar="N", help="(default: lean 60, paper 200)")
+    train.add_argument("--epochs", type=whole, metavar="N", help="(default: lean 30, paper 200)")
     train.add_argument("--rate", type=number, metavar="X", help="learning rate (default: lean 2e-3, paper 1e-4)")
     train.add_argument("--all-epochs", action="store_true", help="of paper: go on when the halved rate is below 1e-6")
     train.add_argument(
