@@ -58,7 +58,9 @@ def add(commands: Subcommands) -> None:
 
 def _add_capture(run: argparse.ArgumentParser) -> None:
     """What every command that simulates a capture asks for."""
-    run.add_argument("motion", metavar="MOTION", help="an .amc or .bvh file, or synthetic:walk, :kick, :punch, :jumping_jack")
+    run.add_argument(
+        "motion", metavar="MOTION", help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack"
+    )
     run.add_argument("--skeleton", type=Path, metavar="ASF", help="the .asf of an .amc recording")
     run.add_argument(
         "--radar", default="paper-12ghz", metavar="NAME|TOML", help=f"{', '.join(PRESETS)}, or a TOML file (default: paper-12ghz)"

@@ -7,6 +7,7 @@ from pathlib import Path
 from rtradar.errors import InputError
 from rtradar.motion.asf import load_amc, load_skeleton
 from rtradar.motion.bvh import load_bvh
+from rtradar.motion.c3d import load_c3d
 from rtradar.motion.motion import Motion
 
 
@@ -16,11 +17,12 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
     Parameters
     ----------
     path : path
-        ``.amc`` (120 Hz, with its ``skeleton``) or ``.bvh``.
+        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, or ``.c3d`` with the markers of CMU and HDM05.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
     unit_m : float, optional
-        Metres in one length unit of a ``.bvh``, which does not say; found from the person's size where not given.
+        Metres in one length unit of a ``.bvh``, which does not say; found from the person's size where not given. Of a
+        ``.c3d`` that does not say.
 
     Returns
     -------
@@ -45,5 +47,7 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
             raise InputError(f"{file}: a BVH file holds its own skeleton; leave {skeleton} out")
         return load_bvh(file, unit_m)
     if suffix == ".c3d":
-        raise InputError(f"{file}: C3D is not read yet; convert it to BVH or AMC")
-    raise InputError(f"{file}: unknown kind of motion file {suffix!r}; allowed are .amc (with .asf) and .bvh")
+        if skeleton is not None:
+            raise InputError(f"{file}: a C3D file holds markers, from which joints are found; leave {skeleton} out")
+        return load_c3d(file, unit_m)
+    raise InputError(f"{file}: unknown kind of motion file {suffix!r}; allowed are .amc (with .asf), .bvh and .c3d")

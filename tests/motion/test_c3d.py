@@ -1,0 +1,236 @@
+"""C3D files, written by an independent library: what a person's markers say of the joints, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import ezc3d
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtradar.errors import InputError
+from rtradar.motion import load_motion
+from rtradar.motion.c3d import LONGEST_GAP_S, read_markers
+from rtradar.motion.joints import to_nodes
+from rtradar.motion.markers import CENTRES, NEEDED, SHANK_M
+from rtradar.motion.names import NODES
+
+FRAMES, RATE = 90, 120.0
+
+# The set of the HDM05 recordings, in the order of their files; some of it is not needed.
+HDM05 = [
+    *("LFHD", "RFHD", "LBHD", "RBHD", "C7", "T10", "CLAV", "STRN", "RBAC"),
+    *("LSHO", "LUPA", "LELB", "LFRM", "LWRA", "LWRB", "LFIN", "RSHO", "RUPA", "RELB", "RFRM", "RWRA", "RWRB", "RFIN"),
+    *("LFWT", "RFWT", "LBWT", "RBWT", "LTHI", "LKNE", "LSHN", "LANK", "LHEE", "LTOE", "LMT5"),
+    *("RTHI", "RKNE", "RSHN", "RANK", "RHEE", "RTOE", "RMT5"),
+]
+
+# A person at the origin who looks along +x, forearms forward, thumbs up [m]; the left side of what is on both.
+STANDING = {
+    "FHD": (0.10, 0.07, 1.62),
+    "BHD": (-0.08, 0.05, 1.62),
+    "C7": (-0.05, 0.0, 1.45),
+    "CLAV": (0.05, 0.0, 1.45),
+    "T10": (-0.10, 0.0, 1.15),
+    "STRN": (0.10, 0.0, 1.15),
+    "SHO": (0.0, 0.2, 1.42),
+    "ELB": (0.0, 0.2, 1.12),
+    "WRA": (0.28, 0.2, 1.16),
+    "WRB": (0.28, 0.2, 1.08),
+    "FIN": (0.37, 0.2, 1.12),
+    "FWT": (0.12, 0.12, 0.95),
+    "BWT": (-0.12, 0.08, 0.95),
+    "KNE": (0.0, 0.12, 0.08 + SHANK_M),
+    "ANK": (0.0, 0.12, 0.08),
+    "TOE": (0.16, 0.12, 0.08),
+}
+
+# In the world, the directions that are forward, left and up of a segment in this pose.
+UPRIGHT = np.eye(3)
+AXES = {"forearm": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])}  # thumb up, elbow behind
+
+
+def place(name: str) -> np.ndarray:
+    """A marker of the standing person."""
+    if name in STANDING:
+        return np.array(STANDING[name])
+    if name[1:] in STANDING:
+        return np.array(STANDING[name[1:]]) * [1, 1 if name[0] == "L" else -1, 1]
+    return np.array([0.0, 0.0, 1.0])
+
+
+def joint(node: str) -> np.ndarray:
+    """Where the table puts a joint of the standing person."""
+    side = {"l_": "L", "r_": "R"}.get(node[:2], "")
+    centre = CENTRES[node[2:] if side else node]
+    forward, left, up = centre.offset_m
+    axes = AXES.get(centre.segment, UPRIGHT)
+    offset = np.array([forward, -left if side == "R" else left, up]) @ axes
+    return np.mean([place(name.replace("@", side)) for name in centre.markers], axis=0) + offset
+
+
+def moved(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) as the person walks a curve and turns, (frame, n, 3)."""
+    time = np.arange(FRAMES) / RATE
+    cosine, sine = np.cos(0.3 + 1.2 * time), np.sin(0.3 + 1.2 * time)
+    turn = np.zeros((FRAMES, 3, 3))
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = cosine, -sine, sine, cosine, 1
+    return (
+        points @ turn.transpose(0, 2, 1)
+        + np.stack([1.1 * time, 0.2 * np.sin(3 * time), 0.02 * np.cos(9 * time)], axis=1)[:, None]
+    )
+
+
+def write(path: Path, positions_m: np.ndarray, names: list[str] = HDM05, unit: str = "mm", prefix: str = "", **more: Any) -> Path:
+    """A C3D file of positions (frame, marker, 3) [m]; NaN is a marker that was not seen."""
+    file = ezc3d.c3d()
+    file["parameters"]["POINT"]["RATE"]["value"] = [RATE]
+    file["parameters"]["POINT"]["LABELS"]["value"] = tuple(prefix + name for name in names)
+    file["parameters"]["POINT"]["UNITS"]["value"] = (unit,)
+    for name, value in more.items():
+        file.add_parameter("POINT", name, [value])
+    points = np.ones((4, len(names), len(positions_m)))
+    points[:3] = np.moveaxis(positions_m, 2, 0).swapaxes(1, 2) / {"mm": 1e-3, "cm": 1e-2, "m": 1.0}.get(unit, 1.0)
+    file["data"]["points"] = points
+    file.write(str(path))
+    return path
+
+
+@pytest.fixture
+def walk() -> np.ndarray:
+    return moved(np.array([place(name) for name in HDM05]))
+
+
+@pytest.mark.parametrize(("unit", "prefix"), [("mm", ""), ("cm", "male:"), ("m", "")])
+def test_joints_stand_where_the_table_puts_them(tmp_path: Path, walk: np.ndarray, unit: str, prefix: str) -> None:
+    motion = load_motion(write(tmp_path / "walk.c3d", walk, unit=unit, prefix=prefix))
+    assert motion.joints == NODES
+    assert motion.rate_hz == RATE
+    known = moved(np.array([joint(node) for node in NODES]))
+    np.testing.assert_allclose(motion.positions, known, atol=2e-6)  # float32 in the file: 2 m are kept to 1e-7 m
+    assert to_nodes(motion) is motion
+
+
+def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.ndarray) -> None:
+    motion = load_motion(write(tmp_path / "walk.c3d", walk))
+    # He turns by 1.2 rad/s as a whole: every bone's rotation from the first frame on is that turn.
+    half = 0.6 * np.arange(FRAMES) / RATE
+    for j in range(1, len(NODES)):
+        x, y, z, w = motion.rotations[:, j].T
+        x0, y0, z0, w0 = motion.rotations[0, j]
+        turned = np.stack(
+            [-w * x0 + x * w0 - y * z0 + z * y0, -w * y0 + x * z0 + y * w0 - z * x0, -w * z0 - x * y0 + y * x0 + z * w0]
+        )
+        np.testing.assert_allclose(np.abs(turned), [0 * half, 0 * half, np.sin(half)], atol=1e-5)
+
+
+def test_a_file_that_says_y_is_up_is_turned(tmp_path: Path, walk: np.ndarray) -> None:
+    upright = load_motion(write(tmp_path / "z.c3d", walk))
+    # World (x, y, z) = file (z, x, y).
+    turned = load_motion(write(tmp_path / "y.c3d", walk[..., [1, 2, 0]], X_SCREEN="+X", Y_SCREEN="+Y"))
+    np.testing.assert_array_equal(turned.positions, upright.positions)
+    with pytest.raises(InputError, match=r"the head is .* POINT:Y_SCREEN"):
+        load_motion(write(tmp_path / "silent.c3d", walk[..., [1, 2, 0]]))
+    with pytest.raises(InputError, match="POINT:Y_SCREEN is '-Y'"):
+        load_motion(write(tmp_path / "down.c3d", walk, X_SCREEN="+X", Y_SCREEN="-Y"))
+
+
+def test_positions_are_those_that_another_reader_finds(tmp_path: Path, walk: np.ndarray) -> None:
+    walk[20:25, HDM05.index("LKNE")] = np.nan
+    path = write(tmp_path / "walk.c3d", walk)
+    ours = read_markers(path, NEEDED)
+    other = ezc3d.c3d(str(path))
+    labels = other["parameters"]["POINT"]["LABELS"]["value"]
+    theirs = np.stack([other["data"]["points"][:3, labels.index(name)].T for name in NEEDED], axis=1) / 1000
+    np.testing.assert_allclose(ours.positions, theirs, rtol=1e-12)
+    assert np.isnan(ours.positions).any(axis=2).sum() == 5
+
+
+@pytest.mark.parametrize("lost", [np.nan, 0.0])
+def test_short_gaps_are_bridged(tmp_path: Path, walk: np.ndarray, lost: float) -> None:
+    whole = load_motion(write(tmp_path / "whole.c3d", walk))
+    longest = round(LONGEST_GAP_S * RATE)
+    for name, begin in (("LKNE", 30), ("RWRA", 50), ("LTHI", 0)):  # the last is not needed at all
+        walk[begin : begin + longest, HDM05.index(name)] = lost
+    bridged = load_motion(write(tmp_path / "gaps.c3d", walk))
+    # 0.1 s of a turning walk: a cubic spline misses its sines by h^4/384 times 9^4 x 0.02 m, and less than that: 40 um.
+    assert 0 < np.abs(bridged.positions - whole.positions).max() < 40e-6
+
+
+@pytest.mark.parametrize(
+    ("frames", "says"),
+    [
+        ((40, 54), r"marker LKNE is not seen in frames 41 to 54, 0.117 s; gaps up to 0.1 s"),
+        ((0, 3), "1 to 3, at an end"),
+        ((88, 90), "89 to 90, at an end"),
+    ],
+)
+def test_long_gaps_are_refused_by_name(tmp_path: Path, walk: np.ndarray, frames: tuple[int, int], says: str) -> None:
+    walk[slice(*frames), HDM05.index("LKNE")] = np.nan
+    with pytest.raises(InputError, match=says):
+        load_motion(write(tmp_path / "gaps.c3d", walk))
+
+
+def test_what_is_no_person_is_refused(tmp_path: Path, walk: np.ndarray) -> None:
+    with pytest.raises(InputError, match="POINT:UNITS is 'furlong'"):
+        load_motion(write(tmp_path / "a.c3d", walk, unit="furlong"))
+    assert load_motion(write(tmp_path / "b.c3d", walk, unit="furlong"), unit_m=1.0).joints == NODES
+    with pytest.raises(InputError, match="knee and ankle markers are 436 m apart"):
+        load_motion(write(tmp_path / "c.c3d", walk * 1000))
+    with pytest.raises(InputError, match="marker LKNE is missing"):
+        load_motion(write(tmp_path / "d.c3d", walk, [name if name != "LKNE" else "KNEE" for name in HDM05]))
+    with pytest.raises(InputError, match="marker LKNE is there 2 times"):
+        load_motion(write(tmp_path / "e.c3d", walk, [name if name != "LTHI" else "other:LKNE" for name in HDM05]))
+    with pytest.raises(InputError, match="holds markers"):
+        load_motion(tmp_path / "d.c3d", skeleton="x.asf")
+    with pytest.raises(InputError, match="cannot read"):
+        load_motion(tmp_path / "none.c3d")
+    (tmp_path / "folder.c3d").mkdir()
+    with pytest.raises(InputError, match="a directory"):
+        load_motion(tmp_path / "folder.c3d")
+    coinciding = walk.copy()
+    coinciding[7, HDM05.index("RANK")] = coinciding[7, HDM05.index("RTOE")] - [0.0, 0.0, 0.001]
+    assert load_motion(write(tmp_path / "f.c3d", coinciding)).joints == NODES  # the offset of the ankle keeps them apart
+    data = (tmp_path / "b.c3d").read_bytes()
+    (tmp_path / "cut.c3d").write_bytes(data[: len(data) // 2])
+    with pytest.raises(InputError, match=r"ends after \d+ frames where its header promises more"):
+        load_motion(tmp_path / "cut.c3d", unit_m=1.0)
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """Bytes of a good file of few frames."""
+    path = tmp_path_factory.mktemp("c3d") / "good.c3d"
+    return write(path, moved(np.array([place(name) for name in HDM05]))[:4]).read_bytes()
+
+
+@given(data=st.data())
+def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, good: bytes, data: st.DataObject) -> None:
+    kind = data.draw(st.sampled_from(["noise", "headed noise", "cut", "damaged"]))
+    if kind.endswith("noise"):
+        junk = (b"\x02\x50" if kind == "headed noise" else b"") + data.draw(st.binary(max_size=3000))
+    elif kind == "cut":
+        junk = good[: data.draw(st.integers(0, len(good) - 1))]
+    else:
+        changed = bytearray(good)
+        for at, value in data.draw(
+            st.lists(st.tuples(st.integers(0, len(good) - 1), st.integers(0, 255)), min_size=1, max_size=40)
+        ):
+            changed[at] = value
+        junk = bytes(changed)
+    path = tmp_path_factory.getbasetemp() / "junk.c3d"
+    path.write_bytes(junk)
+    refusal = None
+    try:
+        motion = load_motion(path)
+    except InputError as error:
+        refusal = str(error)
+    if refusal is None:
+        assert kind in ("damaged", "cut")  # what was hit said nothing of the markers
+        assert np.isfinite(motion.positions).all()
+    else:
+        assert "\n" not in refusal
+        assert "junk" in refusal
