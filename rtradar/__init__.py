@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from rtradar import classify, process, rcs, signal
+    from rtradar import classify, exchange, process, rcs, signal
     from rtradar.body import Body, Ellipsoids
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, InputError, ValidityWarning
@@ -44,7 +44,7 @@ _HOME = {
     "scattering_length": "scatter",
     "synthetic_motion": "motion",
 }
-_MODULES = ("classify", "process", "rcs", "signal")
+_MODULES = ("classify", "exchange", "process", "rcs", "signal")
 
 __all__ = [
     "BackendError",
@@ -60,6 +60,7 @@ __all__ = [
     "ValidityWarning",
     "classify",
     "compare",
+    "exchange",
     "load_motion",
     "process",
     "rcs",

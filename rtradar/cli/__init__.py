@@ -1,4 +1,4 @@
-"""The command line: ``rtradar doctor``, ``run``, ``compare``, ``dataset``, ``train``, ``evaluate``, ``validate`` and ``bench``.
+"""The command line: ``rtradar run``, ``export``, ``validate`` and all that ``rtradar --help`` lists.
 
 Each module here adds commands to the parser; what they do stands in the packages that they call, imported on use.
 
@@ -14,7 +14,7 @@ import warnings
 from importlib.metadata import version
 from typing import TextIO
 
-from rtradar.cli import captures, checks, classifiers, datasets
+from rtradar.cli import captures, checks, classifiers, datasets, exports
 from rtradar.cli.values import OneLineParser, fail
 from rtradar.errors import BackendError, CampaignError, InputError
 
@@ -64,6 +64,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)
-    for module in (captures, datasets, classifiers, checks):
+    for module in (captures, datasets, classifiers, exports, checks):
         module.add(commands)
     return parser

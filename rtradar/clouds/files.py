@@ -33,7 +33,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     Yields
     ------
     binary file
-        Open for writing, in the same folder under another name.
+        Open for writing and reading, in the same folder under another name.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     # Not by the process alone: on a shared disk another machine may write the same file.
     beside = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
     try:
-        file = open(beside, "wb")  # noqa: SIM115 - closed below, before the file is moved
+        file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
     except OSError as error:
         raise InputError(f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written") from None
     try:

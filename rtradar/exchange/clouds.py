@@ -1,0 +1,152 @@
+"""Point clouds as PLY and PCD, which viewers open, and as the NumPy archives of a run."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds import RDT_AXES, RDT_UNITS, atomic_file
+from rtradar.errors import InputError
+
+_EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
+"""What a spatial cloud tells of its points beside their places."""
+
+_PLY_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4", "double": "<f8",
+}  # fmt: skip
+_MEANING = re.compile(r"(\w+) = (\w+) \[([^\]]*)\]")
+_MOST_HEADER_BYTES = 65536
+
+
+@dataclass(frozen=True)
+class CloudTable:
+    """Points, and what is known of each.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the columns: three coordinates, then the rest.
+    units : tuple of str
+        Theirs; empty where a file does not tell.
+    values : (point, column) float64
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: NDArray[np.float64]
+
+    def _fields(self) -> tuple[str, ...]:
+        """Names in files for viewers, which look for x, y and z."""
+        return ("x", "y", "z", *self.names[3:])
+
+    def _meaning(self) -> str:
+        table = zip(self._fields(), self.names, self.units, strict=True)
+        return ", ".join(f"{field} = {name} [{unit}]" for field, name, unit in table)
+
+
+def write_npz(path: Path, cloud: CloudTable) -> dict[str, Any]:
+    """Write ``points (n, 3)``, ``axes``, ``units``, and each further column by its name, in float64."""
+    extra = {name: cloud.values[:, 3 + k] for k, name in enumerate(cloud.names[3:])}
+    with atomic_file(path) as file:
+        axes, units = np.array(cloud.names[:3]), np.array(cloud.units[:3])
+        np.savez_compressed(file, allow_pickle=False, points=cloud.values[:, :3], axes=axes, units=units, **extra)
+    return {"type": "float64"}
+
+
+def write_ply(path: Path, cloud: CloudTable) -> dict[str, Any]:
+    """Write a binary little-endian PLY, all columns as double; a comment says what they are."""
+    properties = "".join(f"property double {field}\n" for field in cloud._fields())
+    header = (
+        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {cloud._meaning()}\nelement vertex {len(cloud.values)}\n"
+        f"{properties}end_header\n"
+    )
+    with atomic_file(path) as file:
+        file.write(header.encode("ascii"))
+        file.write(cloud.values.astype("<f8").tobytes())
+    return {"type": "float64"}
+
+
+def write_pcd(path: Path, cloud: CloudTable) -> dict[str, Any]:
+    """Write a binary PCD, all columns as float32, for the point types of PCL know no double: 24 bits of each number stay."""
+    count = len(cloud._fields())
+    header = (
+        f"# .PCD v0.7 - Point Cloud Data file format\n# rtradar: {cloud._meaning()}\nVERSION 0.7\n"
+        f"FIELDS {' '.join(cloud._fields())}\nSIZE {' '.join('4' * count)}\nTYPE {' '.join('F' * count)}\n"
+        f"COUNT {' '.join('1' * count)}\nWIDTH {len(cloud.values)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
+        f"POINTS {len(cloud.values)}\nDATA binary\n"
+    )
+    with atomic_file(path) as file:
+        file.write(header.encode("ascii"))
+        file.write(cloud.values.astype("<f4").tobytes())
+    return {"type": "float32"}
+
+
+def read_npz(path: Path) -> CloudTable:
+    """A cloud of a run or a collection; errors of many kinds where it is none."""
+    # Opened here: NumPy leaves a file that is no archive open.
+    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
+        points = np.asarray(archive["points"], dtype=np.float64)
+        known = [name for name in _EXTRA_UNITS if name in archive and archive[name].shape == points.shape[:1]]
+        axes = tuple(map(str, archive["axes"])) if "axes" in archive else RDT_AXES
+        units = tuple(map(str, archive["units"])) if "units" in archive else RDT_UNITS
+        columns = [np.asarray(archive[name], dtype=np.float64) for name in known]
+    if points.ndim != 2 or points.shape[1] != 3 or len(axes) != 3 or len(units) != 3:
+        raise ValueError(f"points have shape {points.shape}")
+    extra_units = tuple(_EXTRA_UNITS[name] for name in known)
+    return CloudTable((*axes, *known), (*units, *extra_units), np.column_stack([points, *columns]))
+
+
+def read_ply(path: Path) -> CloudTable:
+    """The vertices of a binary little-endian PLY; errors of many kinds where it is none."""
+    data = path.read_bytes()
+    head, end, body = data.partition(b"end_header\n")
+    lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
+    if not end or lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
+        raise ValueError("no header of a binary little-endian PLY")
+    elements = [k for k, line in enumerate(lines) if line[:1] == ["element"]]
+    if not elements or lines[elements[0]][1] != "vertex":
+        raise ValueError("its first element is no vertex")
+    own = lines[elements[0] + 1 : elements[1] if len(elements) > 1 else None]
+    fields = [(line[2], _PLY_TYPES[line[1]]) for line in own if line[0] == "property"]
+    return _table(head, fields, int(lines[elements[0]][2]), body)
+
+
+def read_pcd(path: Path) -> CloudTable:
+    """A binary PCD of one number a field; errors of many kinds where it is none."""
+    data = path.read_bytes()
+    head, end, body = data.partition(b"DATA binary\n")
+    lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
+    told = {line[0]: line[1:] for line in lines if len(line) > 1 and not line[0].startswith("#")}
+    if not end or any(count != "1" for count in told.get("COUNT", [])):
+        raise ValueError("no header of a binary PCD with one number a field")
+    letters = {"F": "f", "I": "i", "U": "u"}
+    kinds = [f"<{letters[letter]}{int(size)}" for letter, size in zip(told["TYPE"], told["SIZE"], strict=True)]
+    return _table(head, list(zip(told["FIELDS"], kinds, strict=True)), int(told["POINTS"][0]), body)
+
+
+def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) -> CloudTable:
+    kind = np.dtype(fields)
+    if count < 0 or len(body) < count * kind.itemsize:
+        raise ValueError(f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; it is cut off")
+    rows = np.frombuffer(body, dtype=kind, count=count)
+    order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
+    meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
+    names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)
+    return CloudTable(names, units, np.column_stack([rows[field].astype(np.float64) for field in order]))
+
+
+def checked(cloud: CloudTable, path: Path) -> CloudTable:
+    """The same, if every value is finite.
+
+    Raises
+    ------
+    InputError
+    """
+    if not np.isfinite(cloud.values).all():
+        raise InputError(f"'{path}' holds NaN or infinity; every value of a cloud must be finite")
+    return cloud

@@ -1,0 +1,76 @@
+"""IF samples as whole numbers of 16 bits, I and Q in turn, as radar boards give them; a JSON file beside them says the rest."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rtradar.clouds import atomic_file
+from rtradar.errors import InputError
+from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+
+_LARGEST = 32767
+
+
+def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
+    """Write (chirp, tx, rx, sample, IQ) as little-endian int16, and beside it a JSON file of the same name.
+
+    The largest part of any sample becomes 32767. Rounding moves each part by at most half of ``scale``.
+
+    Raises
+    ------
+    InputError
+        Where a file cannot be written, or a sample is not finite.
+    """
+    beside = path.with_suffix(".json")
+    for file in (path, beside):
+        if file.is_dir():
+            raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
+    peak = 0.0
+    for _, block in recording.blocks("finding the peak"):
+        largest = float(np.abs(block.view(np.float32)).max())
+        if not np.isfinite(largest):
+            raise InputError(f"{recording.name}: a sample is not finite, and has no place in 16 bits; run it again")
+        peak = max(peak, largest)
+    scale = peak / _LARGEST if peak else 1.0
+    about = {
+        "what": "IF samples of rtradar: sample = scale * (I + 1j Q)",
+        "data": path.name,
+        "type": "int16, little-endian",
+        "axes": [*IF_AXES, "iq"],
+        "shape": [*recording.shape, 2],
+        "scale": scale,
+        "unit": IF_UNIT,
+        "quantisation": scale / 2,
+        **scalars(recording.radar),
+        "tx_position_m": recording.radar.tx.tolist(),
+        "rx_position_m": quantities(recording.radar, 1)["rx_position"].values.tolist(),
+        "radar": json.loads(radar_text(recording.radar)),
+    }
+    with atomic_file(beside) as text, atomic_file(path) as raw:
+        text.write((json.dumps(about, indent=1) + "\n").encode("utf-8"))
+        for _, block in recording.blocks("writing"):
+            # In float64: the quotient of two float32 could round to the wrong side of a half.
+            raw.write(np.rint(block.view(np.float32).astype(np.float64) / scale).astype("<i2").tobytes())
+        beside.unlink(missing_ok=True)  # of another cube: never beside this one, wherever the next steps end
+    return {"beside": str(beside), "scale": scale, "quantisation": scale / 2, "type": "int16"}
+
+
+def read_int16(path: Path) -> IfCube:
+    """What `write_int16` wrote, each part to half of ``scale`` and the rounding of float32.
+
+    Raises
+    ------
+    Exception
+        Of many kinds where the files are others; `rtradar.exchange.read_if` makes one line of it.
+    """
+    about = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    shape = tuple(map(int, about["shape"]))
+    whole = np.fromfile(path, dtype="<i2")
+    if len(shape) != 5 or whole.size != np.prod(shape):
+        raise ValueError(f"{whole.size} numbers where the JSON file tells of {shape}")
+    parts = (whole.astype(np.float64) * float(about["scale"])).astype(np.float32)
+    return IfCube(parts.view(np.complex64).reshape(shape[:4]), radar_of(json.dumps(about["radar"])))

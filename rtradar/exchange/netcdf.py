@@ -1,0 +1,72 @@
+"""IF samples as netCDF-4, with their axes, for xarray and whatever else reads that."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rtradar.clouds import atomic_file
+from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+
+_PARTS = ("if_real", "if_imag")
+"""netCDF knows no complex numbers."""
+
+
+def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
+    """Write ``if_real`` and ``if_imag`` (chirp, tx, rx, sample), float32, with coordinates.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written.
+    """
+    shape = recording.shape
+    with atomic_file(path) as raw, h5py.File(raw, "w", libver=("earliest", "v108"), track_order=True) as file:
+        for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
+            axis = file.create_dataset(name, data=np.arange(length))
+            axis.make_scale(name)
+            axis.attrs["units"], axis.attrs["long_name"] = (
+                "1",
+                "0, 1, 2 are x, y, z" if name == "xyz" else f"number of the {name}",
+            )
+        parts = []
+        for name, meaning in zip(_PARTS, ("real (I)", "imaginary (Q)"), strict=True):
+            # A block is a chunk, so that nothing waits in a cache.
+            part = file.create_dataset(name, shape, "<f4", chunks=(recording.step, *shape[1:]), rdcc_nbytes=0)
+            parts.append(_described(file, part, IF_AXES, IF_UNIT, f"{meaning} part of the IF samples"))
+        for name, quantity in quantities(recording.radar, shape[0]).items():
+            data = file.create_dataset(name, data=quantity.values)
+            _described(file, data, quantity.axes, quantity.unit, quantity.meaning)
+        for part in parts:
+            part.attrs["coordinates"] = "chirp_time sample_time"
+        for key, value in scalars(recording.radar).items():
+            file.attrs[key] = value
+        file.attrs["title"], file.attrs["radar"] = recording.name, radar_text(recording.radar)
+        for first, block in recording.blocks("writing"):
+            for part, values in zip(parts, (block.real, block.imag), strict=True):
+                part[first : first + len(block)] = values
+    return {"variables": list(_PARTS), "type": "float32"}
+
+
+def read_netcdf(path: Path) -> IfCube:
+    """What `write_netcdf` wrote, bit by bit.
+
+    Raises
+    ------
+    Exception
+        Of many kinds where the file is another; `rtradar.exchange.read_if` makes one line of it.
+    """
+    with h5py.File(path, "r") as file:
+        samples = np.empty(file[_PARTS[0]].shape, dtype=np.complex64)
+        samples.real, samples.imag = (file[name][:] for name in _PARTS)
+        return IfCube(samples, radar_of(str(file.attrs["radar"])))
+
+
+def _described(file: Any, data: Any, axes: tuple[str, ...], unit: str, meaning: str) -> Any:
+    data.attrs["units"], data.attrs["long_name"] = unit, meaning
+    for number, axis in enumerate(axes):
+        data.dims[number].attach_scale(file[axis])
+    return data

@@ -1,0 +1,175 @@
+"""The IF samples that a run kept, in the order that other tools expect: chirp, Tx, Rx, sample."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+
+IF_AXES = ("chirp", "tx", "rx", "sample")
+"""Axes of a cube: the chirps of each Tx by themselves (a TDM cycle gives one of each), then Tx, Rx and fast time."""
+
+IF_UNIT = "m"
+"""Of the samples: the square of one is a cross-section, spread out by distance."""
+
+
+@dataclass(frozen=True)
+class IfCube:
+    """IF samples read back, and the radar they are of.
+
+    Parameters
+    ----------
+    samples : (chirp, tx, rx, sample) complex64
+        Of a line's Tx the Rx of that line, as `rtradar.Radar.rx_of_tx` says.
+    radar : Radar
+    """
+
+    samples: NDArray[np.complex64]
+    radar: Radar
+
+
+@dataclass(frozen=True)
+class IfRecording:
+    """The samples of a run, still on the disk.
+
+    Parameters
+    ----------
+    radar : Radar
+        Where it stood in the scene.
+    stored : array-like
+        (chirp, rx, sample) complex64, all Tx in turn.
+    name : str
+        For progress bars.
+    """
+
+    radar: Radar
+    stored: Any
+    name: str
+
+    @property
+    def shape(self) -> tuple[int, int, int, int]:
+        """Length of the chirp, tx, rx and sample axes; a TDM cycle that is not whole is left out."""
+        tx = self.radar.n_tx
+        return (self.stored.shape[0] // tx, tx, *self.stored.shape[1:])
+
+    @property
+    def step(self) -> int:
+        """Chirps of each Tx in one block: what lies together on the disk."""
+        return min(max(1, self.stored.chunks[0] // self.radar.n_tx), self.shape[0])
+
+    def blocks(self, doing: str) -> Iterator[tuple[int, NDArray[np.complex64]]]:
+        """First chirp and samples (chirp, tx, rx, sample) of one stretch after the other, with a bar on a terminal."""
+        chirps, tx, rx, samples = self.shape
+        for first in tqdm(range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None):
+            last = min(first + self.step, chirps)
+            part = np.asarray(self.stored[first * tx : last * tx], dtype=np.complex64)
+            yield first, part.reshape(last - first, tx, rx, samples)
+
+
+def open_recording(folder: Path) -> IfRecording:
+    """Samples and radar of a run's folder.
+
+    Raises
+    ------
+    InputError
+        Where there are no samples, or the summary beside them does not fit.
+    """
+    import zarr  # slow to import
+
+    if not (folder / "if.zarr").is_dir():
+        raise InputError(f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if")
+    try:
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        radar = Radar(**summary["parameters"]["radar"])
+    except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
+        raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
+    try:
+        stored = zarr.open_array(folder / "if.zarr", mode="r")
+        shape, kind = stored.shape, np.dtype(stored.dtype)
+    except Exception as error:  # zarr fails in many ways on a damaged folder
+        raise InputError(f"'{folder / 'if.zarr'}' cannot be read ({_short(error)}); run it again") from None
+    fits = len(shape) == 3 and shape[1:] == (radar.n_rx, radar.samples_per_chirp) and shape[0] >= radar.n_tx
+    if not fits or kind != np.complex64:
+        raise InputError(
+            f"'{folder / 'if.zarr'}' holds {kind} {shape}; the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
+            f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
+        )
+    return IfRecording(radar, stored, folder.resolve().name)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What goes with the samples, under the same name in every format.
+
+    Parameters
+    ----------
+    axes : tuple of str
+        Of the values.
+    values : array
+        float64.
+    unit, meaning : str
+    """
+
+    axes: tuple[str, ...]
+    values: NDArray[np.float64]
+    unit: str
+    meaning: str
+
+
+def quantities(radar: Radar, chirps: int) -> dict[str, Quantity]:
+    """Times and places that belong to the axes of a cube of so many chirps of each Tx."""
+    samples = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
+    return {
+        "chirp_time": Quantity(
+            ("chirp", "tx"),
+            radar.chirp_times(chirps * radar.n_tx).reshape(chirps, radar.n_tx),
+            "s",
+            "centre of each chirp since the start of the capture",
+        ),
+        "sample_time": Quantity(("sample",), samples, "s", "time of each sample since the chirp began"),
+        "tx_position": Quantity(("tx", "xyz"), radar.tx, "m", "place of each Tx, world axes"),
+        "rx_position": Quantity(("tx", "rx", "xyz"), radar.rx[radar.rx_of_tx], "m", "place of each Rx that listens to a Tx"),
+    }
+
+
+def scalars(radar: Radar) -> dict[str, float]:
+    """Numbers of the waveform, units in their names."""
+    return {
+        "start_frequency_hz": radar.start_frequency_hz,
+        "bandwidth_hz": radar.bandwidth_hz,
+        "centre_frequency_hz": radar.centre_frequency_hz,
+        "slope_hz_per_s": radar.slope_hz_per_s,
+        "sample_rate_hz": radar.sample_rate_hz,
+        "chirp_duration_s": radar.chirp_duration_s,
+        "cycle_duration_s": radar.cycle_duration_s,
+    }
+
+
+def radar_text(radar: Radar) -> str:
+    """All of a radar as JSON."""
+    return json.dumps(dataclasses.asdict(radar))
+
+
+def radar_of(text: str) -> Radar:
+    """The radar that `radar_text` wrote.
+
+    Raises
+    ------
+    ValueError, TypeError
+        Where the text is of none; an InputError is a ValueError.
+    """
+    return Radar(**json.loads(text))
+
+
+def _short(error: BaseException) -> str:
+    return " ".join(str(error).split())[:100] or type(error).__name__

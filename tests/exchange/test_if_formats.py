@@ -1,0 +1,256 @@
+"""IF samples in every format: read back by us and by others, equal or as far off as is said."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+import xarray
+import zarr
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtradar.cli import main
+from rtradar.errors import InputError
+from rtradar.exchange import IF_FORMATS, export, read_if
+from rtradar.pipeline.timing import forget_peak_memory, give_back_memory, peak_memory_mb
+from rtradar.radar import Radar
+
+RADAR = Radar(
+    name="small",
+    tx_y=2,
+    tx_z=1,
+    rx_y=4,
+    rx_z=4,
+    samples_per_chirp=16,
+    chirp_duration_s=1e-4,
+    frame_duration_s=3e-3,
+    frame_hop_s=1e-3,
+)
+
+CENTRES = (np.arange(30) + 0.5).reshape(10, 3) * 1e-4
+
+
+def make_run(folder: Path, chirps: int, seed: int = 0, chunk: int = 12) -> np.ndarray:
+    """A folder with IF samples and a summary; the samples (chirp, rx, sample) are returned."""
+    random = np.random.default_rng(seed)
+    shape = (chirps, RADAR.n_rx, RADAR.samples_per_chirp)
+    samples = (random.standard_normal((*shape, 2)) * 1e-3).astype(np.float32).view(np.complex64)[..., 0]
+    folder.mkdir(parents=True, exist_ok=True)
+    array = zarr.create_array(folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64")
+    array[:] = samples
+    (folder / "summary.json").write_text(json.dumps({"parameters": {"radar": dataclasses.asdict(RADAR)}}))
+    return samples
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> tuple[Path, np.ndarray]:
+    """A run of 31 chirps, so 10 whole TDM cycles: its folder, and its samples as (chirp, tx, rx, sample)."""
+    samples = make_run(tmp_path / "walk", 31)
+    # Written out by the schedule: chirp m is from Tx m mod 3.
+    cube = np.stack([np.stack([samples[3 * cycle + tx] for tx in range(3)]) for cycle in range(10)])
+    return tmp_path / "walk", cube
+
+
+def test_the_folder_itself_is_read_in_that_order(run: tuple[Path, np.ndarray]) -> None:
+    folder, cube = run
+    read = read_if(folder)
+    np.testing.assert_array_equal(read.samples, cube)
+    assert read.radar == RADAR
+
+
+@pytest.mark.parametrize("suffix", [".mat", ".nc"])
+def test_our_reader_gives_equal_bits(run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str) -> None:
+    folder, cube = run
+    said = export(folder, tmp_path / f"cube{suffix}")
+    assert said["shape"] == [10, 3, 4, 16]
+    read = read_if(tmp_path / f"cube{suffix}")
+    assert read.samples.dtype == np.complex64
+    assert read.samples.tobytes() == cube.tobytes()
+    assert read.radar == RADAR
+
+
+def test_int16_is_off_by_half_of_its_scale_at_most(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    folder, cube = run
+    scale = export(folder, tmp_path / "cube.bin")["scale"]
+    parts, whole = cube.view(np.float32).reshape(*cube.shape, 2).astype(np.float64), np.fromfile(tmp_path / "cube.bin", "<i2")
+    # By the documented layout alone, without our reader.
+    about = json.loads((tmp_path / "cube.json").read_text())
+    assert about["axes"] == ["chirp", "tx", "rx", "sample", "iq"]
+    whole = whole.reshape(about["shape"])
+    assert np.abs(whole).max() == 32767
+    off = np.abs(whole * about["scale"] - parts)
+    assert off.max() <= about["quantisation"] * (1 + 1e-12)
+    assert off.max() > 0.9 * scale / 2  # it is rounded, not kept
+    read = read_if(tmp_path / "cube.bin")
+    assert np.abs(read.samples.view(np.float32).reshape(parts.shape) - parts).max() <= scale / 2 + 2**-24 * np.abs(parts).max()
+    assert read.radar == RADAR
+
+
+def test_silence_stays_silence(tmp_path: Path) -> None:
+    make_run(tmp_path / "quiet", 6)
+    zarr.open_array(tmp_path / "quiet" / "if.zarr", mode="r+")[:] = 0
+    assert export(tmp_path / "quiet", tmp_path / "quiet.bin")["scale"] == 1.0
+    assert not read_if(tmp_path / "quiet.bin").samples.any()
+
+
+@pytest.mark.parametrize("engine", ["h5netcdf", "netcdf4"])
+def test_xarray_opens_netcdf(run: tuple[Path, np.ndarray], tmp_path: Path, engine: str) -> None:
+    if engine == "netcdf4":
+        pytest.importorskip("netCDF4")
+    folder, cube = run
+    export(folder, tmp_path / "cube.nc")
+    with xarray.open_dataset(tmp_path / "cube.nc", engine=engine) as data:
+        assert data.if_real.dims == ("chirp", "tx", "rx", "sample")
+        np.testing.assert_array_equal((data.if_real + 1j * data.if_imag).astype(np.complex64), cube)
+        np.testing.assert_allclose(data.chirp_time, CENTRES, rtol=1e-12)
+        assert "chirp_time" in data.if_real.coords
+        assert data.if_real.attrs["units"] == "m"
+        np.testing.assert_array_equal(data.tx_position, RADAR.tx)
+        np.testing.assert_array_equal(data.rx_position[2], RADAR.rx[4:])  # the z-line listens to the Tx of the z-line
+        assert data.attrs["start_frequency_hz"] == 12e9
+
+
+def test_mat_is_laid_out_as_matlab_does(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    folder, cube = run
+    export(folder, tmp_path / "cube.mat")
+    head = (tmp_path / "cube.mat").read_bytes()[:512]
+    assert head.startswith(b"MATLAB 7.3 MAT-file")
+    assert head[124:128] == b"\x00\x02IM"
+    with h5py.File(tmp_path / "cube.mat") as file:
+        data = file["if_samples"]
+        assert data.attrs["MATLAB_class"] == b"single"
+        assert data.dtype.names == ("real", "imag")
+        np.testing.assert_array_equal(np.transpose(data["real"]), cube.real)
+        assert file["radar/sample_rate_hz"][()].tolist() == [[160_000.0]]
+        assert "".join(map(chr, file["radar/name"][:].ravel())) == "small"
+
+
+@pytest.mark.skipif(
+    not shutil.which("octave-cli"), reason="octave-cli is not installed: nobody else reads .mat of version 7.3 here"
+)
+def test_octave_opens_mat(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    folder, cube = run
+    export(folder, tmp_path / "cube.mat")
+    script = (
+        "s = load('cube.mat'); x = s.if_samples; printf('%d ', size(x)); printf('\\n%s\\n', char(s.radar.name));"
+        "printf('%.17g %.17g %.17g\\n', s.radar.start_frequency_hz, s.chirp_time(2, 3), s.tx_position(3, 1));"
+        "y = permute(x, [4 3 2 1]); f = fopen('back.bin', 'w'); fwrite(f, [real(y(:))'; imag(y(:))'], 'single'); fclose(f);"
+    )
+    # Without a display it complains on leaving; what it printed counts.
+    found = subprocess.run(["octave-cli", "--norc", "--eval", script], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert found.stdout.split("\n")[:2] == ["10 3 4 16 ", "small"], found.stderr
+    assert [float(word) for word in found.stdout.split("\n")[2].split()] == [12e9, CENTRES[1, 2], RADAR.tx[2, 0]]
+    assert (tmp_path / "back.bin").read_bytes() == cube.tobytes()
+
+
+@pytest.mark.parametrize("suffix", IF_FORMATS)
+def test_the_same_samples_give_the_same_file(run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str) -> None:
+    export(run[0], tmp_path / f"cube{suffix}")
+    first = (tmp_path / f"cube{suffix}").read_bytes()
+    export(run[0], tmp_path / f"cube{suffix}")
+    assert (tmp_path / f"cube{suffix}").read_bytes() == first
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
+@pytest.mark.parametrize("suffix", IF_FORMATS)
+def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path, suffix: str) -> None:
+    make_run(tmp_path / "short", 3000, chunk=600)
+    make_run(tmp_path / "long", 90_000, chunk=600)  # 46 MB
+    export(tmp_path / "short", tmp_path / f"short{suffix}")
+    give_back_memory()
+    forget_peak_memory()
+    before = peak_memory_mb()
+    export(tmp_path / "long", tmp_path / f"long{suffix}")
+    # 46 MB are written, in blocks of 0.3 MB; the times of all chirps take 0.7 MB.
+    assert peak_memory_mb() - before < 6
+
+
+def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    folder, _ = run
+    for source, out, says in (
+        (folder, "cube.xyz", "no format has the suffix '.xyz'; allowed: .mat, .nc, .bin for IF samples, .npz, .ply, .pcd"),
+        (folder, "cube.ply", "is a folder; name the cloud in it"),
+        (tmp_path, "cube.mat", "holds no IF samples"),
+        (folder / "summary.json", "cube.mat", "is no folder"),
+        (folder, "nowhere/cube.mat", "cannot write"),
+        (folder, "nowhere/cube.bin", "cannot write"),
+    ):
+        with pytest.raises(InputError, match=says):
+            export(source, tmp_path / out)
+    (tmp_path / "cube.json").mkdir()
+    with pytest.raises(InputError, match="a directory"):
+        export(folder, tmp_path / "cube.bin")
+    for text in ("{", "{}", '{"parameters": {"radar": {"tx_y": -1}}}', '{"parameters": {"radar": {"colour": 1}}}'):
+        (folder / "summary.json").write_text(text)
+        with pytest.raises(InputError, match="tells of no radar"):
+            export(folder, tmp_path / "cube.mat")
+    (folder / "summary.json").write_text('{"parameters": {"radar": {}}}')
+    with pytest.raises(InputError, match="the radar of its summary gives"):
+        export(folder, tmp_path / "cube.mat")
+    (folder / "if.zarr" / "zarr.json").write_text("{")
+    with pytest.raises(InputError, match="cannot be read"):
+        export(folder, tmp_path / "cube.mat")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "walk"]
+
+
+def test_samples_that_are_not_finite_are_refused_as_int16(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    zarr.open_array(run[0] / "if.zarr", mode="r+")[5, 1, 2] = np.nan
+    with pytest.raises(InputError, match="not finite"):
+        export(run[0], tmp_path / "cube.bin")
+    assert not (tmp_path / "cube.bin").exists()
+    export(run[0], tmp_path / "cube.nc")
+    assert np.isnan(read_if(tmp_path / "cube.nc").samples).sum() == 1
+
+
+def test_a_file_of_something_else_is_refused(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    export(run[0], tmp_path / "cube.bin")
+    (tmp_path / "cube.bin").write_bytes(b"\0" * 10)
+    with pytest.raises(InputError, match="5 numbers where the JSON file tells"):
+        read_if(tmp_path / "cube.bin")
+    for name in ("none.mat", "none.nc", "none.bin"):
+        with pytest.raises(InputError, match="cannot read IF samples"):
+            read_if(tmp_path / name)
+    with pytest.raises(InputError, match="is read from"):
+        read_if(tmp_path / "cube.json")
+
+
+@given(data=st.data())
+def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+    suffix = data.draw(st.sampled_from(list(IF_FORMATS)))
+    base = tmp_path_factory.getbasetemp()
+    if not (base / f"good{suffix}").exists():
+        make_run(base / "good", 6, chunk=3)
+        export(base / "good", base / f"good{suffix}")
+        shutil.rmtree(base / "good")
+    victim = base / (f"good{suffix}" if suffix != ".bin" else "good.json")
+    changed = bytearray(victim.read_bytes())
+    for at, value in data.draw(st.lists(st.tuples(st.integers(0, len(changed) - 1), st.integers(0, 255)), max_size=30)):
+        changed[at] = value
+    junk = base / f"junk{suffix}"
+    junk.write_bytes((base / f"good{suffix}").read_bytes())
+    junk.with_suffix(victim.suffix).write_bytes(bytes(changed[: data.draw(st.integers(0, len(changed)))]))
+    refusal = ""
+    try:
+        assert read_if(junk).samples.ndim == 4  # what was hit does not matter to us
+    except InputError as error:
+        refusal = str(error)
+    assert "\n" not in refusal
+
+
+def test_the_command(run: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "cube.bin"
+    assert main(["export", str(run[0]), "--out", str(out), "--json", str(tmp_path / "said.json")]) == 0
+    assert capsys.readouterr().out.startswith("chirp 10, tx 3, rx 4, sample 16; int16; see ")
+    said = json.loads((tmp_path / "said.json").read_text())
+    assert said["axes"] == ["chirp", "tx", "rx", "sample"]
+    assert said["quantisation"] == said["scale"] / 2
+    assert main(["export", str(tmp_path), "--out", str(out)]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
