@@ -4,9 +4,9 @@ The offsets of `rtradar.motion.markers` were set by the first half of the take; 
 frame k. It is the same person: how well the offsets fit others is not measured here. The median of each joint must stay within
 6 cm; beside it stand the distance that 99 % of the frames keep, the largest, the frame of that, and the share beyond 6 cm.
 
-Where it is more, the AMC and the markers disagree by more than any point fixed to a bone explains: the best point that is
-rigid in the axes of three markers of the same segment is reported as "rigid", in the median. The AMC's hands jump (2600 m/s^2
-where the marker on the knuckle has 700), and its wrists and elbows follow.
+Two reasons are measured. How far the AMC's joint is, in the median, from the one point that fits it best in the axes of three
+markers of its segment ("rigid"): no point fixed to the markers can be nearer. And how far the knee is bent, in all frames and
+where it is beyond; and the largest acceleration of a hand in the AMC and of its marker: a jump of one frame.
 
 Then markers are taken away for 0.1 s, one at a time, and bridged: how far off the bridge is. Last, without --quick, both go
 through radar and detector: the distance of their RDT clouds of a kick, in bins, beside that of two samplings of one of them.
@@ -96,6 +96,25 @@ def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     return rows
 
 
+def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
+    half = len(c3d.root_positions) // 2
+    knuckles = read_markers(take, ("LFIN", "RFIN")).positions[half:]
+    rows = []
+    for side, key in enumerate("lr"):
+        hip, knee, ankle, hand = (amc.positions[half:, NODES.index(f"{key}_{name}")] for name in ("hip", "knee", "ankle", "hand"))
+        thigh, shank = (bone / np.linalg.norm(bone, axis=1, keepdims=True) for bone in (knee - hip, ankle - knee))
+        bend = np.degrees(np.arccos(np.clip(np.sum(thigh * shank, axis=1), -1, 1)))
+        beyond = np.linalg.norm(c3d.positions[half:, NODES.index(f"{key}_knee")] - knee, axis=1) * 100 > LIMIT_CM
+        rows.append(reported(f"{key}_knee", "bend, median", "deg", float(np.median(bend))))
+        if beyond.any():
+            rows.append(reported(f"{key}_knee", "bend where beyond, median", "deg", float(np.median(bend[beyond]))))
+        jumps = [
+            float(np.linalg.norm(np.diff(path, 2, axis=0), axis=1).max()) * c3d.rate_hz**2 for path in (hand, knuckles[:, side])
+        ]
+        rows.append(reported(f"{key}_hand", "largest acceleration, AMC beside marker", "m/s^2", jumps[0], reference=jumps[1]))
+    return rows
+
+
 def gaps(take: Path) -> list[Row]:
     seen = read_markers(take, NEEDED)
     longest = round(LONGEST_GAP_S * seen.rate_hz)
@@ -145,7 +164,7 @@ def compare(quick: bool) -> list[Row]:
     take = folder() / "135_02.c3d"
     c3d = rt.load_motion(take)
     amc = to_nodes(rt.load_motion(take.with_suffix(".amc"), skeleton=folder() / "135.asf"))
-    return joints(take, amc, c3d) + gaps(take) + ([] if quick else clouds(amc, c3d))
+    return joints(take, amc, c3d) + reasons(take, amc, c3d) + gaps(take) + ([] if quick else clouds(amc, c3d))
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         Where the file cannot be written.
     """
     shape = recording.shape
+    chunk = (recording.step, *shape[1:])
     with atomic_file(path) as raw, h5py.File(raw, "w", libver=("earliest", "v108"), track_order=True) as file:
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
             axis = file.create_dataset(name, data=np.arange(length))
@@ -34,8 +35,7 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
             )
         parts = []
         for name, meaning in zip(_PARTS, ("real (I)", "imaginary (Q)"), strict=True):
-            # A block is a chunk, so that nothing waits in a cache.
-            part = file.create_dataset(name, shape, "<f4", chunks=(recording.step, *shape[1:]), rdcc_nbytes=0)
+            part = file.create_dataset(name, shape, "<f4", chunks=chunk)
             parts.append(_described(file, part, IF_AXES, IF_UNIT, f"{meaning} part of the IF samples"))
         for name, quantity in quantities(recording.radar, shape[0]).items():
             data = file.create_dataset(name, data=quantity.values)
@@ -47,7 +47,9 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         file.attrs["title"], file.attrs["radar"] = recording.name, radar_text(recording.radar)
         for first, block in recording.blocks("writing"):
             for part, values in zip(parts, (block.real, block.imag), strict=True):
-                part[first : first + len(block)] = values
+                whole = np.zeros(chunk, dtype=np.float32)  # as chunks at the end of an axis are in the file
+                whole[: len(block)] = values
+                part.id.write_direct_chunk((first, 0, 0, 0), whole.tobytes())
     return {"variables": list(_PARTS), "type": "float32"}
 
 

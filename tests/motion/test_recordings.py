@@ -102,6 +102,15 @@ def test_spikes_of_135_02_stay_rigid(mocap: Path) -> None:
     assert (positions.min(axis=(0, 1)) > frames.min(axis=(0, 1)) - 0.05).all()
 
 
+def test_c3d_and_amc_of_one_take_agree(mocap: Path) -> None:
+    c3d = load_motion(mocap / "cmu/135_02.c3d")
+    amc = to_nodes(load_motion(mocap / "cmu/135_02.amc", mocap / "cmu/135.asf"))
+    assert c3d.rate_hz == amc.rate_hz
+    # Of the half that the offsets of the markers were not set by; validation/c3d_take.py tells more.
+    apart = np.linalg.norm(c3d.positions - amc.positions, axis=2)[2601:]
+    assert (np.median(apart, axis=0) < 0.06).all()
+
+
 def test_skeleton_of_another_kind_is_refused(mocap: Path) -> None:
     amc = (mocap / FILES["hdm05 kick"][0]).read_bytes()
     assert b"\r\n" in amc
