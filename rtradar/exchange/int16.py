@@ -13,6 +13,7 @@ from rtradar.errors import InputError
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
 
 _LARGEST = 32767
+_WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"
 
 
 def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
@@ -23,12 +24,14 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
     Raises
     ------
     InputError
-        Where a file cannot be written, or a sample is not finite.
+        Where a file cannot be written, the JSON file is there and of something else, or a sample is not finite.
     """
     beside = path.with_suffix(".json")
     for file in (path, beside):
         if file.is_dir():
             raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
+    if beside.exists() and not _ours(beside):
+        raise InputError(f"'{beside}' is there, and something else; it would be replaced: give another file (--out)")
     peak = 0.0
     for _, block in recording.blocks("finding the peak"):
         largest = float(np.abs(block.view(np.float32)).max())
@@ -37,7 +40,7 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
         peak = max(peak, largest)
     scale = peak / _LARGEST if peak else 1.0
     about = {
-        "what": "IF samples of rtradar: sample = scale * (I + 1j Q)",
+        "what": _WHAT,
         "data": path.name,
         "type": "int16, little-endian",
         "axes": [*IF_AXES, "iq"],
@@ -74,3 +77,10 @@ def read_int16(path: Path) -> IfCube:
         raise ValueError(f"{whole.size} numbers where the JSON file tells of {shape}")
     parts = (whole.astype(np.float64) * float(about["scale"])).astype(np.float32)
     return IfCube(parts.view(np.complex64).reshape(shape[:4]), radar_of(json.dumps(about["radar"])))
+
+
+def _ours(path: Path) -> bool:
+    try:
+        return bool(json.loads(path.read_text(encoding="utf-8"))["what"] == _WHAT)
+    except (OSError, ValueError, KeyError, TypeError):
+        return False

@@ -185,6 +185,10 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, 
     ):
         with pytest.raises(InputError, match=says):
             export(source, tmp_path / out)
+    told = (folder / "summary.json").read_bytes()
+    with pytest.raises(InputError, match="something else"):
+        export(folder, folder / "summary.bin")
+    assert (folder / "summary.json").read_bytes() == told
     (tmp_path / "cube.json").mkdir()
     with pytest.raises(InputError, match="a directory"):
         export(folder, tmp_path / "cube.bin")
