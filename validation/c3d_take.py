@@ -129,11 +129,12 @@ def gaps(take: Path) -> list[Row]:
         filled = bridged(dataclasses.replace(seen, names=(seen.names[k],), positions=lost))
         errors.append(np.linalg.norm(filled[hidden, 0] - seen.positions[hidden, k], axis=1) * 1000)
     off = np.concatenate(errors)
+    worst = seen.names[int(np.argmax([error.max() for error in errors]))]
     label = f"a marker lost for {LONGEST_GAP_S} s"
     return [
         reported(label, "median", "mm", float(np.median(off))),
         reported(label, "99 %", "mm", float(np.quantile(off, 0.99))),
-        reported(label, "largest", "mm", float(off.max())),
+        reported(label, f"largest, {worst}", "mm", float(off.max())),
     ]
 
 
