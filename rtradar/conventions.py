@@ -17,7 +17,7 @@ Phase
     (paper, eq. 9), so it turns with exp(+j 2 pi f tau), tau = length / c. An echo's ``amplitude`` is the conjugate
     of the scattering length with the phase of ``length`` taken out: the received spectrum is
     H(f) = sum conj(amplitude) exp(-j 2 pi f length / c). A conducting sphere of radius a has the specular
-    amplitude +sqrt(pi) a, real; |amplitude|^2 is a radar cross-section [m^2] when spreading is left out.
+    amplitude +sqrt(pi) a, real; ``|amplitude|^2`` is a radar cross-section [m^2] when spreading is left out.
 
 Spreading
     Spherical spreading sits in ``amplitude``, a factor 1 / (R1 R2) normalised to 1 at R1 = R2 = 1 m, so that the

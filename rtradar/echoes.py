@@ -31,6 +31,10 @@ class Echoes:
     ------
     ValueError
         Where the shapes do not fit each other.
+
+    Notes
+    -----
+    Equation :eq:`received-spectrum` of the theory page has what they stand for; :eq:`if-signal` what is made of them.
     """
 
     length: NDArray[np.float64]

@@ -156,6 +156,15 @@ class Radar:
     def preset(cls, name: str) -> Radar:
         """The radar of that name; `PRESETS` lists them.
 
+        Parameters
+        ----------
+        name : str
+            One of `PRESETS`.
+
+        Returns
+        -------
+        Radar
+
         Raises
         ------
         InputError
@@ -168,6 +177,15 @@ class Radar:
     @classmethod
     def load(cls, source: str | Path) -> Radar:
         """A preset by its name, or a TOML file whose keys are the fields of this class.
+
+        Parameters
+        ----------
+        source : str or path
+            Name of a preset, or path of a ``.toml`` file.
+
+        Returns
+        -------
+        Radar
 
         Raises
         ------
@@ -254,17 +272,59 @@ class Radar:
         return self.cycles_per_frame * self.n_tx
 
     def tx_of_chirp(self, chirp: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Transmitter of each chirp, numbered from the start of the capture."""
+        """Transmitter of each chirp, numbered from the start of the capture.
+
+        Parameters
+        ----------
+        chirp : (chirp,) int
+            From 0.
+
+        Returns
+        -------
+        (chirp,) int64
+            Index into `tx`.
+
+        Notes
+        -----
+        Equation :eq:`tdm` of the theory page.
+        """
         return np.asarray(chirp, dtype=np.int64) % self.n_tx
 
     def chirp_times(self, n: int, first: int = 0) -> NDArray[np.float64]:
-        """Centres of ``n`` chirps from chirp ``first`` on, (chirp,) [s] since the start of the capture."""
+        """Centres of ``n`` chirps from chirp ``first`` on, (chirp,) [s] since the start of the capture.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+        first : int
+            Number of the first of them.
+
+        Returns
+        -------
+        (chirp,) float64
+            [s].
+
+        Notes
+        -----
+        Equation :eq:`tdm` of the theory page.
+        """
         return np.asarray((np.arange(first, first + n) + 0.5) * self.chirp_duration_s, dtype=np.float64)
 
     def window_starts(self, n_chirps: int) -> NDArray[np.int64]:
         """First cycle of each processing window in a capture of ``n_chirps``, (window,).
 
         A window starts at the cycle boundary nearest to a multiple of ``frame_hop_s`` and takes ``cycles_per_frame``.
+
+        Parameters
+        ----------
+        n_chirps : int
+            In the capture.
+
+        Returns
+        -------
+        (window,) int64
+            Cycles; none where the capture is shorter than one window.
         """
         last = n_chirps // self.n_tx - self.cycles_per_frame
         if last < 0:
@@ -275,7 +335,18 @@ class Radar:
         return np.unique(starts[starts <= last])
 
     def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
-        """Centres of the windows that start at these cycles, (window,) [s]."""
+        """Centres of the windows that start at these cycles, (window,) [s].
+
+        Parameters
+        ----------
+        starts : (window,) int
+            First cycle of each, as of `window_starts`.
+
+        Returns
+        -------
+        (window,) float64
+            Since the start of the capture [s].
+        """
         return np.asarray((np.asarray(starts) + self.cycles_per_frame / 2) * self.cycle_duration_s, dtype=np.float64)
 
     # -- array ---------------------------------------------------------------------------------------------------
@@ -309,27 +380,42 @@ class Radar:
 
     @property
     def range_bin_m(self) -> float:
-        """Range resolution and width of one range bin, c / 2B [m] (paper, eq. 2)."""
+        """Range resolution and width of one range bin, c / 2B [m] (paper, eq. 2).
+
+        Equation :eq:`range-axis` of the theory page.
+        """
         return SPEED_OF_LIGHT_MPS / (2 * self.bandwidth_hz)
 
     @property
     def max_range_m(self) -> float:
-        """Range whose beat frequency reaches the sample rate, c Fs / 2s [m] (paper, eq. 1)."""
+        """Range whose beat frequency reaches the sample rate, c Fs / 2s [m] (paper, eq. 1).
+
+        Equation :eq:`range-axis` of the theory page.
+        """
         return self.range_bin_m * self.samples_per_chirp
 
     @property
     def max_velocity_mps(self) -> float:
-        """Unambiguous velocity, lambda / (4 cycle) with the centre wavelength [m/s] (paper, eq. 3)."""
+        """Unambiguous velocity, lambda / (4 cycle) with the centre wavelength [m/s] (paper, eq. 3).
+
+        Equation :eq:`doppler-axis` of the theory page.
+        """
         return self.wavelength_m / (4 * self.cycle_duration_s)
 
     @property
     def velocity_bin_mps(self) -> float:
-        """Velocity resolution and width of one Doppler bin, centre wavelength [m/s] (paper, eq. 4)."""
+        """Velocity resolution and width of one Doppler bin, centre wavelength [m/s] (paper, eq. 4).
+
+        Equation :eq:`doppler-axis` of the theory page.
+        """
         return self.wavelength_m / (2 * self.cycles_per_frame * self.cycle_duration_s)
 
     @property
     def max_angle_deg(self) -> float:
-        """Unambiguous azimuth and elevation, asin(lambda / 2d) with the centre wavelength [deg] (paper, eq. 5)."""
+        """Unambiguous azimuth and elevation, asin(lambda / 2d) with the centre wavelength [deg] (paper, eq. 5).
+
+        Equation :eq:`angle-axis` of the theory page.
+        """
         return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
 
     @property
@@ -337,6 +423,8 @@ class Radar:
         """Half-power beam width of one uniform virtual line in its far field at broadside, 0.886 lambda / N d [deg].
 
         Where Tx and Rx spacing do not fill a line without gaps this is that of the line of the same element count.
+
+        Equation :eq:`angle-axis` of the theory page.
         """
         elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
         if elements < 2:
@@ -353,6 +441,17 @@ class Radar:
         return np.arange(self.samples_per_chirp, dtype=np.float64) * self.range_bin_m
 
     def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
-        """Velocity of each Doppler bin (velocity,) [m/s], ascending, zero at index ``n_cycles // 2``."""
+        """Velocity of each Doppler bin (velocity,) [m/s], ascending, zero at index ``n_cycles // 2``.
+
+        Parameters
+        ----------
+        n_cycles : int
+            In the window that is transformed.
+
+        Returns
+        -------
+        (velocity,) float64
+            [m/s].
+        """
         bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
         return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))

@@ -119,6 +119,10 @@ class Body:
         scale : float
             Multiplies the whole subject, its path and its thickness.
 
+        Returns
+        -------
+        Body
+
         Raises
         ------
         InputError
@@ -149,6 +153,15 @@ class Body:
 
         The frames are fixed in the material of the bones: they turn with them and never flip.
 
+        Parameters
+        ----------
+        times : (time,) array_like
+            Since the start of the motion [s].
+
+        Returns
+        -------
+        Poses
+
         Raises
         ------
         InputError
@@ -162,7 +175,17 @@ class Body:
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
-        """The pose at one time [s]."""
+        """The pose at one time [s].
+
+        Parameters
+        ----------
+        time : float
+            Since the start of the motion [s].
+
+        Returns
+        -------
+        Ellipsoids
+        """
         poses = self.at([time])
         return Ellipsoids(poses.centres[0], poses.frames[0], poses.semi_axes)
 

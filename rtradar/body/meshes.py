@@ -18,7 +18,7 @@ MAXIMUM_SUBDIVISIONS = 8
 def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Icosphere of 20 x 4^subdivisions triangles, closed, normals outward, the size of a unit sphere in the mean.
 
-    Its vertices lie a little outside the unit sphere, so that the mean of |x|^2 over its surface is 1.
+    Its vertices lie a little outside the unit sphere, so that the mean of ``|x|^2`` over its surface is 1.
 
     Parameters
     ----------

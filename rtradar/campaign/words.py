@@ -9,7 +9,17 @@ _MOST_SHOWN = 8
 
 
 def in_words(report: Mapping[str, Any]) -> str:
-    """A few lines for people of what `rtradar.campaign.build_dataset` reports."""
+    """A few lines for people of what `rtradar.campaign.build_dataset` reports.
+
+    Parameters
+    ----------
+    report : mapping
+        What `rtradar.campaign.build_dataset` returned.
+
+    Returns
+    -------
+    str
+    """
     lines = [f"{report['samples']} samples"]
     for key, counted in report["by"].items():
         shown = [f"{name} {count}" for name, count in list(counted.items())[:_MOST_SHOWN]]

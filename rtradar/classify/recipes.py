@@ -114,7 +114,19 @@ class Recipe:
         return next((epoch for epoch in range(1, self.epochs) if self._halved(epoch) < self.stop_below), self.epochs)
 
     def rate_at(self, epoch: int, progress: float) -> float:
-        """Learning rate at a step: ``progress``, 0 to 1, is the share of the epoch's steps that are done."""
+        """Learning rate at a step: ``progress``, 0 to 1, is the share of the epoch's steps that are done.
+
+        Parameters
+        ----------
+        epoch : int
+            From 0.
+        progress : float
+            From 0 to 1.
+
+        Returns
+        -------
+        float
+        """
         if self.schedule == "halving":
             return self._halved(epoch)
         done = (epoch + progress) / self.epochs
@@ -125,7 +137,17 @@ class Recipe:
         return self.rate * 0.5 ** (epoch // self.halve_every)
 
     def changed(self, **fields: Any) -> Recipe:
-        """The same with other values; those that are None stay as they are."""
+        """The same with other values; those that are None stay as they are.
+
+        Parameters
+        ----------
+        **fields
+            By the names of the fields.
+
+        Returns
+        -------
+        Recipe
+        """
         return dataclasses.replace(self, **{name: value for name, value in fields.items() if value is not None})
 
     def as_dict(self) -> dict[str, Any]:

@@ -136,7 +136,22 @@ def train_study(
 
 
 def load_study(folder: Path) -> Study:
-    """Read the plan and what is done; InputError where there is none of it."""
+    """Read the plan and what is done; InputError where there is none of it.
+
+    Parameters
+    ----------
+    folder : path
+        Of the trainings.
+
+    Returns
+    -------
+    Study
+
+    Raises
+    ------
+    InputError
+        Where it holds no plan, a damaged one, or no training that is done.
+    """
     plan = _read_plan(folder)
     names = plan["trainings"]
     paths = [training_folder(folder, number) / _OUTCOME for number in range(len(names))]

@@ -51,7 +51,17 @@ class Examples:
     names: tuple[str, ...]
 
     def of(self, indices: NDArray[np.int64]) -> Examples:
-        """Some of them."""
+        """Some of them.
+
+        Parameters
+        ----------
+        indices : (cloud,) int64
+            Which.
+
+        Returns
+        -------
+        chosen : Examples
+        """
         chosen = torch.from_numpy(indices)
         return Examples(self.points[chosen], self.classes[chosen], self.names)
 
@@ -155,7 +165,20 @@ def train_network(
 
 
 def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np.float32]:
-    """Logarithm of the probability of every class, (cloud, class), from the first points of every cloud."""
+    """Logarithm of the probability of every class, (cloud, class), from the first points of every cloud.
+
+    Parameters
+    ----------
+    network : PointNet
+    examples : Examples
+        Their clouds.
+    recipe : Recipe
+        That of the network.
+
+    Returns
+    -------
+    (cloud, class) float32
+    """
     device = next(network.parameters()).device
     network.eval()
     with torch.no_grad():

@@ -105,6 +105,15 @@ class Collection:
     def column(self, name: str) -> NDArray[Any]:
         """One entry of the provenance of each sample, (sample,); None where a sample has it not. No cloud is read.
 
+        Parameters
+        ----------
+        name : str
+            Such as ``subject`` or ``snr_db``.
+
+        Returns
+        -------
+        (sample,) ndarray
+
         Raises
         ------
         InputError
@@ -123,6 +132,15 @@ class Collection:
     def points(self, index: int) -> NDArray[np.float64]:
         """The RDT cloud of a sample (n, 3): time [s], range [m], velocity [m/s].
 
+        Parameters
+        ----------
+        index : int
+            Of the sample.
+
+        Returns
+        -------
+        (n, 3) float64
+
         Raises
         ------
         InputError
@@ -132,6 +150,15 @@ class Collection:
 
     def spatial(self, index: int) -> NDArray[np.float64]:
         """The spatial cloud of the same capture (m, 3): x, y, z [m], in the order of time; m may be 0.
+
+        Parameters
+        ----------
+        index : int
+            Of the sample.
+
+        Returns
+        -------
+        (m, 3) float64
 
         Raises
         ------

@@ -48,7 +48,12 @@ class UniformSample:
         self.n_seen = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Take the next rows, (row, column) float64."""
+        """Take the next rows, (row, column) float64.
+
+        Parameters
+        ----------
+        rows : (row, column) float64
+        """
         keys = np.concatenate([self._keys, self._random.random(len(rows))])
         least = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
         is_new = least >= self._n_rows

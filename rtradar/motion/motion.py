@@ -224,7 +224,17 @@ class Motion:
     # -- the same motion elsewhere ---------------------------------------------------------------------------------
 
     def scaled(self, factor: float) -> Motion:
-        """The same motion by a subject ``factor`` times as tall and as thick, about the world's origin on the floor."""
+        """The same motion by a subject ``factor`` times as tall and as thick, about the world's origin on the floor.
+
+        Parameters
+        ----------
+        factor : float
+            Positive.
+
+        Returns
+        -------
+        Motion
+        """
         if not (math.isfinite(factor) and factor > 0):
             raise InputError(f"Motion.scaled: factor = {factor}; it must be positive")
         return dataclasses.replace(
@@ -232,7 +242,17 @@ class Motion:
         )
 
     def turned(self, yaw_rad: float) -> Motion:
-        """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above."""
+        """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above.
+
+        Parameters
+        ----------
+        yaw_rad : float
+            [rad].
+
+        Returns
+        -------
+        Motion
+        """
         half = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
         x, y, z, w = (self.rotations[..., k] for k in range(4))
         s, c = half[2], half[3]
@@ -240,5 +260,15 @@ class Motion:
         return dataclasses.replace(self, root_positions=rotate(half, self.root_positions), rotations=turned)
 
     def shifted(self, by_m: ArrayLike) -> Motion:
-        """The same motion moved by ``by_m`` (3,) [m]."""
+        """The same motion moved by ``by_m`` (3,) [m].
+
+        Parameters
+        ----------
+        by_m : (3,) array_like
+            World [m].
+
+        Returns
+        -------
+        Motion
+        """
         return dataclasses.replace(self, root_positions=self.root_positions + np.asarray(by_m, dtype=np.float64))

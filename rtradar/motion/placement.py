@@ -99,7 +99,19 @@ def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg
 
 
 def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
-    """An interval inside a recording, with the frames that `place` needs and no more; ``start_s`` becomes time zero."""
+    """An interval inside a recording, with the frames that `place` needs and no more; ``start_s`` becomes time zero.
+
+    Parameters
+    ----------
+    motion : Motion
+    start_s, length_s : float
+        Where the interval begins, and how long it is [s].
+
+    Returns
+    -------
+    Motion
+        With up to `MARGIN_FRAMES` frames more on each side.
+    """
     frames = len(motion.root_positions)
     begin = (start_s - motion.first_frame_s) * motion.rate_hz
     end = begin + length_s * motion.rate_hz

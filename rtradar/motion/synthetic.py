@@ -74,6 +74,11 @@ def synthetic_motion(
     take : int
         Another one of the same subject begins elsewhere in the movement.
 
+    Returns
+    -------
+    Motion
+        Of ``duration_s`` at ``rate_hz``, world axes, not yet placed before a radar.
+
     Raises
     ------
     InputError

@@ -88,6 +88,10 @@ def angle_spectra(
     InputError
         Where the shapes do not fit each other or the radar, a number is not finite, a range lies outside the map, or the radar
         has no line of at least 2 channels.
+
+    Notes
+    -----
+    Equation :eq:`tdm-phase` of the theory page is taken out; elements are added along :eq:`near-field`.
     """
     cells = np.asarray(values)
     lines = virtual_lines(radar)
@@ -148,6 +152,10 @@ def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bo
     InputError
         Where the shape does not fit the radar, a sample is not finite, the cell lies outside the map or holds nothing, or the
         radar has no line of at least 2 channels.
+
+    Notes
+    -----
+    Equations :eq:`near-field` and :eq:`direction` of the theory page.
     """
     virtual_lines(radar)
     samples = np.asarray(x)

@@ -15,7 +15,17 @@ from rtradar.radar import Radar
 
 
 def angle_grid(radar: Radar) -> NDArray[np.float64]:
-    """Azimuths, and elevations, of the maps (angle,) [rad]: uniform within the unambiguous angle."""
+    """Azimuths, and elevations, of the maps (angle,) [rad]: uniform within the unambiguous angle.
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    (angle,) float64
+        [rad].
+    """
     largest = math.radians(radar.max_angle_deg)
     return np.linspace(-largest, largest, len(sine_grid(radar)))
 
@@ -51,6 +61,17 @@ def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     """Power over range and elevation, summed over cells; the z-line tells w = sin(elevation).
 
     Parameters and result as in `range_azimuth`: (range, elevation) float64.
+
+    Parameters
+    ----------
+    spectra : AngleSpectra
+        Of the detected cells of one window.
+    radar : Radar
+
+    Returns
+    -------
+    (range, elevation) float64
+        On the range bins of the radar and on `angle_grid`, in the unit of ``spectra``. No cells: zero.
 
     Raises
     ------

@@ -67,6 +67,10 @@ def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float
     ------
     InputError
         Where an argument is out of its range.
+
+    Notes
+    -----
+    Equations :eq:`os-cfar`, for one look, and :eq:`os-cfar-looks` of the theory page.
     """
     _check_law(n_train, pfa, looks)
     check_quantile(quantile)
@@ -95,6 +99,10 @@ def ca_scale(n_train: int, pfa: float, looks: int = 1) -> float:
     ------
     InputError
         Where an argument is out of its range.
+
+    Notes
+    -----
+    Equation :eq:`ca-cfar` of the theory page.
     """
     _check_law(n_train, pfa, looks)
     # F.isf(pfa, 2L, 2NL) = N (1 - y) / y with y the pfa-quantile of Beta(NL, L); 1 - y by itself, without cancellation.

@@ -233,6 +233,10 @@ def clutter_removal(
     InputError
         Where there is no such method, a setting has no meaning or belongs to another method, or ``mean`` has only one cycle
         to average.
+
+    Notes
+    -----
+    Equation :eq:`clutter-gain` of the theory page has the gains of ``exponential`` and ``mti``.
     """
     if method not in CLUTTER_REMOVALS:
         raise InputError(f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}")

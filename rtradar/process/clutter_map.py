@@ -159,6 +159,10 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     ------
     InputError
         Where an argument is out of its range.
+
+    Notes
+    -----
+    Equation :eq:`clutter-map` of the theory page, for one look; the head of this module has the law for more.
     """
     check_pfa(pfa)
     check_looks(looks)

@@ -79,6 +79,10 @@ def range_doppler(
     InputError
         Where the shape does not fit the radar, not one whole cycle is there, a sample is not finite, or a window has
         the wrong length or no weight.
+
+    Notes
+    -----
+    Equation :eq:`range-doppler` of the theory page.
     """
     samples = _checked_if(x, radar)
     n_cycles = samples.shape[0] // radar.n_tx

@@ -78,6 +78,10 @@ def spectrogram(
     InputError
         Where the shape or type is wrong, a value is not finite, there are fewer cycles than one window takes, or ``tx``,
         ``window`` or ``overlap`` have no meaning.
+
+    Notes
+    -----
+    Equation :eq:`spectrogram` of the theory page.
     """
     hop = _hop(radar, tx, window, overlap)
     values = np.asarray(signals)

@@ -57,6 +57,10 @@ class Line:
             Sine of the direction along the line.
         range_m : float or None
             Range of the point; None for a plane wave.
+
+        Notes
+        -----
+        Equation :eq:`near-field` of the theory page.
         """
         u = np.asarray(sines, dtype=np.float64)[..., None]
         if range_m is None:
@@ -85,7 +89,16 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
 
 
 def measures_angle(radar: Radar) -> bool:
-    """Whether there is a line of at least two channels."""
+    """Whether there is a line of at least two channels.
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    bool
+    """
     return max(radar.tx_y * radar.rx_y, radar.tx_z * radar.rx_z) > 1
 
 

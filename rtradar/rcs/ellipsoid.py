@@ -33,6 +33,8 @@ def ellipsoid(a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: A
     pi a^2 b^2 c^2 / (a^2 sin^2(theta) cos^2(phi) + b^2 sin^2(theta) sin^2(phi) + c^2 cos^2(theta))^2, from Mahafza,
     *Radar Systems Analysis and Design Using MATLAB*, eq. 2.39. Code published with the paper writes c cos^2(theta)
     in the denominator, whose unit does not fit and which is 14 to 26 dB low end-on.
+
+    Equation :eq:`rcs-ellipsoid` of the theory page.
     """
     a, b, c, theta, phi = (np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
     if not all((axis > 0).all() for axis in (a, b, c)):
@@ -64,6 +66,8 @@ def ellipsoid_radii(
     -----
     The inverse of the shape operator on the tangent plane is the Hessian of the support function
     h(n) = sqrt(n . A^2 n); its trace and determinant there are (tr A^2 - n.A^4 n / h^2) / h and (abc)^2 / h^4.
+
+    Equation :eq:`radii` of the theory page.
     """
     a, b, c, theta, phi = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi)))
     squares = np.stack([a, b, c], axis=-1) ** 2

@@ -38,6 +38,8 @@ def sphere(radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", 
     -----
     Mie series of a conductor: Harrington, *Time-Harmonic Electromagnetic Fields*, section 6-9. Physical optics:
     F = jk / sqrt(pi) times the integral of (n.s) exp(2jk s.r) over the lit half.
+
+    Equations :eq:`sphere-go`, :eq:`sphere-po` and :eq:`sphere-mie` of the theory page.
     """
     radius, frequency = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(frequency, np.float64))
     if not ((radius > 0).all() and (frequency > 0).all()):

@@ -45,6 +45,10 @@ def far_field_echo(
         Tx..Rx path over the surface point whose normal is that bisector [m].
     amplitude : (chirp, rx, part) float64
         Square root of the cross-section, over R1 R2 with ``spreading`` [m]; 0 where Tx and Rx are exactly opposite.
+
+    Notes
+    -----
+    Equations :eq:`mirror-point-far` and :eq:`rcs-ellipsoid` of the theory page.
     """
     tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
     shape = (*rx.shape[:2], centres.shape[1])

@@ -69,6 +69,10 @@ def facet_scattering(
         Where ka is above 400 and facets are too few, or ``facets`` does not fit the target.
     BackendError
         Where no backend of that kind works here.
+
+    Notes
+    -----
+    Equations :eq:`po` and :eq:`facet` of the theory page.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     if len(tx) == 0:

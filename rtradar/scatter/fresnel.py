@@ -122,6 +122,10 @@ def fresnel_scattering(
     ------
     InputError
         Where ``shadow_rays`` is out of range.
+
+    Notes
+    -----
+    Equation :eq:`fresnel` of the theory page.
     """
     _check(shadow_rays)
     pairs, parts = len(tx), len(target.semi_axes)

@@ -52,6 +52,10 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
     **dials
         Of the rung, such as ``shadow_rays`` of ``fresnel``; its class documents them.
 
+    Returns
+    -------
+    Rung
+
     Raises
     ------
     InputError

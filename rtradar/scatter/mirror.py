@@ -263,6 +263,10 @@ def mirror(
         Scattering length, over R1 R2 with ``spreading`` [m].
     point : (chirp, rx, part, 3) float64
         World [m]; empty unless ``points``.
+
+    Notes
+    -----
+    Equations :eq:`mirror-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page, times :eq:`polarization`.
     """
     tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
     shape = (*rx.shape[:2], centres.shape[1])

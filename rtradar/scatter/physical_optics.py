@@ -88,6 +88,10 @@ class PhysicalOptics:
     ------
     InputError
         Where a dial is out of range.
+
+    Notes
+    -----
+    Equation :eq:`envelope` of the theory page; :eq:`po` in each anchor.
     """
 
     def __init__(

@@ -28,6 +28,8 @@ def copolar(to_tx: NDArray[np.float64], to_rx: NDArray[np.float64], polarization
     -----
     On that mirror the current of physical optics, 2 n x H, radiates just this times the scalar with the mean of n.s_T and
     n.s_R, once averaged with its own reciprocal.
+
+    Equation :eq:`polarization` of the theory page.
     """
     tx, rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in (to_tx, to_rx))
     normal = tx + rx

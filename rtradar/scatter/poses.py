@@ -31,7 +31,17 @@ class Rung(Protocol):
     variant: str | None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending."""
+        """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending.
+
+        Parameters
+        ----------
+        chirps : (chirp,) int64
+            From 0.
+
+        Returns
+        -------
+        Echoes
+        """
         ...
 
 

@@ -28,7 +28,10 @@ def height(wall: Wall, points: Array, *, back: bool = False) -> Array:
 
 
 def image(wall: Wall, points: Array, *, back: bool = False) -> Array:
-    """Mirror images (..., 3) of points (..., 3) in the plane of the front, or of the back [m]."""
+    """Mirror images (..., 3) of points (..., 3) in the plane of the front, or of the back [m].
+
+    Equation :eq:`image` of the theory page.
+    """
     normal = -wall.normal if back else wall.normal
     return np.asarray(points - 2 * height(wall, points, back=back)[..., None] * normal)
 

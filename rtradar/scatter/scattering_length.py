@@ -73,13 +73,17 @@ def scattering_length(
     Returns
     -------
     (n,) complex128
-        Scattering length [m] for exp(+j omega t): the scattered field times |tx - origin| |rx - origin|, its phase
+        Scattering length [m] for exp(+j omega t): the scattered field times ``|tx - origin| |rx - origin|``, its phase
         relative to the path over the origin of the coordinates. Far away ``|.|^2`` is the radar cross-section.
 
     Raises
     ------
     InputError
         Where shapes do not fit, an antenna is inside the target, or the rung or a dial is unknown.
+
+    Notes
+    -----
+    Equation :eq:`scattering-length` of the theory page.
     """
     tx_array, rx_array, frequencies = _pairs(tx, rx, frequency)
     if polarization not in ("v", "h"):

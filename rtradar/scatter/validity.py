@@ -43,6 +43,10 @@ def warn_of_small_radii(
     -----
     ValidityWarning
         Where such radii, taken where the normal halves the angle between both antennas, give more than 5 % of the power.
+
+    Notes
+    -----
+    Equation :eq:`validity` of the theory page.
     """
     normal = np.zeros((len(tx), *target.centres.shape))
     for antennas in (tx, rx):

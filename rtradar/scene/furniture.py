@@ -94,6 +94,11 @@ class Furniture:
     def triangles(self) -> Triangles:
         """Its mesh as it stands in the scene, world [m].
 
+        Returns
+        -------
+        Triangles
+            Where it stands, world [m].
+
         Raises
         ------
         InputError

@@ -119,7 +119,17 @@ class Material:
         return all(isinstance(band, Conductor) or (isinstance(band, PowerLaw) and band.c >= 1e6) for band in self.bands)
 
     def holds(self, frequency_hz: ArrayLike) -> NDArray[np.bool_]:
-        """Whether its figures are given at these frequencies [Hz], of any shape."""
+        """Whether its figures are given at these frequencies [Hz], of any shape.
+
+        Parameters
+        ----------
+        frequency_hz : (...) array_like
+            [Hz].
+
+        Returns
+        -------
+        (...) bool
+        """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
         inside = [(frequency >= band.low_hz) & (frequency <= band.high_hz) for band in self.bands]
         return np.asarray(np.any(inside, axis=0) & np.isfinite(frequency) & (frequency > 0))
@@ -203,6 +213,14 @@ MATERIALS: Mapping[str, Material] = MappingProxyType(_known())
 def material(name: str) -> Material:
     """The material of that name among `MATERIALS`.
 
+    Parameters
+    ----------
+    name : str
+
+    Returns
+    -------
+    Material
+
     Raises
     ------
     InputError
@@ -228,6 +246,10 @@ def own_material(
         Between which frequencies they hold [Hz].
     a, b, c, d : float
         As in ITU-R P.2040-3.
+
+    Returns
+    -------
+    Material
 
     Raises
     ------

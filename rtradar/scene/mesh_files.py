@@ -46,7 +46,18 @@ class Triangles:
         return self.vertices[self.faces]
 
     def distance_m(self, point: NDArray[np.float64]) -> float:
-        """From a point (3,) to the nearest point of the surface [m]; 0 inside a closed mesh."""
+        """From a point (3,) to the nearest point of the surface [m]; 0 inside a closed mesh.
+
+        Parameters
+        ----------
+        point : (3,) float64
+            World [m].
+
+        Returns
+        -------
+        float
+            [m].
+        """
         from trimesh import triangles  # slow to import
 
         find: Any = triangles.closest_point  # has no types

@@ -78,6 +78,15 @@ class Scene:
     def load(cls, source: str | Path) -> Scene:
         """A scene by its name under ``scenes/``, or a TOML file.
 
+        Parameters
+        ----------
+        source : str or path
+            ``free-space``, ``living-room``, ..., or the path of a ``.toml`` file.
+
+        Returns
+        -------
+        Scene
+
         Raises
         ------
         InputError

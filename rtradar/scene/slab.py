@@ -41,6 +41,10 @@ def reflection(eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarizat
     ------
     InputError
         Where a cosine, a permittivity or the polarisation has no meaning.
+
+    Notes
+    -----
+    Equation :eq:`half-space` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
     return np.where(conducts, _perfect(polarization), _interface(eta, cosine, _inner(eta, cosine), polarization))
@@ -77,6 +81,10 @@ def slab(
     ------
     InputError
         Where a value has no meaning.
+
+    Notes
+    -----
+    Equation :eq:`slab` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
     thickness, frequency = np.asarray(thickness_m, dtype=np.float64), np.asarray(frequency_hz, dtype=np.float64)

@@ -99,7 +99,17 @@ class Wall:
         return bool(abs(self.normal[2]) < _SQUARE and abs(self.corners[:, 2].min()) < 1e-6)
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether points (..., 3) [m] lie inside the slab; shape (...)."""
+        """Whether points (..., 3) [m] lie inside the slab; shape (...).
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            World [m].
+
+        Returns
+        -------
+        (...) bool
+        """
         away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
         inside = np.ones(away.shape[:-1], dtype=bool)
         for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):

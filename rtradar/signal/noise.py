@@ -33,13 +33,38 @@ class Noise:
 
     @classmethod
     def for_snr(cls, signal_power: float, snr_db: float, seed: int = 0) -> Noise:
-        """Noise whose power per sample is ``signal_power`` less ``snr_db``; infinite ``snr_db`` is none."""
+        """Noise whose power per sample is ``signal_power`` less ``snr_db``; infinite ``snr_db`` is none.
+
+        Parameters
+        ----------
+        signal_power : float
+            Of the person's visible echoes: sum of ``|amplitude|^2``, averaged over the capture [m^2].
+        snr_db : float
+            [dB].
+        seed : int
+
+        Returns
+        -------
+        Noise
+
+        Notes
+        -----
+        Equation :eq:`snr` of the theory page.
+        """
         return cls(0.0 if math.isinf(snr_db) and snr_db > 0 else signal_power / 10 ** (snr_db / 10), seed)
 
     def add(self, samples: NDArray[np.complex64], radar: Radar, first_chirp: int) -> None:
         """Add noise in place to a block of chirps ``(chirp, rx, sample)`` that starts at ``first_chirp``, a cycle's first.
 
         Each TDM cycle has a stream of its own, made from the seed and its number.
+
+        Parameters
+        ----------
+        samples : (chirp, rx, sample) complex64
+            Changed in place [m].
+        radar : Radar
+        first_chirp : int
+            Number of the first of them in the capture.
 
         Raises
         ------

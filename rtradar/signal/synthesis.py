@@ -163,7 +163,17 @@ def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, 
 
 
 def in_band(echoes: Echoes, radar: Radar) -> NDArray[np.bool_]:
-    """Which echoes pass the ideal IF low-pass: beat frequency in [0, sample rate), (chirp, rx, echo)."""
+    """Which echoes pass the ideal IF low-pass: beat frequency in [0, sample rate), (chirp, rx, echo).
+
+    Parameters
+    ----------
+    echoes : Echoes
+    radar : Radar
+
+    Returns
+    -------
+    (chirp, rx, echo) bool
+    """
     return _in_band(echoes.length, radar)
 
 
@@ -205,6 +215,10 @@ def synthesize(
     -----
     ValidityWarning
         Where an echo moves by more than a tenth of a range bin inside one chirp, which is taken to stand still there.
+
+    Notes
+    -----
+    Equation :eq:`if-signal` of the theory page, which follows from the sweep, :eq:`chirp`.
     """
     times = np.asarray(times, dtype=np.float64)
     if times.shape != echoes.length.shape[:1]:
