@@ -1,0 +1,67 @@
+"""Write a page for each public package, from its ``__all__``: what is public is said in one place."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+
+PACKAGES = {
+    "rtradar": "What most need",
+    "rtradar.motion": "Motion",
+    "rtradar.body": "Bodies",
+    "rtradar.rcs": "Closed forms",
+    "rtradar.scene": "Scenes",
+    "rtradar.scatter": "The fidelity ladder",
+    "rtradar.signal": "Signals",
+    "rtradar.process": "Processing",
+    "rtradar.clouds": "Point clouds",
+    "rtradar.classify": "Classifiers",
+    "rtradar.campaign": "Data sets",
+    "rtradar.pipeline": "The whole chain",
+    "rtradar.report": "Pictures and pages",
+}
+"""Packages with a page, in the order of the data flow, and their titles."""
+
+
+def public(package: str) -> dict[str, object]:
+    """Everything public of a package but its modules, by name."""
+    module = import_module(package)
+    found = {name: getattr(module, name) for name in module.__all__}
+    return {name: thing for name, thing in found.items() if not isinstance(thing, ModuleType)}
+
+
+def page(package: str) -> str:
+    """The page of a package; what stands on the first page is not told again."""
+    first = {id(thing) for thing in public("rtradar").values()} if package != "rtradar" else set()
+    heading = f"{PACKAGES[package]}: {package}"
+    lines = [heading, "=" * len(heading), "", f".. automodule:: {package}", "   :no-members:", ""]
+    if again := [name for name, thing in public(package).items() if id(thing) in first]:
+        lines += ["Also here: " + ", ".join(f":py:obj:`rtradar.{name}`" for name in again) + ".", ""]
+    for name, thing in public(package).items():
+        if id(thing) in first:
+            continue
+        kind = "class" if inspect.isclass(thing) else "function" if inspect.isroutine(thing) else "data"
+        lines.append(f".. auto{kind}:: {package}.{name}")
+        if kind == "class":
+            lines.append("   :members:")
+        if kind == "data":
+            lines.append("   :no-value:")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def write(folder: Path) -> None:
+    """Write all pages and their list; one that has not changed keeps its date, and is not built anew."""
+    names = [package.replace(".", "_") for package in PACKAGES]
+    title = "Python interface"
+    pages = dict(zip(names, map(page, PACKAGES), strict=True))
+    pages["index"] = "\n".join(
+        [title, "=" * len(title), "", ".. toctree::", "   :maxdepth: 1", "", *(f"   {n}" for n in names), ""]
+    )
+    folder.mkdir(exist_ok=True)
+    for name, text in pages.items():
+        path = folder / f"{name}.rst"
+        if not path.exists() or path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")

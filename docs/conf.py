@@ -1,0 +1,68 @@
+"""How Sphinx builds these pages: ``make docs``, into out/docs, without the internet, warnings being errors."""
+
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import latex2mathml
+from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+import api_pages  # noqa: E402
+
+import rtradar  # noqa: E402
+
+project, author, release = "rtradar", "rtradar developers", rtradar.__version__
+extensions = ["sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
+exclude_patterns = ["gallery"]
+default_role = "py:obj"
+html_theme = "alabaster"
+html_theme_options = {"description": rtradar.__doc__.splitlines()[0], "page_width": "1100px", "fixed_sidebar": True}
+html_math_renderer = "mathml"
+html_show_sourcelink = False
+numpydoc_show_class_members = False
+autodoc_typehints = "none"  # the docstrings say more: shapes, units
+autodoc_member_order = "bysource"
+
+sphinx_gallery_conf = {
+    "examples_dirs": "gallery",
+    "gallery_dirs": "auto_gallery",
+    "filename_pattern": r"[0-9]_\w+\.py",
+    "abort_on_example_error": True,
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "min_reported_time": 3600,
+    "reset_modules": (),
+}
+# Gallery scripts write where they are told; here not into the sources.
+os.environ.setdefault("RTRADAR_GALLERY_OUT", str(HERE.parent / "out" / "gallery"))
+os.environ.pop("RTRADAR_MOCAP", None)
+
+
+def inline_math(page: Any, node: nodes.math) -> None:
+    """A formula within a line, as MathML, which browsers draw without help."""
+    page.body.append(latex2mathml.tex2mathml(node.astext()))
+    raise nodes.SkipNode
+
+
+def displayed_math(page: Any, node: nodes.math_block) -> None:
+    """A formula of its own, with its number and, where it has one, the label that docstrings cite."""
+    page.body.append(page.starttag(node, "div", CLASS="math"))
+    if node["number"]:
+        page.body.append(f'<span class="eqno">({node["number"]}) <small>{node["label"]}</small>')
+        page.add_permalink_ref(node, "Link to this equation")
+        page.body.append("</span>")
+    page.body.append(latex2mathml.tex2mathml(node.astext(), as_block=True) + "</div>\n")
+    raise nodes.SkipNode
+
+
+def setup(app: Sphinx) -> None:
+    """Teach Sphinx MathML, and write the pages of the API from what is public."""
+    app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))
+    app.connect("builder-inited", lambda app: api_pages.write(Path(app.srcdir) / "api"))
