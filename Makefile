@@ -1,6 +1,7 @@
 # make demo    a 3 s synthetic walk by both models, pictures in out/demo/
 # make test    the tests
 # make lint    ruff, mypy and the import contract
+# make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
 # make clean   removes all that these made, .venv/ included
 #
 # All goes into .venv/; another Python: make PYTHON=python3.12 demo
@@ -11,7 +12,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 RUN := $(BIN)/rtradar run synthetic:walk --duration 3
 
-.PHONY: demo test lint clean
+.PHONY: demo test lint docs clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
@@ -28,15 +29,19 @@ lint: $(VENV)/.installed-lint
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: $(VENV)/.installed-docs
+	$(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/docs
+
 clean:
-	rm -rf $(VENV) out build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) out docs/api docs/auto_gallery build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 # A stamp stands for one set of packages; it is renewed when what it was made from changes.
 $(VENV)/.installed: EXTRAS :=
 $(VENV)/.installed-test: EXTRAS := [campaign,learn,test]
 $(VENV)/.installed-lint: EXTRAS := [campaign,learn,test,dev]
-$(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-lint: pyproject.toml constraints.txt | $(BIN)/python
+$(VENV)/.installed-docs: EXTRAS := [campaign,learn,docs]
+$(VENV)/.installed $(VENV)/.installed-test $(VENV)/.installed-lint $(VENV)/.installed-docs: pyproject.toml constraints.txt | $(BIN)/python
 	$(PIP) --editable ".$(EXTRAS)"
 	@touch $@
 
