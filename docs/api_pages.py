@@ -20,6 +20,7 @@ PACKAGES = {
     "rtradar.classify": "Classifiers",
     "rtradar.campaign": "Data sets",
     "rtradar.pipeline": "The whole chain",
+    "rtradar.exchange": "For other tools, and back",
     "rtradar.report": "Pictures and pages",
 }
 """Packages with a page, in the order of the data flow, and their titles."""
