@@ -90,6 +90,15 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
 def read_if(path: str | Path) -> IfCube:
     """IF samples, all at once, from a file that `export` wrote or from the folder of a run.
 
+    Parameters
+    ----------
+    path : path
+        ``.mat``, ``.nc`` or ``.bin``, or the folder of a run that kept its IF samples.
+
+    Returns
+    -------
+    IfCube
+
     Raises
     ------
     InputError
@@ -105,6 +114,15 @@ def read_if(path: str | Path) -> IfCube:
 
 def read_cloud(path: str | Path) -> CloudTable:
     """A cloud of a run, or one that `export` wrote.
+
+    Parameters
+    ----------
+    path : path
+        ``.npz``, ``.ply`` or ``.pcd``.
+
+    Returns
+    -------
+    CloudTable
 
     Raises
     ------
