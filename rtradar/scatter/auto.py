@@ -44,6 +44,16 @@ class Planned(NamedTuple):
     told: Forecast
 
 
+class _Group(NamedTuple):
+    """Echoes of some parts, all modelled in one way, as in `Echoes`; amplitudes may be real."""
+
+    length: NDArray[np.float64]
+    amplitude: NDArray[np.inexact]
+    frequency: NDArray[np.float64]
+    part: NDArray[np.int64]
+    bounces: NDArray[np.int64]
+
+
 class Auto:
     """`auto`: only what the tolerance requires of each part is modelled; where the way changes, echoes are faded over.
 
@@ -104,15 +114,24 @@ class Auto:
         if not found:
             # Nobody is seen: one part stands for all, with nothing to return.
             found.append((self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1))))
-        frequency = max((echoes.frequency for echoes, _ in found), key=len)
-        amplitudes = [_at_nodes(echoes, frequency) * weight[:, None] for echoes, weight in found]
+        frequency = max((group.frequency for group, _ in found), key=len)
+        part = np.concatenate([group.part for group, _ in found])
+        # Filled in place: to make each group complex and join them afterwards would cost more than the closed forms.
+        length = np.empty((*found[0][0].length.shape[:2], len(part)))
+        amplitude = np.empty((len(frequency), *length.shape), dtype=np.complex128)
+        begin = 0
+        for group, weight in found:
+            own = slice(begin, begin + len(group.part))
+            length[..., own] = group.length
+            np.multiply(_at_nodes(group, frequency), weight[:, None], out=amplitude[..., own])
+            begin = own.stop
         return Echoes(
-            length=np.concatenate([echoes.length for echoes, _ in found], axis=2),
-            amplitude=np.concatenate(amplitudes, axis=3),
+            length=length,
+            amplitude=amplitude,
             frequency=frequency,
             tx=at.tx_index,
-            part=np.concatenate([echoes.part for echoes, _ in found]),
-            bounces=np.concatenate([echoes.bounces for echoes, _ in found]),
+            part=part,
+            bounces=np.concatenate([group.bounces for group, _ in found]),
         )
 
     def account(self) -> dict[str, Any]:
@@ -152,16 +171,14 @@ class Auto:
         interval = chirps // self._step
         share = (chirps - interval * self._step) / self._step
         share = (share**2 * (3 - 2 * share))[:, None]
-        rows = np.arange(len(chirps))[:, None]
         weights = np.zeros((len(WAYS), len(chirps), len(parts)))
         cut = np.zeros(len(parts), dtype=bool)
         for end, weight in ((interval, 1 - share), (interval + 1, share)):
-            ways = np.empty((len(chirps), len(parts)), dtype=np.int64)
             for instant in np.unique(end):
                 planned, row = self._plan(int(instant))
-                ways[end == instant] = planned.chosen[row]
+                here = np.flatnonzero(end == instant)
+                weights[planned.chosen[row], here[:, None], parts] += weight[here]
                 cut |= ~planned.told.in_view[row]
-            np.add.at(weights, (ways, rows, parts), np.broadcast_to(weight, ways.shape))
         weights[LEFT_OUT] = 0
         return weights, cut
 
@@ -189,38 +206,26 @@ class Auto:
 
     def _by(
         self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]
-    ) -> Echoes:
+    ) -> _Group:
         if way >= PHYSICAL_OPTICS:
             echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(chirps)
-            return Echoes(
-                length=echoes.length[..., parts],
-                amplitude=echoes.amplitude[..., parts],
-                frequency=echoes.frequency,
-                tx=echoes.tx,
-                part=echoes.part[parts],
-                bounces=echoes.bounces[parts],
+            return _Group(
+                echoes.length[..., parts], echoes.amplitude[..., parts], echoes.frequency, echoes.part[parts], echoes.bounces[parts]
             )
         poses = (at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
         frequency = np.array([self._radar.centre_frequency_hz])
+        values: NDArray[np.inexact]
         if way == ANALYTIC:
-            length, amplitude = far_field_echo(*poses, spreading=self._spreading)
-            values = amplitude.astype(np.complex128)[None]
+            length, values = far_field_echo(*poses, spreading=self._spreading)
         else:
-            length, amplitude, _ = mirror(*poses, polarization=self._radar.polarization, spreading=self._spreading)
-            values = amplitude.astype(np.complex128)[None]
-            if cut[parts].any() and way == SPECULAR:
-                values = values * self._mirror_points.at(chirps)[0][..., parts]
-            elif way == FRESNEL and cut[parts].any():
-                frequency = sweep_nodes(self._radar)
-                values = values * self._zones.at(chirps)[..., parts].conj()
-        return Echoes(
-            length=length,
-            amplitude=values,
-            frequency=frequency,
-            tx=at.tx_index,
-            part=parts,
-            bounces=np.ones(len(parts), dtype=np.int64),
-        )
+            length, values, _ = mirror(*poses, polarization=self._radar.polarization, spreading=self._spreading)
+        values = values[None]
+        if way == SPECULAR and cut[parts].any():
+            values = values * self._mirror_points.at(chirps)[0][..., parts]
+        elif way == FRESNEL and cut[parts].any():
+            frequency = sweep_nodes(self._radar)
+            values = values * self._zones.at(chirps)[..., parts].conj()
+        return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
 
     @cached_property
     def _mirror_points(self) -> MirrorVisibility:
@@ -245,7 +250,7 @@ class Auto:
         return rung
 
 
-def _at_nodes(echoes: Echoes, frequency: NDArray[np.float64]) -> NDArray[np.complexfloating]:
+def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:
     """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through their own nodes."""
     if len(echoes.frequency) == 1:
         return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
