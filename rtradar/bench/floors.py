@@ -1,7 +1,7 @@
 """The least that each stage of a run could take, from the work it must do and what this machine was just measured to do.
 
 A floor counts what a stage cannot avoid: bytes that it must read and write once, at the rate of a copy by all cores; FFTs, by
-all cores in blocks that stay in the cache; normal deviates; multiply-adds, at the rate of a matrix product. The largest of
+all cores in blocks that stay in the cache; random words; multiply-adds, at the rate of a matrix product. The largest of
 these is the floor, as if all else went on beside it. Stages whose work cannot be told from the size of a run have none.
 """
 
@@ -26,8 +26,8 @@ class Rates:
     ----------
     copied_bytes : float
         Read and written, in a copy much larger than the caches.
-    normals : float
-        float32 normal deviates drawn.
+    random_words : float
+        64-bit random words drawn.
     multiply_adds : float
         float64, in a matrix product.
     range_ffts, doppler_ffts, spectrogram_ffts, angle_ffts : float
@@ -36,7 +36,7 @@ class Rates:
     """
 
     copied_bytes: float
-    normals: float
+    random_words: float
     multiply_adds: float
     range_ffts: float
     doppler_ffts: float
@@ -142,7 +142,7 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
         ELSEWHERE: Floor(copied(2 * _SAMPLE * samples), "spectra kept for the windows"),
         "scatter": Floor(copied(_ECHO * echoes), "lengths and amplitudes written"),
         "signal": Floor(tones, "four multiply-adds an echo and sample, or samples written"),
-        "noise": Floor(max(2 * samples / rates.normals, copied(2 * _SAMPLE * samples)), "two normals a sample"),
+        "noise": Floor(max(samples / rates.random_words, copied(2 * _SAMPLE * samples)), "a random word a sample"),
         "range": Floor(
             max(samples / work.samples / rates.range_ffts, copied(2 * _SAMPLE * samples)), "an FFT a chirp and receiver"
         ),

@@ -74,8 +74,8 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
 def _rates(rates: dict[str, Any]) -> str:
     own = next(iter(rates.values()))
     return (
-        f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, {own['normals'] / 1e6:.0f} million normals, "
-        f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
+        f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, {own['random_words'] / 1e6:.0f} million "
+        f"random words, {own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
     )
 
 

@@ -210,7 +210,11 @@ class Auto:
         if way >= PHYSICAL_OPTICS:
             echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(chirps)
             return _Group(
-                echoes.length[..., parts], echoes.amplitude[..., parts], echoes.frequency, echoes.part[parts], echoes.bounces[parts]
+                echoes.length[..., parts],
+                echoes.amplitude[..., parts],
+                echoes.frequency,
+                echoes.part[parts],
+                echoes.bounces[parts],
             )
         poses = (at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
         frequency = np.array([self._radar.centre_frequency_hz])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import numpy as np
@@ -10,7 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
+from scipy import stats
 
+import rtradar.threads
 from rtradar.radar import Radar
 from rtradar.signal import Noise
 
@@ -43,12 +46,32 @@ def test_circular_and_gaussian(plenty: NDArray[np.complex64]) -> None:
     assert np.mean(np.abs(plenty.astype(complex)) ** 4) == pytest.approx(2, abs=spread * math.sqrt(20))
 
 
+def test_both_parts_are_normal_and_the_phase_is_even(plenty: NDArray[np.complex64]) -> None:
+    deviation = math.sqrt(0.5)
+    for values in (plenty.real, plenty.imag):
+        assert stats.kstest(values.ravel()[::3], stats.norm(scale=deviation).cdf).pvalue > 1e-4
+    # |n|^2 is exponential, its phase evenly spread, and neither tells of the other.
+    power, turns = np.abs(plenty.ravel()) ** 2, np.angle(plenty.ravel()) / (2 * np.pi) + 0.5
+    assert stats.kstest(power[::3], stats.expon.cdf).pvalue > 1e-4
+    assert stats.kstest(turns[::3], stats.uniform.cdf).pvalue > 1e-4
+    assert stats.chi2_contingency(np.histogram2d(np.exp(-power), turns, bins=16)[0]).pvalue > 1e-4
+
+
+@pytest.mark.parametrize("deviations", [3.0, 4.0, 4.5])
+def test_the_tails_are_those_of_a_normal(plenty: NDArray[np.complex64], deviations: float) -> None:
+    values = np.abs(np.concatenate([plenty.real.ravel(), plenty.imag.ravel()])) * math.sqrt(2)
+    expected = values.size * math.erfc(deviations / math.sqrt(2))
+    assert abs(np.count_nonzero(values > deviations) - expected) < 5 * math.sqrt(expected)
+
+
 @pytest.mark.parametrize("lag", [(0, 0, 1), (0, 0, 7), (0, 1, 0), (1, 0, 0), (12, 0, 0), (1, 1, 1)])
 def test_white(plenty: NDArray[np.complex64], lag: tuple[int, int, int]) -> None:
     # 12 chirps is one cycle: the next one's stream.
     early = plenty[tuple(slice(None, -k or None) for k in lag)]
     late = plenty[tuple(slice(k, None) for k in lag)]
     assert abs(np.mean(late * early.conj())) < 5 / math.sqrt(early.size)
+    # Nor do powers know of each other, whose deviation is 1.
+    assert abs(np.mean((np.abs(late) ** 2 - 1) * (np.abs(early) ** 2 - 1))) < 5 / math.sqrt(early.size)
 
 
 @given(cuts=st.lists(st.integers(0, 10), max_size=4), end=st.integers(1, 32))
@@ -73,6 +96,22 @@ def test_seed() -> None:
     np.testing.assert_array_equal(noise(1.0, SMALL, 30, seed=5), noise(1.0, SMALL, 30, seed=5))
     ours, other = noise(1.0, LOW, 48, seed=5), noise(1.0, LOW, 48, seed=6)
     assert abs(np.mean(ours * other.conj())) < 5 / math.sqrt(ours.size)
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+    usual = noise(1.0, SMALL, 300)
+    with ThreadPoolExecutor(threads) as pool:
+        monkeypatch.setattr(rtradar.threads, "_pool", lambda: pool)
+        np.testing.assert_array_equal(noise(1.0, SMALL, 300), usual)
+
+
+def test_it_is_the_transform_of_its_bits() -> None:
+    cycle = noise(1.0, SMALL, SMALL.n_tx, seed=3)
+    bits = np.random.SFC64([3, 0]).random_raw(cycle.size).reshape(cycle.shape)
+    u, turns = ((bits >> 33) + 0.5) / 2**31, bits.astype(np.uint32).view(np.int32) / 2.0**32
+    # float32 logarithm, sine and cosine: 1e-7 each, of radii up to 5.
+    np.testing.assert_allclose(cycle, np.sqrt(-np.log(u)) * np.exp(2j * np.pi * turns), atol=2e-6)
 
 
 def test_power_scales_the_same_noise() -> None:
