@@ -82,16 +82,17 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
     _bundle(targets, own, counts, middles[:, 1], reach[:, 1])
     near = np.zeros((parts + 1, parts), dtype=np.bool_)
     for part in range(parts + 1):
-        a, way = middles[part, 0], middles[part, 1] - middles[part, 0]
+        a, b = middles[part, 0], middles[part, 1]
+        way0, way1, way2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
         first, last = math.sqrt(reach[part, 0]), math.sqrt(reach[part, 1])
-        length = math.sqrt(way @ way)
+        span = way0 * way0 + way1 * way1 + way2 * way2
+        length = math.sqrt(span)
         for other in range(parts):
             if other != part and counts[part] > 0:
-                gap = centres[other] - a
-                share = min(1.0, max(0.0, (gap @ way) / max(way @ way, 1e-300)))
-                square = 0.0
-                for i in range(3):
-                    square += (gap[i] - share * way[i]) ** 2
+                c = centres[other]
+                gap0, gap1, gap2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+                share = min(1.0, max(0.0, (gap0 * way0 + gap1 * way1 + gap2 * way2) / max(span, 1e-300)))
+                square = (gap0 - share * way0) ** 2 + (gap1 - share * way1) ** 2 + (gap2 - share * way2) ** 2
                 # The bundle of lines narrows from one end to the other; as wide as where it is before this part.
                 before = max(0.0, share - _NEAR * longest[other] / max(length, 1e-300))
                 wide = max(first + before * (last - first), last) if first > last else last
