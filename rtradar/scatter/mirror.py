@@ -19,8 +19,10 @@ import math
 from typing import Literal
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
+
+from rtradar.threads import in_threads
 
 _MAX_STEPS = 60
 # A last Newton step below this share of the smallest semi-axis leaves 1e-7 in amplitude and, squared, nothing in length.
@@ -177,12 +179,15 @@ def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ign
         out[2, i], out[3, i], out[4, i] = lanes[0, i], lanes[1, i], lanes[2, i]
 
 
-def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point):  # type: ignore[no-untyped-def]
-    chirps, receivers = rx.shape[:2]
-    parts = centres.shape[1]
-    for chirp in prange(chirps):
-        one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
-        local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
+@njit(cache=True, nogil=True, error_model="numpy")
+def _mirror(  # type: ignore[no-untyped-def]
+    begin, end, tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point
+):
+    """Fill length, amplitude and, unless empty, point for the chirps from begin to end."""
+    receivers, parts = rx.shape[1], centres.shape[1]
+    one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
+    local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
+    for chirp in range(begin, end):
         for part in range(parts):
             frame, centre, axes = frames[chirp, part], centres[chirp, part], semi_axes[part]
             for i in range(3):
@@ -197,7 +202,9 @@ def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, le
             if math.isnan(guess[0]):
                 # From cold: the others begin where the first has it.
                 _solve(local_t, local_r[:, 0], axes, up, horizontal, spreading, guess, one)
-                guess[:] = one[2:]
+                # One by one: to assign a slice brings seconds of compiling, for the text of an error it could raise.
+                for i in range(3):
+                    guess[i] = one[2 + i]
             for first in range(0, receivers, _LANES):
                 some = slice(first, min(first + _LANES, receivers))
                 _in_lanes(local_t, local_r[:, some], axes, up, horizontal, spreading, guess, out[:, some])
@@ -216,10 +223,8 @@ def _mirror(tx, rx, centres, frames, semi_axes, start, horizontal, spreading, le
                         )
 
 
-_mirror_parallel = njit(cache=True, error_model="numpy", parallel=True)(_mirror)
-_mirror_serial = njit(cache=True, error_model="numpy")(_mirror)
-_PARALLEL_CHIRPS = 64
-"""Below this many chirps waking threads costs more than the work, all the more while Mitsuba's own are awake."""
+_CHIRPS_A_THREAD = 64
+"""For fewer, waking threads costs more than the work, all the more while Mitsuba's own are awake."""
 
 
 def mirror(
@@ -275,6 +280,11 @@ def mirror(
     if start is None:
         start = np.full(centres.shape, np.nan)
     start = np.ascontiguousarray(start, dtype=np.float64)
-    kernel = _mirror_parallel if len(tx) >= _PARALLEL_CHIRPS else _mirror_serial
-    kernel(tx, rx, centres, frames, semi_axes, start, polarization == "h", spreading, length, amplitude, point)
+    horizontal = polarization == "h"
+
+    def solve(begin: int) -> None:
+        end = min(begin + _CHIRPS_A_THREAD, len(tx))
+        _mirror(begin, end, tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point)
+
+    in_threads(solve, range(0, len(tx), _CHIRPS_A_THREAD))
     return length, amplitude, point

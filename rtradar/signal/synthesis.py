@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
@@ -14,6 +14,7 @@ from rtradar.errors import ValidityWarning
 from rtradar.phasor import phasor
 from rtradar.radar import Radar
 from rtradar.signal.spreading import MOST_NODES, spread_sum
+from rtradar.threads import in_threads
 
 MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
@@ -22,6 +23,9 @@ MANY_ECHOES = 32
 """From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` has what it saves)."""
 
 _LANES = 32
+_CHIRPS_A_THREAD = 16
+"""Handed out at once: half a millisecond or more of work."""
+
 _INSTANTS = 16
 """At so many instants of a block the speed of echoes is looked at."""
 
@@ -94,20 +98,22 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
     return count
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
-def _synthesize(length, amplitude, powers, start_frequency, slope, sample_rate, ramp, out):  # type: ignore[no-untyped-def]
-    """Fill ``out (chirp, rx, sample)``; samples are added up in the precision of ``ramp``, which counts the lanes."""
-    chirps, receivers, samples = out.shape
+@njit(cache=True, nogil=True, error_model="numpy")
+def _synthesize(  # type: ignore[no-untyped-def]
+    begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, ramp, out
+):
+    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the precision of ``ramp``, which counts the lanes."""
+    receivers, samples = out.shape[1:]
     nodes, echoes = amplitude.shape[0], length.shape[2]
     # The last block may reach past the last sample.
     padded = (samples + _LANES - 1) // _LANES * _LANES
-    for chirp in prange(chirps):
-        real, imaginary, now = np.empty_like(ramp), np.empty_like(ramp), np.empty(6, dtype=ramp.dtype)
-        exact_re, exact_im = np.empty(_LANES), np.empty(_LANES)
-        sum_re, sum_im = np.empty(padded, dtype=ramp.dtype), np.empty(padded, dtype=ramp.dtype)
-        start_re, start_im, turn_re, turn_im = np.empty(echoes), np.empty(echoes), np.empty(echoes), np.empty(echoes)
-        heard, coefficient = np.empty(echoes, dtype=np.int64), np.empty(_POWERS, dtype=np.complex128)
-        delay = np.empty(echoes)
+    real, imaginary, now = np.empty_like(ramp), np.empty_like(ramp), np.empty(6, dtype=ramp.dtype)
+    exact_re, exact_im = np.empty(_LANES), np.empty(_LANES)
+    sum_re, sum_im = np.empty(padded, dtype=ramp.dtype), np.empty(padded, dtype=ramp.dtype)
+    start_re, start_im, turn_re, turn_im = np.empty(echoes), np.empty(echoes), np.empty(echoes), np.empty(echoes)
+    heard, coefficient = np.empty(echoes, dtype=np.int64), np.empty(_POWERS, dtype=np.complex128)
+    delay = np.empty(echoes)
+    for chirp in range(begin, end):
         for receiver in range(receivers):
             own = amplitude[:, chirp, receiver]
             count = _heard(length[chirp, receiver], own, slope / SPEED_OF_LIGHT_MPS, sample_rate, heard)
@@ -235,7 +241,12 @@ def synthesize(
         # More powers than those of a parabola cancel too much for float32.
         kind = np.float32 if out.dtype == np.complex64 and len(echoes.frequency) <= _POWERS else np.float64
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
-        _synthesize(length, amplitude, powers, *waveform, np.arange(_LANES, dtype=kind), out)
+        ramp = np.arange(_LANES, dtype=kind)
+
+        def fill(begin: int) -> None:
+            _synthesize(begin, min(begin + _CHIRPS_A_THREAD, len(out)), length, amplitude, powers, *waveform, ramp, out)
+
+        in_threads(fill, range(0, len(out), _CHIRPS_A_THREAD))
     return out
 
 
