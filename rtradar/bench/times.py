@@ -9,8 +9,8 @@ from statistics import median
 OTHER_PRODUCTS = ("spectrogram", "angle")
 """Stages of a run that the range-Doppler-time cloud does not need."""
 
-FILES = ("write", "pictures", "report")
-"""Stages that write files: maps, clouds, pictures and the page."""
+FILES = ("write", "pictures", "view", "report")
+"""Stages that write files: maps, clouds, pictures, moments to view and the page."""
 
 ELSEWHERE = "elsewhere"
 """Time of a run outside all of its stages, such as sliding windows, which copy; it counts to the cloud."""

@@ -14,7 +14,7 @@ import warnings
 from importlib.metadata import version
 from typing import TextIO
 
-from rtradar.cli import captures, checks, classifiers, datasets, exports
+from rtradar.cli import captures, checks, classifiers, datasets, exports, viewing
 from rtradar.cli.values import OneLineParser, fail
 from rtradar.errors import BackendError, CampaignError, InputError
 
@@ -64,6 +64,6 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)
-    for module in (captures, datasets, classifiers, exports, checks):
+    for module in (captures, viewing, datasets, classifiers, exports, checks):
         module.add(commands)
     return parser

@@ -24,6 +24,7 @@ from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture, prepare
 from rtradar.pipeline.cloud_maker import CloudMaker, Clouds
 from rtradar.pipeline.folder import all_or_nothing
+from rtradar.pipeline.moments import moments
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
@@ -33,6 +34,7 @@ from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory
 from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
+from rtradar.report.moments import save_moments
 from rtradar.scatter import Accountable
 from rtradar.scene import Scene
 
@@ -239,6 +241,9 @@ def run(
             **({"modelled": capture.rung.account()} if isinstance(capture.rung, Accountable) else {}),
             **({"room": inside.account} if inside else {}),
         }
+        # After the rung has given its account, for looking at it once more is no part of the capture.
+        with stages.time("view"):
+            save_moments(folder / "view.npz", moments(capture.rung, radar, body, scene, windows, n_chirps))
         with stages.time("report"):
             write_report(
                 folder / "report.html",

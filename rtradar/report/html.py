@@ -2,14 +2,8 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Iterable, Mapping
-from html import escape
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -17,6 +11,7 @@ from numpy.typing import ArrayLike
 from rtradar.body import Body
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
+from rtradar.report.page import player, write_page
 from rtradar.report.sections import (
     limits_box,
     limits_table,
@@ -28,45 +23,9 @@ from rtradar.report.sections import (
 )
 from rtradar.report.viewer import figure_data, rdt_data, spatial_data
 
-_PAGE = Template("""<!doctype html>
-<html lang="en">
-<head>
-<meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="$policy">
-<meta name="viewport" content="width=device-width, initial-scale=1">
-<meta name="color-scheme" content="light dark">
-<title>$title</title>
-<style>
-$style</style>
-</head>
-<body>
-<header>
-<p class="kind">rtradar report</p>
-<h1>$motion</h1>
-<p class="sub">$subtitle</p>
-</header>
-<main>
-$limits
-$tiles
-<noscript><p class="box warn">The 3D views need JavaScript; all else on this page does without.</p></noscript>
-$body</main>
-<script type="application/json" id="report-data">$data</script>
-<script>$library</script>
-<script>$script</script>
-</body>
-</html>
-""")
-
-# Places of the two large pieces; no text on a page holds a zero byte.
-_DATA, _LIBRARY = "\0data\0", "\0library\0"
-
-_FIGURE = """<section id="figure"><h2>The recording before the radar</h2>
+_FIGURE = f"""<section id="figure"><h2>The recording before the radar</h2>
 <div class="scene tall" id="scene-figure"></div>
-<div class="player" id="player"><button type="button" id="play">Play</button>
-<input type="range" id="moment" min="0" value="0" step="1" aria-label="Moment of the recording">
-<output id="clock" for="moment"></output>
-<label>Speed <select id="speed"><option value="0.1">× 0.1</option><option value="0.25">× 0.25</option>
-<option value="0.5">× 0.5</option><option value="1" selected>× 1</option></select></label></div>
+{player()}
 <p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone. Drag to turn, scroll to come nearer.
 World axes: x from the radar to the person, y to the left seen from the radar, z up.</p></section>
 """
@@ -108,53 +67,22 @@ def write_report(
     InputError
         Where a picture is missing or no PNG, or ``rdt_points`` has a wrong shape or values that are not finite.
     """
-    from plotly.offline import get_plotlyjs  # slow to import, and 5 MB
-
     data = {"figure": figure_data(body, radar, summary.get("part_power_m2")), "rdt": rdt_data(rdt_points)}
     if spatial is not None:
         data["spatial"] = spatial_data(spatial)
-    library, script = get_plotlyjs(), _asset("viewer.js")
     parameters = summary.get("parameters", {})
-    motion, fidelity = str(parameters.get("motion", "Recording")), str(summary.get("fidelity", ""))
-    page = _PAGE.substitute(
-        policy=_policy((library, script)),
-        title=escape(f"{motion} - rtradar"),
-        motion=escape(motion),
-        subtitle=escape(", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}")))),
-        style=_asset("page.css"),
-        limits=limits_box(summary.get("limits", ())),
-        tiles=tiles(_headline(summary)),
+    fidelity = str(summary.get("fidelity", ""))
+    top = limits_box(summary.get("limits", ())) + "\n" + tiles(_headline(summary))
+    write_page(
+        path,
+        kind="rtradar report",
+        heading=str(parameters.get("motion", "Recording")),
+        subtitle=", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))),
+        top=top,
         body=_FIGURE + _clouds(data) + _pictures(pictures) + _tables(summary, radar),
-        data=_DATA,
-        library=_LIBRARY,
-        script=script,
+        data=data,
+        scripts=("plots.js", "figure.js", "report.js"),
     )
-    # The two large pieces go in one after the other: a page put together first would take the memory of several.
-    head, rest = page.split(_DATA)
-    middle, tail = rest.split(_LIBRARY)
-    with open(path, "w", encoding="utf-8", newline="\n") as file:
-        file.write(head)
-        file.write(_json(data))
-        file.write(middle)
-        file.write(library)
-        file.write(tail)
-
-
-def _asset(name: str) -> str:
-    return files("rtradar.report").joinpath(name).read_text(encoding="utf-8")
-
-
-def _policy(scripts: Iterable[str]) -> str:
-    """Content security policy: these scripts and no other, embedded pictures, and nothing from anywhere else."""
-    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in scripts)
-    # Plotly writes style rules of its own, and makes pictures for download as blobs.
-    sources = f"script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
-    return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
-
-
-def _json(data: object) -> str:
-    """JSON that no text in it can end: the parser of HTML sees no < at all."""
-    return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,25 +49,55 @@ def figure_data(body: Body, radar: Radar, part_power_m2: Mapping[str, float] | N
     """
     intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
     times = np.linspace(0.0, body.duration_s, intervals + 1)
+    figure = posed_figure(body.part_names, times, semi_axis_poses(body, times), radar)
+    return figure | {"power_db": _power_db(body.part_names, part_power_m2 or {})}
+
+
+def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centre and the three semi-axes of each part as vectors, (time, part, 4, 3) world [m], at times (time,) [s]."""
     centres, frames, semi_axes = body.at(times)
     # Columns of a frame are directions: after the swap, row k is semi-axis k.
     axes = np.swapaxes(frames * semi_axes[:, None, :], 2, 3)
-    poses = np.concatenate([centres[:, :, None, :], axes], axis=2)
+    return np.concatenate([centres[:, :, None, :], axes], axis=2)
+
+
+def posed_figure(
+    part_names: Sequence[str],
+    times: NDArray[np.float64],
+    poses: NDArray[np.floating],
+    radar: Radar,
+) -> dict[str, Any]:
+    """What both pages draw of a moving body before a radar.
+
+    Parameters
+    ----------
+    part_names : sequence of str
+    times : (frame,) float64
+        [s].
+    poses : (frame, part, 4, 3)
+        As `semi_axis_poses` gives them.
+    radar : Radar
+
+    Returns
+    -------
+    dict
+        Ready for JSON: all of `figure_data` but ``power_db``.
+    """
+    centres, axes = poses[:, :, 0], poses[:, :, 1:]
     vertices, faces = unit_sphere(_SUBDIVISIONS)
     # An ellipsoid reaches sqrt(sum of squares of its semi-axes' components) along each world axis.
     reach = np.sqrt((axes**2).sum(axis=2))
     return {
-        "parts": list(body.part_names),
+        "parts": list(part_names),
         "times": np.round(times, 4).tolist(),
-        "poses": _floats(poses),
-        "vertices": _floats(vertices),
+        "poses": packed_floats(poses),
+        "vertices": packed_floats(vertices),
         "faces": faces.ravel().tolist(),
         "tx": np.round(radar.tx, 4).tolist(),
         "rx": np.round(radar.rx, 4).tolist(),
         "ranges": _ranges(
             (centres - reach).reshape(-1, 3), (centres + reach).reshape(-1, 3), np.concatenate([radar.tx, radar.rx])
         ),
-        "power_db": _power_db(body.part_names, part_power_m2 or {}),
         "window_s": radar.frame_duration_s,
     }
 
@@ -116,16 +146,16 @@ def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
 
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
     every = max(1, math.ceil(len(points) / MOST_POINTS))
-    packed = {name: _floats(array[::every]) for name, array in {"points": points, **values}.items()}
+    packed = {name: packed_floats(array[::every]) for name, array in {"points": points, **values}.items()}
     return {"count": len(points), "shown": len(points[::every]), **packed}
 
 
-def _floats(array: NDArray[np.float64]) -> str:
+def packed_floats(array: NDArray[np.floating]) -> str:
     """Base64 of little-endian float32, last axis fastest."""
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
 
 
-def _ranges(low: NDArray[np.float64], high: NDArray[np.float64], antennas: NDArray[np.float64]) -> list[list[float]]:
+def _ranges(low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
     """Box about all poses, the radar and the floor, in half metres."""
     least = np.minimum(low.min(axis=0), antennas.min(axis=0))
     most = np.maximum(high.max(axis=0), antennas.max(axis=0))

@@ -1,0 +1,223 @@
+"""What a run left in its folder, read again for `rtradar view`."""
+
+from __future__ import annotations
+
+import json
+import math
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.errors import InputError
+from rtradar.pipeline.pictures import thinned
+from rtradar.radar import Radar
+from rtradar.report.linked import COLOURS, MOST_LEVEL, Levels, Linked, write_view
+from rtradar.report.moments import Moments, load_moments
+from rtradar.report.still import draw_still
+
+_MOST_ROWS, _MOST_COLUMNS = 256, 200
+"""Of a range-Doppler map; of larger ones neighbours are put together, the strongest for all."""
+
+_DYNAMIC_RANGE_DB = 60.0
+_SAMPLED = 16
+"""Maps whose median tells the noise."""
+
+_DAMAGE = (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+_MEND = "make it anew with: rtradar run"
+
+
+def view(
+    folder: str | Path,
+    *,
+    page: str | Path | None = None,
+    still: str | Path | None = None,
+    time_s: float | None = None,
+    colour: str = "part",
+) -> dict[str, Any]:
+    """Show what `run` left in a folder: a page that moves, a still, or both.
+
+    Parameters
+    ----------
+    folder : path
+        As ``run(..., out=folder)`` leaves it.
+    page : path, optional
+        HTML file to write, with all it needs inside.
+    still : path, optional
+        PNG file to draw.
+    time_s : float, optional
+        Of the still, the nearest window [s]; the middle of the capture if left out.
+    colour : {"part", "power", "velocity"}
+        What colours mean, at first on the page.
+
+    Returns
+    -------
+    dict
+        ``windows`` and ``echoes`` shown, ``first_s`` and ``last_s`` of the windows, and with each file its path and bytes.
+
+    Raises
+    ------
+    InputError
+        Where a file of the folder is missing or damaged, the time lies outside of the capture, a colour is unknown, or a file
+        cannot be written.
+    """
+    if colour not in COLOURS:
+        raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
+    linked = load_linked(Path(folder))
+    times = linked.moments.times
+    if time_s is not None and not times[0] - linked.radar.frame_duration_s <= time_s <= times[-1] + linked.radar.frame_duration_s:
+        raise InputError(f"time_s = {time_s}; the capture has windows from {times[0]:.3f} to {times[-1]:.3f} s (--time)")
+    told: dict[str, Any] = {
+        "windows": len(times),
+        "echoes": len(linked.moments.echo_part),
+        "first_s": float(times[0]),
+        "last_s": float(times[-1]),
+    }
+    if page is not None:
+        write_view(page, linked, name=Path(folder).resolve().name, colour=colour)
+        told["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
+    if still is not None:
+        step = linked.moments.nearest(float(times.mean()) if time_s is None else time_s)
+        draw_still(still, linked, step, colour=colour)
+        told["still"] = {"path": str(still), "bytes": Path(still).stat().st_size, "time_s": float(times[step])}
+    return told
+
+
+def load_linked(folder: Path) -> Linked:
+    """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
+
+    Raises
+    ------
+    InputError
+        Where one of them is missing or damaged, or they are not of one run.
+    """
+    if not (folder / "summary.json").is_file():
+        raise InputError(f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named")
+    summary, radar = _summary(folder / "summary.json")
+    moments = load_moments(folder / "view.npz")
+    rdt = _archive(folder / "cloud_rdt.npz", ("points",))
+    spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"))
+    path = folder / "maps.h5"
+    try:
+        with h5py.File(path) as maps:
+            if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
+                raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
+            range_doppler = _range_doppler(maps, moments, radar)
+            spectrogram = _spectrogram(maps)
+            points = np.asarray(rdt["points"], dtype=np.float64).reshape(-1, 3)
+            rdt_power_db = _at_points(maps, points, radar)
+    except InputError:
+        raise
+    except _DAMAGE as error:
+        why = error.strerror if isinstance(error, FileNotFoundError) else "is damaged, or of another kind"
+        raise InputError(f"'{path}': {why}; {_MEND}") from None
+    parameters = summary["parameters"]
+    scene = str(parameters.get("scene", "free-space"))
+    return Linked(
+        heading=str(parameters.get("motion", "Recording")),
+        subtitle=", ".join([f"radar {radar.name}", f"fidelity {summary.get('fidelity', '')}", scene]),
+        moments=moments,
+        radar=radar,
+        range_doppler=range_doppler,
+        spectrogram=spectrogram,
+        rdt_points=points,
+        rdt_power_db=rdt_power_db,
+        spatial=SpatialCloud(**spatial),
+    )
+
+
+def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+        return summary, Radar(**summary["parameters"]["radar"])
+    except InputError as error:
+        raise InputError(f"'{path}': {error}; {_MEND}") from None
+    except (*_DAMAGE, RecursionError):
+        raise InputError(f"'{path}' is damaged; {_MEND}") from None
+
+
+def _archive(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            return {name: arrays[name] for name in names}
+    except _DAMAGE as error:
+        why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
+        raise InputError(f"'{path}' {why}; {_MEND}") from None
+
+
+# -- maps ----------------------------------------------------------------------------------------------------------------
+
+
+def _decibels(power: NDArray[np.floating]) -> NDArray[np.float64]:
+    return np.asarray(10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny)))
+
+
+def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDArray[np.uint8]:
+    return np.asarray(np.clip(np.rint((level_db - low_db) / step_db), 0, MOST_LEVEL), dtype=np.uint8)
+
+
+def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
+    """Lowest level and the step between levels [dB]: from 3 dB below the noise, or 60 dB below the peak, up to the peak."""
+    low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
+    return low, (top_db - low) / MOST_LEVEL
+
+
+def _range_doppler(maps: Any, moments: Moments, radar: Radar) -> Levels:
+    """Maps of the moments' windows, mean of the channels."""
+    power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
+    per_channel_db = 10 * math.log10(radar.n_channels)
+    windows = moments.window.tolist()
+    top = max(float(power[window].max()) for window in windows)
+    noise = [float(np.median(power[window])) for window in windows[:: math.ceil(len(windows) / _SAMPLED)]]
+    low_db, step_db = _scale(*(_decibels(np.array([top, np.median(noise)])) - per_channel_db).tolist())
+    rows, columns = math.ceil(len(distance) / _MOST_ROWS), math.ceil(len(velocity) / _MOST_COLUMNS)
+
+    def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
+        by_row = np.maximum.reduceat(values, np.arange(0, len(distance), rows), axis=0)
+        return np.asarray(np.maximum.reduceat(by_row, np.arange(0, len(velocity), columns), axis=1))
+
+    def centres(values: NDArray[np.float64], together: int) -> tuple[float, float]:
+        bin_width = float(values[1] - values[0]) if len(values) > 1 else 1.0
+        return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
+
+    return Levels(
+        level=np.stack([_levels(_decibels(pooled(power[window])) - per_channel_db, low_db, step_db) for window in windows]),
+        low_db=low_db,
+        step_db=step_db,
+        across=centres(velocity, columns),
+        up=centres(distance, rows),
+    )
+
+
+def _spectrogram(maps: Any) -> Levels:
+    """Velocity up, time across."""
+    velocity = maps["spectrogram_velocity"][:]
+    up = (float(velocity[0]), float(velocity[1] - velocity[0]))
+    if not len(maps["spectrogram_time"]):
+        return Levels(level=np.zeros((1, len(velocity), 0), dtype=np.uint8), low_db=0.0, step_db=1.0, across=(0.0, 1.0), up=up)
+    power, times = thinned(maps, "spectrogram", "spectrogram_time")
+    level_db = _decibels(power.T)
+    low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))
+    step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
+    level, across = _levels(level_db, low_db, step_db)[None], (float(times[0]), step_s)
+    return Levels(level=level, low_db=low_db, step_db=step_db, across=across, up=up)
+
+
+def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
+    """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB re 1 m^2]."""
+    if not len(points):
+        return np.zeros(0)
+    nearest = [
+        np.abs(column[:, None] - maps[axis][:]).argmin(axis=1)
+        for axis, column in zip(("time", "range", "velocity"), points.T, strict=True)
+    ]
+    found = np.zeros(len(points))
+    for window in np.unique(nearest[0]).tolist():
+        own = nearest[0] == window
+        found[own] = maps["range_doppler"][window][nearest[1][own], nearest[2][own]]
+    return _decibels(found) - 10 * math.log10(radar.n_channels)

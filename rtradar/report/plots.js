@@ -1,0 +1,80 @@
+// What both pages draw with. Needs Plotly and the JSON in #report-data.
+
+const data = JSON.parse(document.getElementById("report-data").textContent);
+// These buttons and no others: by default Plotly also offers to share the data on its own site.
+const config = {
+  displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
+  modeBarButtons: [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]],
+};
+// Visible on white and on black, its middle too.
+const velocityColours = [[0, "#1f6fd6"], [0.5, "#9a9aa2"], [1, "#d9371f"]];
+
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+function floats(text) {
+  const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+/** Every third number from the k-th on. */
+const component = (triples, k) => Float32Array.from({ length: triples.length / 3 }, (_, i) => triples[3 * i + k]);
+
+/** Parts of the layout that follow the page's light or dark colours. */
+function theme() {
+  const changes = { "font.color": colour("--ink"), "modebar.color": colour("--faint"), "modebar.activecolor": colour("--accent") };
+  for (const axis of ["xaxis", "yaxis", "zaxis"]) {
+    changes[`scene.${axis}.gridcolor`] = colour("--line");
+    changes[`scene.${axis}.zerolinecolor`] = colour("--line");
+    changes[`scene.${axis}.linecolor`] = colour("--faint");
+  }
+  return changes;
+}
+
+/** An eye chosen for a wide view, farther away where the view is narrow. */
+function stepBack(eye, node, breadth) {
+  const factor = Math.max(1, breadth * node.clientHeight / node.clientWidth);
+  return { x: eye.x * factor, y: eye.y * factor, z: eye.z * factor };
+}
+
+async function draw(id, traces, scene, breadth, restyleTheme) {
+  const node = document.getElementById(id);
+  if (!node) return null;
+  const layout = {
+    margin: { l: 0, r: 0, t: 0, b: 0 },
+    paper_bgcolor: "rgba(0,0,0,0)",
+    font: { family: getComputedStyle(document.body).fontFamily, size: 12 },
+    legend: { x: 0, y: 1, itemsizing: "constant", bgcolor: "rgba(0,0,0,0)" },
+    modebar: { bgcolor: "rgba(0,0,0,0)" },
+    scene: { ...scene, camera: { ...scene.camera, eye: stepBack(scene.camera.eye, node, breadth) } },
+  };
+  await Plotly.newPlot(node, traces, layout, config);
+  const follow = async () => {
+    await Plotly.relayout(node, theme());
+    if (restyleTheme) await restyleTheme(node);
+  };
+  await follow();
+  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", follow);
+  const canvas = node.querySelector("canvas");
+  node.dataset.drawn = String(Boolean(canvas && canvas.width > 0 && canvas.height > 0));
+  return node;
+}
+
+const axis = (title, range) => ({ title: { text: title }, showbackground: false, showspikes: false, ...(range && { range }) });
+
+const metres = (title, range) => ({ ...axis(title, range), dtick: 1 });
+// Room for the colour bar.
+const domain = window.innerWidth < 600 ? { x: [0, 1], y: [0.14, 1] } : { x: [0, 0.92], y: [0, 1] };
+
+/** Colour bar beside a view; below it where the window is narrow. */
+function bar(title) {
+  return window.innerWidth < 600
+    ? { title: { text: title, side: "top" }, orientation: "h", thickness: 10, len: 0.9, y: 0, yanchor: "bottom" }
+    : { title: { text: title, side: "right" }, thickness: 12, len: 0.75, x: 1, xpad: 4 };
+}
+
+function velocityMarkers(velocity, size) {
+  const largest = velocity.reduce((most, value) => Math.max(most, Math.abs(value)), 1e-3);
+  return {
+    size, color: velocity, cmin: -largest, cmax: largest, colorscale: velocityColours, colorbar: bar("Velocity [m/s], positive receding"),
+  };
+}

@@ -1,0 +1,43 @@
+// The page of a run: the moving figure and the clouds, each by itself.
+
+/** Each part in the colour of its mean power, where it is known. */
+const paint = figure.power_db
+  ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar("Mean echo power [dB re 1 m²]") }
+  : { color: "#4c8fd6" };
+
+async function main() {
+  const [x, y, z] = figure.ranges;
+  const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? "<br>%{intensity:.1f} dB re 1 m²" : ""), ...pointsTraces()], {
+    aspectmode: "data", domain,
+    xaxis: metres("x [m]", x), yaxis: metres("y [m]", y), zaxis: metres("z [m]", z),
+    camera: { eye: { x: -0.45, y: -1.65, z: 0.5 }, center: { x: -0.12, y: 0, z: -0.1 } },
+  }, 1.9, themeFigure);
+  const points = node.data.length - 1;
+  await player(node, (frame) => move(node, placesAt(frame, points))).ready;
+
+  if (data.rdt.count) {
+    const points = floats(data.rdt.points);
+    const [time, range, velocity] = [0, 1, 2].map((k) => component(points, k));
+    await draw("scene-rdt", [{
+      type: "scatter3d", mode: "markers", x: time, y: range, z: velocity, marker: velocityMarkers(velocity, 1.8),
+      hovertemplate: "%{x:.2f} s<br>%{y:.2f} m<br>%{z:.2f} m/s<extra></extra>",
+    }], {
+      domain, aspectmode: "manual", aspectratio: { x: 1.5, y: 1, z: 1 },
+      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis("Velocity [m/s]"),
+      camera: { eye: { x: -1.0, y: -1.75, z: 0.75 }, center: { x: 0, y: 0, z: -0.15 } },
+    }, 1.6);
+  }
+  if (spatial) {
+    await draw("scene-spatial", [{
+      type: "scatter3d", mode: "markers", x: component(spatial.points, 0), y: component(spatial.points, 1), z: component(spatial.points, 2),
+      marker: velocityMarkers(spatial.velocity, 1.8), customdata: spatial.time,
+      hovertemplate: "(%{x:.2f}, %{y:.2f}, %{z:.2f}) m<br>%{customdata:.2f} s<extra></extra>",
+    }], {
+      domain, aspectmode: "data", xaxis: axis("x [m]"), yaxis: axis("y [m]"), zaxis: axis("z [m]"),
+      camera: { eye: { x: -1.6, y: -1.3, z: 0.7 }, center: { x: 0, y: 0, z: -0.1 } },
+    }, 1.6);
+  }
+  document.documentElement.dataset.ready = "true";
+}
+
+main();

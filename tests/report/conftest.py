@@ -1,0 +1,169 @@
+"""A page in a real browser, headless: driven over the pipe that Chromium itself offers, so nothing else is needed."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import io
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib.image
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+TIMEOUT_S = 120.0
+SIZE = (1000, 760)
+
+
+class Browser:
+    """One page in a headless Chromium, with all that it logged and asked for."""
+
+    def __init__(self, profile: Path) -> None:
+        # Chromium reads commands from its file 3 and writes answers to its file 4, each ended by a zero byte.
+        read_commands, self._commands = os.pipe()
+        self._answers, write_answers = os.pipe()
+        move = "import os, sys; os.dup2(int(sys.argv[1]), 3); os.dup2(int(sys.argv[2]), 4); os.execv(sys.argv[3], sys.argv[3:])"
+        flags = [
+            "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
+            "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader",
+            "--enable-unsafe-swiftshader", "--remote-debugging-pipe", f"--user-data-dir={profile}",
+        ]  # fmt: skip
+        self._process = subprocess.Popen(
+            [sys.executable, "-c", move, str(read_commands), str(write_answers), str(CHROMIUM), *flags],
+            pass_fds=(read_commands, write_answers),
+            start_new_session=True,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+        os.close(read_commands)
+        os.close(write_answers)
+        self._deadline = time.monotonic() + TIMEOUT_S
+        self._buffer, self._last, self._session = b"", 0, ""
+        self.events: list[dict[str, Any]] = []
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        for domain in ("Page", "Runtime", "Log", "Network"):
+            self.call(f"{domain}.enable")
+        self.call("Emulation.setDeviceMetricsOverride", width=SIZE[0], height=SIZE[1], deviceScaleFactor=1, mobile=False)
+
+    def close(self) -> None:
+        os.close(self._commands)
+        os.close(self._answers)
+        with contextlib.suppress(ProcessLookupError):  # it may have ended with its pipe
+            os.killpg(self._process.pid, signal.SIGKILL)
+        self._process.wait()
+
+    def call(self, method: str, **params: object) -> dict[str, Any]:
+        self._last += 1
+        message = {"id": self._last, "method": method, "params": params} | ({"sessionId": self._session} if self._session else {})
+        os.write(self._commands, json.dumps(message).encode() + b"\0")
+        while True:
+            answer = self._next()
+            if answer.get("id") == self._last:
+                assert "error" not in answer, f"{method}: {answer['error']}"
+                return dict(answer["result"])
+            self.events.append(answer)
+
+    def _next(self) -> dict[str, Any]:
+        while b"\0" not in self._buffer:
+            left = self._deadline - time.monotonic()
+            ready, _, _ = select.select([self._answers], [], [], max(left, 0))
+            assert ready, f"Chromium gave no answer within {TIMEOUT_S} s"
+            chunk = os.read(self._answers, 1 << 20)
+            assert chunk, "Chromium ended"
+            self._buffer += chunk
+        message, self._buffer = self._buffer.split(b"\0", 1)
+        return dict(json.loads(message))
+
+    def evaluate(self, script: str) -> Any:
+        answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        assert "exceptionDetails" not in answer, answer
+        return answer["result"].get("value")
+
+    def wait(self, script: str) -> None:
+        """Until a script gives true."""
+        while not self.evaluate(script):
+            time.sleep(0.05)
+
+    def open(self, address: str, scheme: str = "light") -> None:
+        self._deadline = time.monotonic() + TIMEOUT_S
+        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
+        self.call("Page.navigate", url="about:blank")  # for the same file with another #t is no new page
+        self.events.clear()
+        self.call("Page.navigate", url=address)
+        self.wait("document.documentElement?.dataset.ready === 'true'")
+
+    def place(self, element: str) -> tuple[float, float, float, float]:
+        """Scroll to an element; its left, top, width and height in the window."""
+        script = f"(() => {{ const e = document.getElementById('{element}'); e.scrollIntoView({{ block: 'center' }});"
+        x, y, width, height = self.evaluate(
+            f"{script} const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; }})()"
+        )
+        return x, y, width, height
+
+    def picture(self, element: str) -> NDArray[np.float64]:
+        """Pixels of an element (row, column, rgb), 0 to 1."""
+        self.place(element)
+        # Two frames of the browser, so that what was scrolled to is painted.
+        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        x, y, width, height = self.place(element)
+        data = self.call("Page.captureScreenshot", format="png")["data"]
+        image = matplotlib.image.imread(io.BytesIO(base64.b64decode(data)))
+        return np.asarray(image[int(y) : int(y + height), int(x) : int(x + width), :3], dtype=np.float64)
+
+    def drag(self, element: str, by: int) -> None:
+        """With the mouse, from the middle of an element to the right."""
+        x, y, width, height = self.place(element)
+        x, y = x + width / 2, y + height / 2
+
+        def mouse(kind: str, at: float, buttons: int) -> None:
+            press = {"button": "left", "clickCount": 1} if kind != "mouseMoved" else {"button": "left" if buttons else "none"}
+            self.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, buttons=buttons, **press)
+
+        mouse("mouseMoved", x, 0)
+        mouse("mousePressed", x, 1)
+        for step in range(1, 11):
+            mouse("mouseMoved", x + by * step / 10, 1)
+            time.sleep(0.03)
+        mouse("mouseReleased", x + by, 0)
+
+    def set(self, element: str, value: object, event: str = "input") -> None:
+        """Choose a value of a slider or a menu, as a hand would."""
+        script = f"const e = document.getElementById('{element}'); e.value = '{value}'; e.dispatchEvent(new Event('{event}'));"
+        self.evaluate(f"(() => {{ {script} }})()")
+
+    def faults(self) -> list[dict[str, Any]]:
+        """Errors that the page threw or logged."""
+        return [
+            event
+            for event in self.events
+            if event["method"] == "Runtime.exceptionThrown"
+            or (event["method"] == "Runtime.consoleAPICalled" and event["params"]["type"] in ("error", "assert"))
+            or (event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] == "error")
+        ]
+
+    def requests(self) -> list[str]:
+        """Addresses that the page asked for."""
+        return [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
+
+
+@pytest.fixture(scope="session")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    if CHROMIUM is None:
+        pytest.skip("no Chromium on PATH: install the package chromium (Debian, Ubuntu, Fedora)")
+    opened = Browser(tmp_path_factory.mktemp("chromium"))
+    yield opened
+    opened.close()
