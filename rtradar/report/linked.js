@@ -24,7 +24,7 @@ const fromGrey = [[0, hiddenColour], [0.02, hiddenColour], ...viridis.map((tint,
 const modes = {
   part: { colorscale: stepped, cmin: 0, cmax: groups.names.length, title: "" },
   power: { colorscale: fromGrey, cmin: data.power_range_db[0], cmax: data.power_range_db[1], title: "Echo power [dB re 1 m²]" },
-  velocity: { colorscale: velocityColours, cmin: -data.fastest_mps, cmax: data.fastest_mps, title: "Rate of range [m/s], + receding" },
+  velocity: { colorscale: data.velocity_colours, cmin: -data.fastest_mps, cmax: data.fastest_mps, title: "Rate of range [m/s], + receding" },
 };
 
 /** A number for the colour of an echo at a step. */

@@ -32,6 +32,17 @@ GROUPS = {
 }
 """Names and colours of groups of parts; the last is of what belongs to none."""
 
+VELOCITY_COLOURS = (
+    (0.0, "#0b2e6b"),
+    (0.25, "#1f6fd6"),
+    (0.44, "#79b4f0"),
+    (0.5, "#9a9aa2"),
+    (0.56, "#f0a184"),
+    (0.75, "#d9371f"),
+    (1.0, "#6b0f0f"),
+)
+"""From approaching to receding; slow rates, which most of a body has, differ from rest at sight."""
+
 _LIMBS = {"clavicle": "arm", "upper arm": "arm", "forearm": "arm", "hand": "arm"}
 _NEAREST_BINS = 4.0
 """A point of the cloud farther than this from any echo is of none."""
@@ -275,6 +286,7 @@ def linked_data(linked: Linked) -> dict[str, Any]:
             "colours": list(GROUPS.values()),
             "of_part": group_of_parts(moments.part_names.tolist()),
         },
+        "velocity_colours": VELOCITY_COLOURS,
         "power_range_db": list(linked.power_range_db),
         "fastest_mps": linked.fastest_mps,
         "max_velocity_mps": radar.max_velocity_mps,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.body import unit_sphere
 from rtradar.clouds.files import atomic_file
 from rtradar.report.figures import new_figure
-from rtradar.report.linked import GROUPS, Levels, Linked, group_of_parts
+from rtradar.report.linked import GROUPS, VELOCITY_COLOURS, Levels, Linked, group_of_parts
 
 _HIDDEN = "#8c8c94"
 _NOW = "#e0389a"
@@ -53,12 +53,13 @@ class _Paint:
 
     def __init__(self, linked: Linked, colour: str) -> None:
         from matplotlib import colormaps
-        from matplotlib.colors import ListedColormap, Normalize
+        from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 
         self.colour, self._linked = colour, linked
         tints = ListedColormap(list(GROUPS.values()))
         low, high = linked.power_range_db
-        self.map = {"part": tints, "power": colormaps["viridis"], "velocity": colormaps["coolwarm"]}[colour]
+        rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
+        self.map = {"part": tints, "power": colormaps["viridis"], "velocity": rates}[colour]
         self.norm = {
             "part": Normalize(-0.5, len(GROUPS) - 0.5),
             "power": Normalize(low, high),

@@ -1,0 +1,177 @@
+"""What a run keeps of body and echoes: held against spheres, whose mirror points and ranges are closed forms."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.motion import place
+from rtradar.pipeline import moments as module
+from rtradar.pipeline.moments import moments
+from rtradar.scatter import build_rung
+from rtradar.scatter.multipath import Multipath
+from rtradar.scene import Furniture, Scene, Wall, material
+
+# One antenna at one place, so that lengths are those of a radar in the middle of its array.
+RADAR = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=500e-6, samples_per_chirp=128, frame_duration_s=0.05)
+RADIUS_M = 0.06
+N_CHIRPS = 800
+WALL = Wall(
+    name="left",
+    corner_m=(-5.0, 2.5, 0.0),
+    edge_u_m=(8.0, 0.0, 0.0),
+    edge_v_m=(0.0, 0.0, 3.0),
+    material=material("metal"),
+    thickness_m=0.01,
+)
+
+
+@pytest.fixture(scope="module")
+def spheres() -> Body:
+    walk = Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.4))
+    return Body(walk.motion, np.full((21, 3), RADIUS_M))
+
+
+def look(body: Body, rung: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None) -> Any:
+    chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
+    return moments(rung, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
+
+
+def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres: Body) -> None:
+    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True))
+    assert found.path_names.tolist() == ["body"]
+    assert found.corners.shape == (len(found.times), 21, 1, 3)
+    centres = spheres.at(found.times).centres
+    antenna = np.array(RADAR.position_m)
+    away = np.linalg.norm(centres - antenna, axis=-1, keepdims=True)
+    # float32 of some metres
+    np.testing.assert_allclose(found.corners[:, :, 0], centres + RADIUS_M * (antenna - centres) / away, atol=1e-6)
+
+
+def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
+    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True))
+
+    def distance(times: NDArray[np.float64]) -> NDArray[np.float64]:
+        return np.linalg.norm(spheres.at(times).centres - np.array(RADAR.position_m), axis=-1) - RADIUS_M
+
+    # The mean of two chirps 2 ms apart is off by half the acceleration times the square of 1 ms: 1e-4 m at 100 m/s^2. Their
+    # middle is half a chirp after the window's, 0.25 ms.
+    middle = found.times + RADAR.chirp_duration_s / 2
+    np.testing.assert_allclose(found.range_m, distance(middle), atol=1e-4)
+    rate = (distance(middle + 1e-3) - distance(middle - 1e-3)) / 2e-3
+    np.testing.assert_allclose(found.velocity_mps, rate, atol=1e-6)
+    assert np.abs(rate).max() > 1
+    assert (found.power_m2 > 0).all()
+
+
+def test_a_ghost_is_mirrored_by_wall_and_sphere(spheres: Body) -> None:
+    scene = Scene(name="one wall", walls=(WALL,))
+    rung = Multipath(RADAR, spheres, scene, fidelity="analytic")
+    found = look(spheres, rung, scene)
+    assert found.path_names.tolist() == ["body", "body > left", "left > body"]
+    antenna = np.array(RADAR.position_m)
+    behind = antenna * [1, -1, 1] + [0, 2 * 2.5, 0]  # its image in the plane y = 2.5
+    step, out = 3, found.path_names[found.echo_path] == "left > body"
+    on_wall, on_sphere = found.corners[step, out, 0].astype(float), found.corners[step, out, 1].astype(float)
+    np.testing.assert_allclose(on_wall[:, 1], 2.5, atol=1e-6)
+    # Antenna, wall and sphere lie on one line once the antenna is mirrored.
+    np.testing.assert_allclose(np.cross(on_wall - behind, on_sphere - behind), 0, atol=1e-5)
+    normal = on_sphere - spheres.at(found.times).centres[step, found.echo_part[out]]
+    np.testing.assert_allclose(np.linalg.norm(normal, axis=1), RADIUS_M, atol=1e-6)
+    # The normal halves the angle between both legs; float32 of the point over the radius is 1e-5.
+    legs = [(place - on_sphere) / np.linalg.norm(place - on_sphere, axis=1, keepdims=True) for place in (behind, antenna)]
+    halves = (legs[0] + legs[1]) / np.linalg.norm(legs[0] + legs[1], axis=1, keepdims=True)
+    np.testing.assert_allclose(halves, normal / RADIUS_M, atol=5e-5)
+    direct = found.echo_bounces == 1
+    assert np.isnan(found.corners[:, direct, 1]).all()
+    assert (found.echo_bounces == np.where(direct, 1, 2)).all()
+
+
+class Told:
+    """A rung that says what it is told: for each chirp, lengths and amplitudes (rx, echo)."""
+
+    variant = None
+
+    def __init__(self, length: Any, amplitude: Any, part: list[int]) -> None:
+        self._length, self._amplitude, self._part = length, amplitude, np.array(part)
+
+    def echoes(self, chirps: NDArray[np.int64]) -> rt.Echoes:
+        assert (np.diff(chirps) > 0).all()
+        times = (chirps + 0.5) * RADAR.chirp_duration_s
+        length = np.array([self._length(time) for time in times], dtype=float)
+        amplitude = np.array([self._amplitude(time) for time in times], dtype=complex)[None]
+        ones = np.ones(len(self._part), dtype=np.int64)
+        return rt.Echoes(
+            length=length, amplitude=amplitude, frequency=np.array([1e10]), tx=0 * chirps, part=self._part, bounces=ones
+        )
+
+
+def test_echoes_of_one_part_are_one_by_their_power(spheres: Body) -> None:
+    rung = Told(lambda t: [[8 + 2 * t, 10 - 4 * t, 6]], lambda t: [[1j, 2, 3]], [4, 4, 7])
+    found = look(spheres, rung, windows=np.array([100]))
+    assert found.echo_part.tolist() == [4, 7]
+    time = float(found.times[0]) + RADAR.chirp_duration_s / 2
+    np.testing.assert_allclose(found.power_m2, [[5, 9]])
+    np.testing.assert_allclose(found.range_m, [[(4 + time + 4 * (5 - 2 * time)) / 5, 3]])
+    np.testing.assert_allclose(found.velocity_mps, [[(1 - 4 * 2) / 5, 0]], atol=1e-9)
+
+
+def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -> None:
+    window = np.array([100])
+    middle = float(RADAR.window_times(window)[0]) + RADAR.chirp_duration_s / 2
+    there = [[8.0], [8.1]]
+    # Two receivers; the second sees the echo before the moment only, and its length then means nothing.
+    rung = Told(lambda t: there if t < middle else [[8.0], [100.0]], lambda t: [[1.0], [float(t < middle)]], [0])
+    found = look(spheres, rung, windows=window)
+    np.testing.assert_allclose([found.range_m, found.velocity_mps, found.power_m2], [[[4.0]], [[0.0]], [[0.5]]], atol=1e-12)
+    gone = look(spheres, Told(lambda t: there, lambda t: [[float(t < middle)]] * 2, [0]), windows=window)
+    assert gone.power_m2.tolist() == [[0.0]]
+
+
+def test_long_captures_and_rich_rooms_keep_no_more(spheres: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "MOST_STEPS", 4)
+    monkeypatch.setattr(module, "MOST_ECHOES", 25)
+    scene = Scene(name="one wall", walls=(WALL,))
+    found = look(spheres, Multipath(RADAR, spheres, scene, fidelity="analytic"), scene)
+    windows = RADAR.window_starts(N_CHIRPS)
+    assert found.window.tolist() == list(range(0, len(windows), -(-len(windows) // 4)))
+    np.testing.assert_allclose(found.times, RADAR.window_times(windows)[found.window])
+    assert found.direct.sum() == 21
+    assert len(found.echo_part) == 25
+
+
+def test_moments_come_at_most_40_times_a_second(spheres: Body) -> None:
+    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True), windows=np.arange(0, 600))
+    # Cycles of 0.5 ms
+    assert np.diff(found.window).tolist() == [50] * (len(found.window) - 1)
+
+
+def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(spheres: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, 1.0, 0.0), yaw_deg=30)
+    lamp = Furniture(name="lamp", mesh="lamp", material=material("metal"), position_m=(1.0, -1.0, 0.0))
+    scene = Scene(name="furnished", furniture=(chair, lamp))
+    rung = build_rung("analytic", RADAR, spheres, spreading=True)
+    limit = len(chair.triangles().faces)
+    assert limit < len(lamp.triangles().faces)
+    monkeypatch.setattr(module, "MOST_FACES", limit)
+    found = look(spheres, rung, scene, windows=np.array([0]))
+    vertices = found.furniture_vertices.astype(float)
+    own = found.furniture_faces[: len(chair.triangles().faces)]
+    np.testing.assert_allclose(vertices[own], chair.triangles().corners, atol=1e-6)
+    box = found.furniture_faces[len(own) :]
+    assert len(box) == 12
+    assert (found.furniture_piece[box] == 1).all()
+    low, high = lamp.triangles().vertices.min(axis=0), lamp.triangles().vertices.max(axis=0)
+    sides = vertices[box]
+    area = np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    a, b, c = high - low
+    assert area.sum() == pytest.approx(2 * (a * b + b * c + c * a), rel=1e-5)
+    # Closed, all faces outward: the volume by the divergence theorem.
+    assert abs(np.einsum("ij,ij->i", sides[:, 0], np.cross(sides[:, 1], sides[:, 2])).sum() / 6) == pytest.approx(
+        a * b * c, rel=1e-4
+    )

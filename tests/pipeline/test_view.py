@@ -1,0 +1,177 @@
+"""`rtradar view`: pages and stills of a run, and what is said where a folder holds none."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import h5py
+import matplotlib.image
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.cli import main
+from rtradar.pipeline.view import load_linked, view
+from rtradar.report.linked import COLOURS
+from rtradar.scene import Scene, Wall, material
+
+RADAR = rt.Radar(
+    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+)
+ROOM = Scene(
+    name="one wall",
+    walls=(
+        Wall(
+            name="left",
+            corner_m=(-4.4, 2.7, 0.0),
+            edge_u_m=(6.8, 0.0, 0.0),
+            edge_v_m=(0.0, 0.0, 2.5),
+            material=material("metal"),
+            thickness_m=0.01,
+        ),
+    ),
+)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("made")
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
+    rt.run(motion, RADAR, ROOM, out=out, fidelity="analytic", clutter_removal="mean")
+    return out
+
+
+def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
+    linked = load_linked(made)
+    shown = linked.range_doppler.low_db + linked.range_doppler.step_db * linked.range_doppler.level.astype(float)
+    with h5py.File(made / "maps.h5") as maps:
+        assert linked.moments.times.tolist() == pytest.approx(maps["time"][linked.moments.window])
+        power, velocity = maps["range_doppler"][:][linked.moments.window], maps["velocity"][:]
+    # Of 8 channels, 9.03 dB
+    level = np.maximum(10 * np.log10(power) - 10 * np.log10(8), linked.range_doppler.low_db)
+    assert np.abs(shown - level).max() <= linked.range_doppler.step_db / 2 * 1.001
+    assert linked.range_doppler.across == pytest.approx((velocity[0], velocity[1] - velocity[0]))
+
+
+def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
+    linked = load_linked(made)
+    moments, levels = linked.moments, linked.range_doppler
+    near = 0
+    for step in range(len(moments.times)):
+        row, column = np.unravel_index(levels.level[step].argmax(), levels.level.shape[1:])
+        distance, velocity = levels.up[0] + row * levels.up[1], levels.across[0] + column * levels.across[1]
+        bins = np.hypot(
+            (moments.range_m[step] - distance) / levels.up[1], (linked.shown_velocity()[step] - velocity) / levels.across[1]
+        )
+        near += bins[linked.seen[step]].min() <= 1.5
+    # One of them is within its cell or next to it, but for the odd window in which parts interfere.
+    assert near >= len(moments.times) - 1
+
+
+def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
+    linked = load_linked(made)
+    with h5py.File(made / "maps.h5") as maps:
+        time, distance, velocity = (maps[name][:] for name in ("time", "range", "velocity"))
+        for point in (0, 17, len(linked.rdt_points) - 1):
+            t, r, v = linked.rdt_points[point]
+            cell = maps["range_doppler"][
+                int(abs(time - t).argmin()), int(abs(distance - r).argmin()), int(abs(velocity - v).argmin())
+            ]
+            assert linked.rdt_power_db[point] == pytest.approx(10 * np.log10(cell / 8), abs=1e-4)
+
+
+@pytest.mark.parametrize("colour", COLOURS)
+def test_a_still_shows_the_moment_in_those_colours(made: Path, tmp_path: Path, colour: str) -> None:
+    told = view(made, still=tmp_path / "a.png", time_s=0.1, colour=colour)
+    view(made, still=tmp_path / "b.png", time_s=0.3, colour=colour)
+    first, second = (matplotlib.image.imread(tmp_path / name) for name in ("a.png", "b.png"))
+    assert told["still"]["time_s"] == pytest.approx(0.1, abs=0.0125)
+    assert "page" not in told
+    assert first.shape == second.shape
+    assert (first != second).any(axis=2).sum() > 1000
+    assert (np.ptp(first[..., :3], axis=2) > 0.25).sum() > 5000
+
+
+def test_the_command_writes_what_it_is_asked_for(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(made, folder)
+    opened: list[str] = []
+    monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
+    assert main(["view", str(folder), "--no-browser", "--json", str(tmp_path / "told.json")]) == 0
+    told = json.loads((tmp_path / "told.json").read_text())
+    assert told["page"] == {"path": str(folder / "view.html"), "bytes": (folder / "view.html").stat().st_size}
+    assert told["page"]["bytes"] < 8e6
+    assert main(["view", str(folder), "--out", str(tmp_path / "own.html"), "--still", str(tmp_path / "own.png")]) == 0
+    assert (tmp_path / "own.html").read_bytes() == (folder / "view.html").read_bytes()
+    (folder / "view.html").unlink()
+    assert main(["view", str(folder), "--still", str(tmp_path / "own.png"), "--time", "0.2"]) == 0
+    assert not opened
+    assert not (folder / "view.html").exists()
+    assert main(["view", str(folder)]) == 0
+    assert opened == [(folder / "view.html").as_uri()]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "said"),
+    [
+        ("summary.json", None, "holds no run"),
+        ("summary.json", "{", "is damaged"),
+        ("summary.json", '{"parameters": {"radar": {"tx_y": -1}}}', "tx_y = -1"),
+        ("view.npz", None, "is not there"),
+        ("maps.h5", None, "No such file"),
+        ("maps.h5", "text", "is damaged"),
+        ("cloud_rdt.npz", None, "is not there"),
+        ("cloud_xyz.npz", "text", "is damaged"),
+    ],
+)
+def test_a_folder_without_a_whole_run_is_refused_in_one_line(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str | None, said: str
+) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(made, folder, ignore=shutil.ignore_patterns("*.png", "*.html"))
+    (folder / name).unlink()
+    if content is not None:
+        (folder / name).write_text(content)
+    assert main(["view", str(folder), "--out", str(tmp_path / "v.html")]) == 2
+    error = capsys.readouterr().err
+    assert said in error
+    assert error.count("\n") == 1
+    assert not (tmp_path / "v.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--still", "s.png", "--time", "7"], "time_s = 7.0; the capture has windows from"),
+        (["--time", "0.1"], "give --still"),
+        (["--out", "nowhere/v.html"], "give a folder that exists"),
+        (["--still", "nowhere/s.png"], "give a folder that exists"),
+    ],
+)
+def test_bad_options_are_refused(
+    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["view", str(made), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert not list(tmp_path.iterdir())
+
+
+def test_moments_of_another_run_are_refused(made: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(made, folder)
+    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.1), RADAR, out=tmp_path / "short", fidelity="analytic")
+    shutil.copy(tmp_path / "short" / "maps.h5", folder / "maps.h5")
+    with pytest.raises(rt.InputError, match="not of one run"):
+        view(folder, page=tmp_path / "v.html")
+
+
+def test_a_capture_too_short_for_a_spectrogram_is_shown_without(tmp_path: Path) -> None:
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=1e-3, samples_per_chirp=128, frame_duration_s=0.05)
+    rt.run(rt.synthetic_motion("kick", seed=1, duration_s=1.0), radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
+    view(tmp_path, page=tmp_path / "v.html", still=tmp_path / "s.png")
+    text = (tmp_path / "v.html").read_text(encoding="utf-8")
+    assert "The capture is too short for one." in text
+    assert 'id="scene-spectrogram"' not in text

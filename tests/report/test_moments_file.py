@@ -1,0 +1,113 @@
+"""``view.npz``: what is written is read again, and nothing else is taken for it."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.report.moments import Moments, load_moments, save_moments
+
+
+def example() -> Moments:
+    rng = np.random.default_rng(0)
+    return Moments(
+        times=np.array([0.1, 0.2]),
+        window=np.array([0, 4]),
+        part_names=np.array(["head", "left foot", "neck"]),
+        poses=rng.normal(size=(2, 3, 4, 3)).astype(np.float32),
+        path_names=np.array(["body", "body > floor"]),
+        echo_path=np.array([0, 0, 1, 1]),
+        echo_part=np.array([0, 1, 2, 0]),
+        echo_bounces=np.array([1, 1, 2, 2]),
+        range_m=rng.uniform(2, 5, (2, 4)),
+        velocity_mps=rng.normal(size=(2, 4)),
+        power_m2=rng.uniform(size=(2, 4)),
+        corners=np.full((2, 4, 2, 3), np.nan, dtype=np.float32),
+        wall_names=np.array([], dtype=np.str_),
+        walls=np.zeros((0, 4, 3)),
+        furniture_names=np.array(["chair"]),
+        furniture_vertices=np.eye(3, dtype=np.float32),
+        furniture_faces=np.array([[0, 1, 2]]),
+        furniture_piece=np.array([0, 0, 0]),
+    )
+
+
+def test_what_is_written_is_read_again(tmp_path: Path) -> None:
+    save_moments(tmp_path / "view.npz", example())
+    found = load_moments(tmp_path / "view.npz")
+    for field in fields(Moments):
+        ours, read = getattr(example(), field.name), getattr(found, field.name)
+        assert ours.dtype.kind == read.dtype.kind
+        np.testing.assert_array_equal(ours, read)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "said"),
+    [
+        ("times", np.array([0.2, 0.1]), "ascend"),
+        ("times", np.array([0.1, np.nan]), "NaN"),
+        ("times", np.zeros(0), "length 0"),
+        ("window", np.array([0.0, 1.0]), "int64"),
+        ("poses", np.zeros((2, 3, 3, 3), dtype=np.float32), "axis 4 must have length 4"),
+        ("poses", np.zeros((2, 4, 4, 3), dtype=np.float32), "length 3"),
+        ("echo_part", np.array([0, 1, 2, 3]), "echo_part points at a part"),
+        ("echo_path", np.array([0, -1, 1, 1]), "echo_path points at a path"),
+        ("furniture_faces", np.array([[0, 1, 3]]), "points at a vertex"),
+        ("power_m2", np.full((2, 4), -1.0), "negative"),
+        ("walls", np.zeros((1, 4, 3)), "length 0"),
+    ],
+)
+def test_refuses_what_has_no_meaning(field: str, value: Any, said: str) -> None:
+    with pytest.raises(rt.InputError, match=said) as caught:
+        replace(example(), **{field: value})
+    assert "\n" not in str(caught.value)
+
+
+def damage(path: Path, how: str) -> None:
+    if how == "missing":
+        path.unlink()
+    elif how == "cut":
+        path.write_bytes(path.read_bytes()[:300])
+    elif how == "text":
+        path.write_text("not an archive")
+    else:
+        with np.load(path) as arrays:
+            content = {name: arrays[name] for name in arrays.files}
+        content |= {
+            "version": {"format": np.array(99)},
+            "field": {},
+            "pickle": {"walls": np.array([{}], dtype=object)},
+            "shape": {"range_m": np.zeros((1, 4))},
+            "vast": {"more": np.zeros(26_000_000)},
+        }[how]
+        if how == "field":
+            del content["corners"]
+        np.savez_compressed(path, **content)
+
+
+@pytest.mark.parametrize(
+    ("how", "said"),
+    [
+        ("missing", "is not there"),
+        ("cut", "damaged"),
+        ("text", "damaged"),
+        ("field", "damaged"),
+        ("pickle", "damaged"),
+        ("version", "another version"),
+        ("shape", "range_m has shape"),
+        ("vast", "claims more than 200 MB"),
+    ],
+)
+def test_refuses_what_is_no_such_file(tmp_path: Path, how: str, said: str) -> None:
+    path = tmp_path / "view.npz"
+    save_moments(path, example())
+    damage(path, how)
+    with pytest.raises(rt.InputError, match=said) as caught:
+        load_moments(path)
+    assert "rtradar run" in str(caught.value)
+    assert "\n" not in str(caught.value)
