@@ -63,7 +63,7 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_a_run_writes_all_its_files_and_nothing_else(walked: Path) -> None:
     names = {file.name for file in walked.iterdir()}
     pictures = {f"{name}.png" for name in ("range_time", "spectrogram", "range_doppler", "range_angle", "cloud_rdt", "cloud_xyz")}
-    clouds = {"cloud_rdt.npz", "cloud_rdt.ply", "cloud_xyz.npz"}
+    clouds = {"cloud_rdt.npz", "cloud_rdt.ply", "cloud_xyz.npz", "view.npz"}
     assert names == {"maps.h5", "summary.json", "report.html", "if.zarr", *pictures, *clouds}
 
 
