@@ -262,7 +262,8 @@ async function main() {
   };
   const paint = { intensity: each(() => 0), ...marking(first), showscale: first !== "part", colorbar: scaleBar(first) };
   const traces = [
-    ...figureTraces(paint, ""), lines("direct paths", true, 3, 0.8), lines("paths over walls", false, 1.5, 0.4),
+    // Bones stand out too much beside colours that are to be told apart; the legend brings them back.
+    ...figureTraces(paint, "").map((trace, k) => (k === 1 ? { ...trace, visible: "legendonly" } : trace)), lines("direct paths", true, 3, 0.8), lines("paths over walls", false, 1.5, 0.4),
     ...pointsTraces().map((trace) => ({ ...trace, visible: "legendonly" })), ...roomTraces(),
   ];
   const pointsTrace = spatial ? 7 : -1;
