@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import importlib.metadata
-import json
 import os
 import platform
 import sys
@@ -13,7 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rtradar.errors import BackendError, InputError
+from rtradar.errors import BackendError
+from rtradar.files import write_json
 from rtradar.trace.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.llvm import candidates
 from rtradar.trace.verdict import judge
@@ -160,10 +160,7 @@ def report(json_path: str | Path | None = None) -> int:
     found = examine()
     print(report_text(found))
     if json_path is not None:
-        try:
-            Path(json_path).write_text(json.dumps(found.as_dict(), indent=1) + "\n", encoding="utf-8")
-        except OSError as error:
-            raise InputError(f"'{json_path}' cannot be written: {error.strerror}; name a file in a folder that exists") from None
+        write_json(json_path, found.as_dict())
     return found.exit_status
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tomllib
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -13,8 +12,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.checks import shown
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.toml_tables import check_keys, read_toml
 
 PRESETS: dict[str, dict[str, Any]] = {
     "paper-12ghz": {"start_frequency_hz": 12e9, "chirp_duration_s": 62.5e-6},
@@ -35,12 +36,6 @@ _COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
-
-
-def _shown(value: object) -> str:
-    """A value as a message shows it: short, and in one line."""
-    text = repr(value) if not isinstance(value, int) or abs(value) < 10**20 else "a number of more than 20 digits"
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _is_number(value: Any) -> bool:
@@ -108,25 +103,25 @@ class Radar:
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name.isprintable()):
-            raise InputError(f"radar: name = {_shown(self.name)}; it must be one line of text")
+            raise InputError(f"radar: name = {shown(self.name)}; it must be one line of text")
         for field in _POSITIVE:
             value = getattr(self, field)
             if not (_is_number(value) and _LEAST < value < _LARGEST):
-                raise InputError(f"radar '{self.name}': {field} = {_shown(value)}; it must be a positive, finite number")
+                raise InputError(f"radar '{self.name}': {field} = {shown(value)}; it must be a positive, finite number")
             object.__setattr__(self, field, float(value))
         for field, least in _COUNTS.items():
             value = getattr(self, field)
             if not (_is_count(value) and least <= value <= _MOST):
                 raise InputError(
-                    f"radar '{self.name}': {field} = {_shown(value)}; it must be a whole number from {least} to {_MOST}"
+                    f"radar '{self.name}': {field} = {shown(value)}; it must be a whole number from {least} to {_MOST}"
                 )
             object.__setattr__(self, field, int(value))
         for field, allowed in (("channels", ("pairs", "all")), ("polarization", ("v", "h"))):
             if getattr(self, field) not in allowed:
-                raise InputError(f"radar '{self.name}': {field} = {_shown(getattr(self, field))}; allowed: {', '.join(allowed)}")
+                raise InputError(f"radar '{self.name}': {field} = {shown(getattr(self, field))}; allowed: {', '.join(allowed)}")
         position = self.position_m
         if not isinstance(position, list | tuple | np.ndarray) or len(position) != 3 or not all(map(_is_number, position)):
-            raise InputError(f"radar '{self.name}': position_m = {_shown(position)}; it must be three finite numbers [m]")
+            raise InputError(f"radar '{self.name}': position_m = {shown(position)}; it must be three finite numbers [m]")
         object.__setattr__(self, "position_m", tuple(float(value) for value in position))
         self._check_array()
         if self.cycles_per_frame < 1:
@@ -197,17 +192,9 @@ class Radar:
         path = Path(source)
         if path.suffix != ".toml":
             return cls.preset(str(source))
+        table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
         try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
-        except OSError as error:
-            raise InputError(f"radar file '{path}': {error.strerror}; give a TOML file or one of: {', '.join(PRESETS)}") from None
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"radar file '{path}' is not TOML: {str(error).splitlines()[0]}") from None
-        fields = {field.name for field in dataclasses.fields(cls)}
-        for key in table:
-            if key not in fields:
-                raise InputError(f"radar file '{path}': unknown key '{key}'; allowed: {', '.join(sorted(fields))}")
-        try:
+            check_keys("", table, (), tuple(sorted(field.name for field in dataclasses.fields(cls))))
             return cls(**{"name": path.stem, **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None

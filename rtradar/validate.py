@@ -14,7 +14,6 @@ import os
 import platform
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from typing import Any
 from tqdm import tqdm
 
 from rtradar.errors import InputError
+from rtradar.files import atomic_file, temporary_folder, write_json
 
 BEGIN, END = "<!-- validation: begin -->", "<!-- validation: end -->"
 """What stands before and after the table in a README."""
@@ -145,8 +145,8 @@ def choose(found: Sequence[Claim], only: str | None) -> list[tuple[Claim, str | 
 def run_claim(claim: Claim, *, key: str | None = None, quick: bool = False, figures: Path | None = None) -> Outcome:
     """Run one script and read its rows."""
     began, spent = time.perf_counter(), _children_s()
-    with tempfile.TemporaryDirectory(prefix="rtradar-validate-") as folder:
-        written = Path(folder, "rows.json")
+    with temporary_folder("rtradar-validate-") as folder:
+        written = folder / "rows.json"
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
@@ -269,10 +269,8 @@ def write_readme(path: Path, text: str) -> None:
         Where the file cannot be read or written, or does not have each marker once, in that order.
     """
     content = _between(path)
-    try:
-        path.write_text(f"{content[0]}{BEGIN}\n\n{text}\n\n{END}{content[1]}", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--readme {path}: {error.strerror}; name a file that can be written") from None
+    with atomic_file(path) as file:
+        file.write(f"{content[0]}{BEGIN}\n\n{text}\n\n{END}{content[1]}".encode())
 
 
 def _between(path: Path) -> tuple[str, str]:
@@ -382,7 +380,4 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
             for row in outcome.rows
         ],
     }
-    try:
-        path.write_text(json.dumps(content, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--json {path}: {error.strerror}; give another file") from None
+    write_json(path, content)

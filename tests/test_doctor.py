@@ -75,7 +75,7 @@ def test_the_report_goes_to_the_terminal_and_to_json(
     assert doctor.report(tmp_path / "doctor.json") == 0
     assert "Cores" in capsys.readouterr().out
     assert json.loads((tmp_path / "doctor.json").read_text()) == doctor.examine().as_dict() | _memory(tmp_path / "doctor.json")
-    with pytest.raises(InputError, match="cannot be written"):
+    with pytest.raises(InputError, match="cannot write"):
         doctor.report(tmp_path / "no" / "doctor.json")
 
 

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import sys
-import tempfile
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
@@ -21,6 +19,7 @@ from rtradar.bench.rows import chirp_rows, rung_row
 from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
 from rtradar.bench.tables import tables
 from rtradar.errors import InputError
+from rtradar.files import atomic_file, temporary_folder, write_json
 from rtradar.radar import Radar
 
 __all__ = ["Plan", "bench", "plan_of"]
@@ -58,13 +57,11 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
         print(f"rtradar: {error}", file=sys.stderr)
         return 1
     print(tables(found))
-    try:
-        if json_path is not None:
-            json_path.write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        if figure is not None:
-            draw(found, figure)
-    except OSError as error:
-        raise InputError(f"cannot write '{error.filename}': {error.strerror}; give another file") from None
+    if json_path is not None:
+        write_json(json_path, found)
+    if figure is not None:
+        with atomic_file(figure) as file:
+            draw(found, file)
     return 0
 
 
@@ -88,13 +85,13 @@ def measure(plan: Plan) -> dict[str, Any]:
         "paper": {"trouble": "", "radars": {}},
         "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": [], "channels": [], "echoes": []},
     }
-    with tempfile.TemporaryDirectory(prefix="rtradar-bench-") as folder:
-        runner = Runner(Path(folder))
+    with temporary_folder("rtradar-bench-") as folder:
+        runner = Runner(folder)
         if "rungs" in plan.parts:
             _measure_rungs(plan, runner, found)
         if "growth" in plan.parts:
             found["growth"]["duration"] = with_duration(plan, runner)
-            found["growth"]["channels"] = with_channels(plan, runner, Path(folder))
+            found["growth"]["channels"] = with_channels(plan, runner, folder)
             found["growth"]["echoes"] = with_echoes(Radar.load(plan.radars[0]))
     return found
 

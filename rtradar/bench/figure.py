@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from rtradar.bench.times import FILES, OTHER_PRODUCTS
 
 Row = dict[str, Any]
 
 
-def draw(found: dict[str, Any], path: Path) -> None:
+def draw(found: dict[str, Any], file: BinaryIO) -> None:
     """Draw what `rtradar.bench.bench` found, as PNG."""
     import matplotlib as mpl
 
@@ -37,7 +36,7 @@ def draw(found: dict[str, Any], path: Path) -> None:
             _lines(axes, growth[name], key, label, [("to_cloud_s", "to the cloud"), ("whole_s", "whole run")])
             _memory(axes.twinx(), growth[name], key)
             axes.set_title(f"`{growth['fidelity']}`", fontsize=9)
-    figure.savefig(path, dpi=110)
+    figure.savefig(file, format="png", dpi=110)
     plt.close(figure)
 
 

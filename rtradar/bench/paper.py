@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path
 
 from rtradar.bench.runs import RunError
 from rtradar.bench.times import Spread, by_stage
+from rtradar.files import temporary_folder
 from rtradar.validate import validation_folder
 
 IF_STAGE = "echoes and IF"
@@ -59,8 +58,8 @@ def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | Non
     script = validation_folder() / "paper_numpy.py"
     if not script.is_file():
         return None
-    with tempfile.TemporaryDirectory() as folder:
-        written = Path(folder, "frames.json")
+    with temporary_folder() as folder:
+        written = folder / "frames.json"
         command = [sys.executable, str(script), "--radar", radar, "--repeats", str(repeats), "--json", str(written)]
         command += ["--cycles", str(_QUICK_CYCLES)] if quick else []
         done = subprocess.run(command, capture_output=True, text=True, check=False)

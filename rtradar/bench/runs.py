@@ -7,7 +7,6 @@ import os
 import site
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -19,6 +18,7 @@ from tqdm import tqdm
 
 from rtradar.bench.plan import Case
 from rtradar.bench.times import to_cloud_s, with_elsewhere
+from rtradar.files import temporary_folder
 
 MOTION = "synthetic:walk"
 
@@ -111,10 +111,10 @@ class Runner:
 
     def run(self, case: Case) -> Run:
         """One run of a case."""
-        with tempfile.TemporaryDirectory(dir=self._folder) as out:
-            written = Path(out, "said.json")
+        with temporary_folder(inside=self._folder) as out:
+            written = out / "said.json"
             command = [sys.executable, "-m", "rtradar", "run", MOTION, "--duration", str(case.duration_s), "--radar", case.radar]
-            command += ["--fidelity", case.fidelity, "--out", str(Path(out, "run")), "--json", str(written)]
+            command += ["--fidelity", case.fidelity, "--out", str(out / "run"), "--json", str(written)]
             with _on_one_core(case.one_core):
                 began = time.perf_counter()
                 done = subprocess.run(command, env=self._environment(case.fidelity), capture_output=True, text=True, check=False)

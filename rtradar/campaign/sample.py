@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.collection import FORMAT, Sample
+from rtradar.clouds.collection import Sample
+from rtradar.clouds.sample_file import FORMAT
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion, cut, synthetic_motion
 from rtradar.pipeline import clouds_of

@@ -5,25 +5,27 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import os
+import re
 from pathlib import Path
 from typing import Any
 
 from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec
 from rtradar.campaign.windows import WINDOW_KEYS, Windows
+from rtradar.checks import check_number, check_text, check_vector, inside, shown
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS
 from rtradar.radar import Radar
 from rtradar.scatter import RUNGS
 from rtradar.scene import Scene
-from rtradar.scene.checks import check_number, check_text, check_vector, shown
-from rtradar.scene.toml_tables import Table, check_keys, read_toml, table_at, tables_at
+from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 _TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
 _EACH = ("radar", "scene", "fidelity", "heading_deg", "snr_db", "person_position_m", "radar_position_m")
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *WINDOW_KEYS)
 _MOST = 1_000_000
+_VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
 def read_spec(path: Path) -> Spec:
@@ -81,13 +83,22 @@ def _spec(table: Table, folder: Path) -> Spec:
 
 
 def _folder(table: Table, beside: Path) -> Path:
+    """Of the recordings: below the file's own, or below one that a variable of the environment allows."""
     named = check_text("data set", "folder", table.get("folder", "."))
-    there = os.path.expandvars(named)
-    if "$" in there:
-        raise InputError(f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings")
-    if not (beside / there).is_dir():
+    allowed, below = beside, named
+    if variable := _VARIABLE.match(named):
+        if not os.environ.get(variable[1]):
+            raise InputError(f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings")
+        allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
+    there = inside(allowed, below)
+    if there is None:
+        raise InputError(
+            f"folder = {shown(named)} leaves the folder of the file; put recordings below it, or name a variable of the "
+            'environment that holds their folder: "${RECORDINGS}"'
+        )
+    if not there.is_dir():
         raise InputError(f"folder = {shown(named)}: there is no such folder")
-    return beside / there
+    return there
 
 
 def _settings(each: Table, folder: Path) -> tuple[Setting, ...]:
@@ -129,6 +140,8 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     source = check_text("[each]", key, value)
+    if source.endswith(".toml") and inside(folder, source) is None:
+        raise InputError(f"[each] {key} = {shown(source)} leaves the folder of the file; put it beside it or below")
     try:
         return load(folder / source if source.endswith(".toml") else source)
     except InputError as error:
@@ -164,6 +177,8 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> Recorde
     texts = {key: check_text(where.strip(), key, table[key]) for key in ("file", "label", "subject", "licence")}
     skeleton = check_text(where.strip(), "skeleton", table["skeleton"]) if "skeleton" in table else None
     for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
+        if name is not None and inside(folder, name) is None:
+            raise InputError(f"{where}{key} = {shown(name)} leaves the folder of recordings; name files in it or below")
         if name is not None and not (folder / name).is_file():
             raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")
     own = {key: value for key, value in table.items() if key in WINDOW_KEYS}

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import torch
 
-from rtradar.clouds import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 
+_MOST_BYTES = 1_000_000_000  # of PointNet with its optimiser: 42 MB
 _KEYS = ("network", "optimiser", "epochs", "history")
 
 
@@ -52,12 +54,25 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """
     cure = "remove it to train anew, or give another folder"
     try:
+        if path.stat().st_size > _MOST_BYTES:
+            raise InputError(f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}")
+        _check_archive(path)
         content = torch.load(path, map_location="cpu", weights_only=True)
+    except InputError:
+        raise
     except OSError as error:
         raise InputError(f"cannot read '{path}': {error.strerror}; {cure}") from None
     except Exception as error:  # torch raises whatever its archive reader and unpickler do
         why = str(error).strip().splitlines()[0][:80] if str(error).strip() else type(error).__name__
         raise InputError(f"'{path}' is no checkpoint that can be read safely, or is damaged ({why}); {cure}") from None
-    if not isinstance(content, dict) or set(content) != set(_KEYS):
+    kinds = dict, dict, int, list
+    if not isinstance(content, dict) or set(content) != set(_KEYS) or not all(map(isinstance, map(content.get, _KEYS), kinds)):
         raise InputError(f"'{path}' is no checkpoint of rtradar: it must hold {', '.join(_KEYS)}; {cure}")
     return Checkpoint(**content)
+
+
+def _check_archive(path: Path) -> None:
+    """Raise where the file is not the kind of archive that `save_checkpoint` writes: nothing in it is larger than it is."""
+    with zipfile.ZipFile(path) as archive:
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+            raise ValueError("it is compressed")

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 
 from rtradar.classify.source import Clouds
 from rtradar.classify.splits import Split
-from rtradar.clouds import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file, read_json
+
+HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "seconds")
+"""What was measured in every epoch."""
 
 
 @dataclass(frozen=True)
@@ -85,10 +88,28 @@ def save_outcome(path: Path, outcome: Outcome) -> None:
 def load_outcome(path: Path) -> Outcome:
     """Read it; InputError where that is not possible."""
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
         kinds = {"indices": np.int64, "truth": np.int64, "predicted": np.int64, "tested_on": np.str_, "recordings": np.str_}
         for name, kind in kinds.items():
             content[name] = np.array(content[name], dtype=kind)
-        return Outcome(**content)
-    except (OSError, ValueError, KeyError, TypeError):
+        outcome = Outcome(**content)
+        if not _is_whole(outcome):
+            raise ValueError
+        return outcome
+    except (OSError, ValueError, KeyError, TypeError, OverflowError):
         raise InputError(f"'{path}' is damaged; remove it and train again: what is done is kept in its checkpoint") from None
+
+
+def _is_whole(outcome: Outcome) -> bool:
+    """Whether everything is there and of its kind."""
+    columns = [getattr(outcome, name) for name in ("indices", "truth", "predicted", "tested_on", "recordings")]
+    return (
+        isinstance(outcome.name, str)
+        and isinstance(outcome.trained_on, str)
+        and all(column.shape == (len(outcome.truth),) for column in columns)
+        and len(outcome.truth) > 0
+        and min(outcome.truth.min(), outcome.predicted.min()) >= 0
+        and isinstance(outcome.history, list)
+        and all(isinstance(row, dict) and set(row) == set(HISTORY) for row in outcome.history)
+        and all(isinstance(value, int | float) for row in outcome.history for value in row.values())
+    )

@@ -22,10 +22,11 @@ from rtradar.classify.recipes import Recipe
 from rtradar.classify.source import Clouds
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples, check_points, predict, train_network
-from rtradar.clouds import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file, read_json
 
 _PLAN_KEYS = ("data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings")
+_MOST_NAMES = 10_000  # of classes, and of trainings
 _PLAN, _CHECKPOINT, _OUTCOME = "plan.json", "checkpoint.pt", "outcome.json"
 
 
@@ -156,6 +157,8 @@ def load_study(folder: Path) -> Study:
     names = plan["trainings"]
     paths = [training_folder(folder, number) / _OUTCOME for number in range(len(names))]
     outcomes = [load_outcome(path) for path in paths if path.exists()]
+    if any(max(one.truth.max(), one.predicted.max()) >= len(plan["classes"]) for one in outcomes):
+        raise InputError(f"'{folder}': answers name more classes than '{_PLAN}' does; train into another folder")
     if not outcomes:
         raise InputError(f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on")
     return Study(folder, plan, outcomes)
@@ -222,7 +225,7 @@ def _check_plan(out: Path, plan: dict[str, Any]) -> None:
     if not path.exists():
         return
     try:
-        there = json.loads(path.read_text(encoding="utf-8"))
+        there = read_json(path)
         other = next((name for name, value in plan.items() if name != "data" and there.get(name) != value), None)
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
@@ -242,8 +245,15 @@ def _write_plan(out: Path, plan: dict[str, Any]) -> None:
 
 def _read_plan(folder: Path) -> dict[str, Any]:
     try:
-        plan = json.loads((folder / _PLAN).read_text(encoding="utf-8"))
+        plan = read_json(folder / _PLAN)
         Recipe(**plan["recipe"])
+        for name in ("data", "classes", "trainings"):
+            if (
+                (name != "data" and not plan[name])
+                or len(plan[name]) > _MOST_NAMES
+                or not all(isinstance(one, str) for one in plan[name])
+            ):
+                raise ValueError
         return {name: plan[name] for name in _PLAN_KEYS}
     except OSError as error:
         raise InputError(f"'{folder}' holds no trainings ({_PLAN}: {error.strerror}); make them with: rtradar train") from None

@@ -11,12 +11,11 @@ from __future__ import annotations
 import argparse
 import sys
 import warnings
-from importlib.metadata import version
 from typing import TextIO
 
-from rtradar.cli import captures, checks, classifiers, datasets, exports, viewing
-from rtradar.cli.values import OneLineParser, fail
 from rtradar.errors import BackendError, CampaignError, InputError
+
+_WHOLE = "nothing was left half-written"
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -25,11 +24,25 @@ def main(arguments: list[str] | None = None) -> int:
     Parameters
     ----------
     arguments : list of str, optional
-        Instead of those of the process.
+        Instead of those of the process. Left out, signals that ask the process to end are taken care of.
     """
+    from rtradar.cli.ending import end_well, stay_if_ending
+
+    options = argparse.Namespace(stopped=_WHOLE)
+    if arguments is None:
+        end_well(lambda: options.stopped.format(**vars(options)))
+    status = _main(arguments, options)
+    stay_if_ending()
+    return status
+
+
+def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
+    # After the first moments, in which a signal would still show a traceback.
+    from rtradar.cli.values import fail
+
     warnings.showwarning = _show_warning
     try:
-        options = _parser().parse_args(arguments)
+        _parser().parse_args(arguments, options)
     except SystemExit as stop:
         return int(stop.code or 0)
     try:
@@ -39,9 +52,9 @@ def main(arguments: list[str] | None = None) -> int:
     except (BackendError, CampaignError) as error:
         return fail(1, error)
     except KeyboardInterrupt:
-        return fail(1, "stopped by the user; nothing was left half-written")
+        return fail(1, f"stopped by the user; {options.stopped.format(**vars(options))}")
     except MemoryError as error:
-        return fail(1, f"out of memory ({str(error) or 'no more to be had'}); nothing was left half-written")
+        return fail(1, f"out of memory ({str(error) or 'no more to be had'}); {_WHOLE}")
     except BrokenPipeError:
         return 1
     return status
@@ -59,6 +72,11 @@ def _show_warning(
 
 
 def _parser() -> argparse.ArgumentParser:
+    from importlib.metadata import version
+
+    from rtradar.cli import captures, checks, classifiers, datasets, exports, viewing
+    from rtradar.cli.values import OneLineParser
+
     parser = OneLineParser(
         prog="rtradar", description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds."
     )

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import check_json_folder, decibels, number, seconds, whole, write_json
+from rtradar.cli.values import check_json_folder, decibels, number, seconds, whole
 from rtradar.errors import InputError
+from rtradar.files import write_json
 from rtradar.radar import PRESETS
 
 if TYPE_CHECKING:

@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder, fail, number, numbers, whole, write_json
+from rtradar.cli.values import check_json_folder, number, numbers, whole
 from rtradar.errors import InputError
+from rtradar.files import write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -48,7 +49,7 @@ def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument("--precision", help="of the search for maxima: bfloat16 or float32 (default: what is faster here)")
     train.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="where to compute (default: auto)")
     train.add_argument("--seed", type=whole, default=0, metavar="N", help="of splits and trainings (default: 0)")
-    train.set_defaults(command=_train)
+    train.set_defaults(command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is")
 
 
 def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
@@ -83,20 +84,17 @@ def _train(options: argparse.Namespace) -> int:
         augmentation=options.augmentation,
         precision=options.precision or pick_precision(device),
     )
-    try:
-        study = train_study(
-            Collection(*options.data),
-            options.out,
-            recipe,
-            data=[str(folder.resolve()) for folder in options.data],
-            split=options.split,
-            folds=options.folds,
-            seed=options.seed,
-            only=options.fold,
-            device=device,
-        )
-    except KeyboardInterrupt:
-        return fail(1, f"stopped by the user; the same command goes on where the last checkpoint in '{options.out}' is")
+    study = train_study(
+        Collection(*options.data),
+        options.out,
+        recipe,
+        data=[str(folder.resolve()) for folder in options.data],
+        split=options.split,
+        folds=options.folds,
+        seed=options.seed,
+        only=options.fold,
+        device=device,
+    )
     done, planned = len(study.outcomes), len(study.plan["trainings"])
     print(f"{done} of {planned} trained; see how well: rtradar evaluate {options.out}")
     return 0
@@ -105,6 +103,7 @@ def _train(options: argparse.Namespace) -> int:
 def _evaluate(options: argparse.Namespace) -> int:
     check_json_folder(options.json)
     from rtradar.classify.study import load_study
+    from rtradar.pipeline.folder import all_or_nothing
     from rtradar.report.evaluation import write_evaluation
 
     studies = [load_study(folder) for folder in options.trained]
@@ -117,7 +116,8 @@ def _evaluate(options: argparse.Namespace) -> int:
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
     out = options.out or options.trained[0]
-    table, content = write_evaluation(studies, baselines, out)
+    with all_or_nothing(out) as folder:
+        table, content = write_evaluation(studies, baselines, folder)
     if options.json is not None:
         write_json(options.json, content)
     print(f"{table}\n\nsee {out}")

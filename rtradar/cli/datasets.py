@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import OneLineParser, check_json_folder, count, write_json
+from rtradar.cli.values import OneLineParser, check_json_folder, count
+from rtradar.files import write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -25,7 +26,7 @@ def add(commands: Subcommands) -> None:
     place.add_argument("--workers", type=count, metavar="N", help="processes that share the cores (default: one a core)")
     place.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler to use, such as tcp://host:8786")
     build.add_argument("--json", type=Path, metavar="FILE", help="write what was made there as JSON")
-    build.set_defaults(command=_dataset_build)
+    build.set_defaults(command=_dataset_build, stopped="the same command goes on with the samples that '{out}' has not yet")
 
 
 def _dataset_build(options: argparse.Namespace) -> int:

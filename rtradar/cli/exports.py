@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder, write_json
+from rtradar.cli.values import check_json_folder
+from rtradar.files import write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands

@@ -1,13 +1,12 @@
-"""Values on the command line, and JSON for machines."""
+"""Values on the command line."""
 
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import TYPE_CHECKING, NoReturn
 
 from rtradar.errors import InputError
 
@@ -33,14 +32,6 @@ def check_json_folder(path: Path | None) -> None:
     """A JSON file that cannot be written is found out before the work, not after it."""
     if path is not None and not path.resolve().parent.is_dir():
         raise InputError(f"--json {path}: there is no folder '{path.resolve().parent}'; make it first")
-
-
-def write_json(path: Path, content: dict[str, Any]) -> None:
-    """Write what a command found where ``--json`` asks for it."""
-    try:
-        path.write_text(json.dumps(content, indent=2) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
 
 
 def number(text: str) -> float:

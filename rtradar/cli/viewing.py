@@ -6,8 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder, seconds, write_json
+from rtradar.cli.values import check_json_folder, seconds
 from rtradar.errors import InputError
+from rtradar.files import write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands

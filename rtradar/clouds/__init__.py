@@ -1,10 +1,11 @@
 """Point clouds from detections."""
 
 from rtradar.clouds.collection import Collection, Sample
-from rtradar.clouds.files import RDT_AXES, RDT_UNITS, atomic_file, save_cloud_npz, save_ply
+from rtradar.clouds.files import RDT_AXES, RDT_UNITS, save_cloud_npz, save_ply
 from rtradar.clouds.rdt import RdtCloud, RdtCloudResult, rdt_isosurface, sample_centres
 from rtradar.clouds.sampling import UniformSample
 from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_points
+from rtradar.files import atomic_file
 
 __all__ = [
     "RDT_AXES",

@@ -11,6 +11,7 @@ import hashlib
 import io
 import json
 import os
+import re
 import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -20,17 +21,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.clouds.files import atomic_file
+from rtradar.checks import shown
+from rtradar.clouds.sample_file import DIGEST, FORMAT, read_sample
 from rtradar.errors import InputError
-
-FORMAT = 1
-"""Of a sample's file and of the index; a reader refuses others."""
+from rtradar.files import atomic_file, read_json
 
 INDEX = "collection.json"
 """Name of the file that says which samples belong to the collection."""
 
-_DIGEST = 64  # hexadecimal digits of SHA-256
-_DAMAGE = (OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError)  # what reading a damaged archive may raise
+_IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a name, and no way to another folder
 
 
 @dataclass(frozen=True)
@@ -83,7 +82,7 @@ class Collection:
                 )
         if len(once := set(self._ids)) < len(self._ids):
             raise InputError(f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; leave one out")
-        self._about = [self._read(index, "about") for index in range(len(self._ids))]
+        self._about = [read_sample(path, "about") for path in self._paths]
 
     def __len__(self) -> int:
         return len(self._ids)
@@ -146,7 +145,7 @@ class Collection:
         InputError
             Where its file is damaged.
         """
-        return np.asarray(self._read(index, "points"))
+        return np.asarray(read_sample(self._paths[index], "points"))
 
     def spatial(self, index: int) -> NDArray[np.float64]:
         """The spatial cloud of the same capture (m, 3): x, y, z [m], in the order of time; m may be 0.
@@ -165,19 +164,7 @@ class Collection:
         InputError
             Where its file is damaged.
         """
-        return np.asarray(self._read(index, "spatial"))
-
-    def _read(self, index: int, name: str) -> Any:
-        path = self._paths[index]
-        try:
-            # Not all of the file: the archive has a checksum of each array, and the comment is the end of the file.
-            with zipfile.ZipFile(path) as archive, archive.open(f"{name}.npy") as entry:
-                if len(archive.comment) != _DIGEST:
-                    raise ValueError
-                values = np.lib.format.read_array(entry, allow_pickle=False)
-            return json.loads(values.tobytes()) if name == "about" else values
-        except _DAMAGE:
-            raise InputError(f"sample '{path}' is damaged; mend the collection with: rtradar dataset build") from None
+        return np.asarray(read_sample(self._paths[index], "spatial"))
 
 
 def sample_path(folder: Path, identity: str) -> Path:
@@ -222,8 +209,8 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
             entry = io.BytesIO()
             np.lib.format.write_array(entry, values, version=(1, 0), allow_pickle=False)
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), entry.getvalue())  # dated 1980, always
-        archive.comment = b"0" * _DIGEST
-    body = buffer.getvalue()[:-_DIGEST]
+        archive.comment = b"0" * DIGEST
+    body = buffer.getvalue()[:-DIGEST]
     whole = body + hashlib.sha256(body).hexdigest().encode()
     with atomic_file(sample_path(folder, identity)) as file:
         file.write(whole)
@@ -238,7 +225,7 @@ def is_whole(path: Path) -> bool:
         whole = path.read_bytes()
     except OSError:
         return False
-    return len(whole) > _DIGEST and hashlib.sha256(whole[:-_DIGEST]).hexdigest().encode() == whole[-_DIGEST:]
+    return len(whole) > DIGEST and hashlib.sha256(whole[:-DIGEST]).hexdigest().encode() == whole[-DIGEST:]
 
 
 def sweep(folder: Path) -> int:
@@ -274,7 +261,7 @@ def read_index(folder: Path) -> tuple[str, ...]:
     """
     path = folder / INDEX
     try:
-        content = json.loads(path.read_text(encoding="utf-8"))
+        content = read_json(path)
     except OSError as error:
         why = error.strerror
         raise InputError(f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build") from None
@@ -282,4 +269,10 @@ def read_index(folder: Path) -> tuple[str, ...]:
         raise InputError(f"'{path}' is damaged; mend the collection with: rtradar dataset build") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("samples"), list):
         raise InputError(f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build")
-    return tuple(sorted(str(identity) for identity in content["samples"]))
+    identities = content["samples"]
+    for identity in identities:
+        if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
+            raise InputError(
+                f"'{path}' names {shown(identity)}, which is no sample; mend the collection with: rtradar dataset build"
+            )
+    return tuple(sorted(identities))

@@ -3,58 +3,19 @@
 from __future__ import annotations
 
 import os
-import secrets
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from pathlib import Path
-from typing import BinaryIO
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 
 RDT_AXES = ("time", "range", "velocity")
 """Names of the coordinates of an RDT cloud."""
 
 RDT_UNITS = ("s", "m", "m/s")
 """Their units."""
-
-
-@contextmanager
-def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A binary file to write; it takes its name when all went well, and leaves nothing otherwise.
-
-    Parameters
-    ----------
-    path : path
-        Where the file shall be; one that is there already is replaced.
-
-    Yields
-    ------
-    binary file
-        Open for writing and reading, in the same folder under another name.
-
-    Raises
-    ------
-    InputError
-        Where the folder is missing or cannot be written.
-    """
-    target = Path(path)
-    # Not by the process alone: on a shared disk another machine may write the same file.
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
-    try:
-        file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
-    except OSError as error:
-        raise InputError(f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written") from None
-    try:
-        with file:
-            yield file
-        os.replace(beside, target)
-    except OSError as error:
-        raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def save_cloud_npz(

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.files import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 from rtradar.process.angle import AngleSpectra
 from rtradar.process.peaks import Peaks, find_peaks
 from rtradar.radar import Radar

@@ -7,6 +7,7 @@ length x direction, and lengths are inches divided by the ``length`` unit of the
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,9 +19,10 @@ from rtradar.errors import InputError
 from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import ASF_JOINTS
-from rtradar.motion.textfile import fail, numbers, read_lines
+from rtradar.motion.textfile import check_size, fail, numbers, read_lines
 
 _INCH_M = 0.0254
+_FRAME_NUMBER = re.compile("-?[0-9]{1,9}")
 _RATE_HZ = 120.0
 """AMC files do not tell their rate; HDM05 and the CMU recordings here were made at 120 Hz."""
 
@@ -86,8 +88,8 @@ def load_skeleton(path: Path) -> Skeleton:
                 units["angle"] = 0.0 if words[1].lower().startswith("rad") else 1.0
             elif key == "length":
                 (units["length"],) = numbers(words[1:2], path, number)
-                if units["length"] <= 0:
-                    raise fail(path, number, f"length unit {units['length']}; it must be positive")
+                if not units["length"] > 1e-6:
+                    raise fail(path, number, f"length unit {units['length']}; it must be positive, and above 1e-6")
         elif section == ":root":
             _root_line(bones["root"], key, words, path, number)
         elif section == ":bonedata":
@@ -108,8 +110,11 @@ def load_skeleton(path: Path) -> Skeleton:
                 _hierarchy_line(words, bones, path, number)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
         raise InputError(f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut off")
+    if not bones["root"].dof:
+        raise InputError(f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of the AMC")
     if inside:
         raise fail(path, len(lines), "the hierarchy does not end; the file may be cut off")
+    check_size(path, len(bones))
     degrees = bool(units["angle"])
     if degrees:
         for each in bones.values():
@@ -262,7 +267,7 @@ def _read_frames(path: Path, skeleton: Skeleton) -> tuple[dict[str, NDArray[np.f
         if words[0].startswith(":"):
             if words[0].upper() in (":DEGREES", ":RADIANS"):
                 degrees = words[0].upper() == ":DEGREES"
-        elif len(words) == 1 and words[0].lstrip("-").isdigit():
+        elif len(words) == 1 and _FRAME_NUMBER.fullmatch(words[0]):
             finish(number - 1)
             if frame is not None and int(words[0]) != frame + 1:
                 raise fail(path, number, f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive")
@@ -287,4 +292,5 @@ def _read_frames(path: Path, skeleton: Skeleton) -> tuple[dict[str, NDArray[np.f
     if frame is None:
         raise InputError(f"{path}: no frame in this AMC file; it may be cut off")
     finish(len(lines))
+    check_size(path, len(skeleton.bones), len(table["root"]) if "root" in table else 1)
     return {name: np.array(rows) for name, rows in table.items()}, degrees

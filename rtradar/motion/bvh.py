@@ -17,13 +17,16 @@ from scipy.spatial.transform import Rotation
 from rtradar.errors import InputError
 from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.motion import Motion, rotate
-from rtradar.motion.textfile import fail, numbers, read_lines
+from rtradar.motion.textfile import check_size, fail, numbers, read_lines
 
 UNITS_M = {"metre": 1.0, "CMU unit (0.45 inch)": 0.0254 / 0.45, "inch": 0.0254, "centimetre": 0.01, "millimetre": 0.001}
 """Length units that BVH files use; the format itself has none."""
 
 _REACH_M = (0.7, 1.5)
 """Length of bones from the root to the farthest end, person: 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
+
+_SHORTEST_S, _LONGEST_S = 1e-6, 10.0
+"""What a frame may last."""
 
 _STRETCH_M = 0.02
 """Bones whose position channels move more than this are not rigid."""
@@ -58,6 +61,7 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     lines = read_lines(path, "BVH motion")
     joints, first = _read_hierarchy(lines, path)
     rate_hz, values = _read_frames(lines, first, sum(len(joint.channels) for joint in joints), path)
+    check_size(path, len(joints), len(values))
     local, positions = _channels(joints, values)
     world: list[Rotation] = []
     for joint, rotation in zip(joints, local, strict=True):
@@ -121,9 +125,13 @@ def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int]:
             if not name or any(joint.name == name for joint in joints):
                 raise fail(path, number, f"joint {name!r}: every joint needs a name of its own")
             joints.append(_Joint(name, parent, number))
+            check_size(path, len(joints))
             pending = len(joints) - 1
         elif key == "{":
+            if pending < 0:
+                raise fail(path, number, "an opening brace without a joint before it")
             stack.append(pending)
+            pending = -1
         elif key == "}":
             if not stack:
                 raise fail(path, number, "a closing brace too many")
@@ -163,8 +171,8 @@ def _read_frames(lines: list[str], first: int, width: int, path: Path) -> tuple[
             frames = int(count[0])
         elif [word.lower() for word in words[:2]] == ["frame", "time:"]:
             time = numbers(words[2:3], path, number)
-            if not time or time[0] <= 0:
-                raise fail(path, number, "Frame Time: needs a positive number of seconds")
+            if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
+                raise fail(path, number, f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}")
             interval = time[0]
         elif frames is None or interval is None:
             raise fail(path, number, "Frames: and Frame Time: must stand before the values")

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
+from rtradar.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.scene.materials import Material
 from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
 

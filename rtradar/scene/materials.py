@@ -19,8 +19,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.checks import check_number, check_text, shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import check_number, check_text, shown
 
 VACUUM_PERMITTIVITY_FPM = 8.8541878188e-12
 """Permittivity of vacuum [F/m], CODATA 2022. P.2040-3 rounds 1e-9 / (2 pi eps_0) = 17.975 to 17.98."""

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.checks import shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import shown
 from rtradar.scene.mesh_headers import refuse_hostile_header
 
 MESH_ENDINGS = (".ply", ".obj", ".stl", ".glb")

@@ -7,8 +7,8 @@ import re
 import struct
 from pathlib import Path
 
+from rtradar.checks import shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import shown
 
 _MOST_PLY_HEADER = 65_536
 _MOST_GLB_HEADER = 16_000_000

@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from rtradar.checks import Vector, check_number, check_vector, shown
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene.checks import Vector, check_number, check_vector, shown
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import Material
 from rtradar.scene.walls import Wall

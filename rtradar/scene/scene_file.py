@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rtradar.checks import check_text, inside, shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import check_text, shown
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.scene import Scene
-from rtradar.scene.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 from rtradar.scene.walls import ROOM_SIDES, Surface, Wall, room_walls
+from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 Made = TypeVar("Made")
 
@@ -116,11 +116,7 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
         return text
     if Path(text).suffix.lower() not in MESH_ENDINGS:
         raise InputError(f"{where}mesh = {shown(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
-    try:
-        inside = not Path(text).is_absolute() and (folder / text).resolve().is_relative_to(folder.resolve())
-    except (OSError, RuntimeError, ValueError):  # a circle of links, a null character
-        inside = False
-    if not inside:
+    if inside(folder, text) is None:
         raise InputError(f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside it or below")
     return folder / text
 

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.scene.materials import Material
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")

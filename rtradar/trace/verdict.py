@@ -7,17 +7,22 @@ import importlib.metadata
 import json
 import os
 import platform
+import signal
 import subprocess
 import sys
-import tempfile
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from rtradar.errors import InputError
+from rtradar.files import atomic_file, temporary_folder
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, Library
 
 TIMEOUT_S = 120.0
 """A probe takes half a second; a cold disk, or a GPU that compiles its kernels for the first time, takes longer."""
+
+_STOPPED = {-number for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))}
+"""Somebody ended the probe, with the program that waits for it perhaps: that says nothing of the library."""
 
 
 @dataclass(frozen=True)
@@ -61,18 +66,19 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
     if key in kept and not fresh:
         return Verdict(**kept[key])
     try:
-        verdict = _probe(variant, library)
+        verdict, ended = _probe(variant, library)
     except subprocess.TimeoutExpired:
         return Verdict(f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None)
-    if key is not None:
+    if key is not None and ended not in _STOPPED:
         _write_cache({**_read_cache(), key: asdict(verdict)})
     return verdict
 
 
-def _probe(variant: str, library: Library | None) -> Verdict:
-    with tempfile.TemporaryDirectory() as kernels:
+def _probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
+    """What it found, and the status with which it ended."""
+    with temporary_folder() as kernels:
         # An empty kernel cache: the verdict must come from compiling, not from what another libLLVM compiled.
-        environment = {**os.environ, "DRJIT_CACHE_DIR": kernels}
+        environment = {**os.environ, "DRJIT_CACHE_DIR": str(kernels)}
         if library is not None:
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
@@ -85,8 +91,8 @@ def _probe(variant: str, library: Library | None) -> Verdict:
     told = said.get("llvm_version", [-1])
     version = ".".join(map(str, told)) if told[0] > 0 else (library.version if library else None)
     if done.returncode == 0 and said.get("works"):
-        return Verdict("good", version)
-    return Verdict(_what_went_wrong(done, said), version)
+        return Verdict("good", version), 0
+    return Verdict(_what_went_wrong(done, said), version), done.returncode
 
 
 def _what_went_wrong(done: subprocess.CompletedProcess[str], said: dict[str, Any]) -> str:
@@ -139,9 +145,8 @@ def _read_cache() -> dict[str, Any]:
 
 def _write_cache(kept: dict[str, Any]) -> None:
     # A read-only home costs the next start half a second, no more.
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError, InputError):
         folder = cache_dir()
         folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile("w", dir=folder, encoding="utf-8", suffix=".json", delete=False) as file:
-            json.dump(kept, file, indent=1)
-        os.replace(file.name, folder / "verdicts.json")
+        with atomic_file(folder / "verdicts.json") as file:
+            file.write(json.dumps(kept, indent=1).encode())

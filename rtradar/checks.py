@@ -1,9 +1,10 @@
-"""Checks of single values from scene files and from Python, each with its one line of complaint."""
+"""Checks of single values from files and from Python, each with its one line of complaint."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -14,6 +15,8 @@ Vector = tuple[float, float, float]
 
 def shown(value: object) -> str:
     """A value as messages show it: one line, not too long."""
+    if isinstance(value, int) and abs(value) >= 10**20:
+        return "a number of more than 20 digits"
     try:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of very many digits, a table nested very deep
@@ -21,6 +24,16 @@ def shown(value: object) -> str:
     text = " ".join(text.split())
     text = "".join(letter if letter.isprintable() else "?" for letter in text)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def inside(folder: Path, name: str) -> Path | None:
+    """A file or folder in ``folder`` or below, links followed; None where the name leads elsewhere, or nowhere at all."""
+    try:
+        if not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(folder.resolve()):
+            return folder / name
+    except (OSError, RuntimeError, ValueError):  # a circle of links, a null character
+        pass
+    return None
 
 
 def check_number(where: str, key: str, value: object, least: float, most: float) -> float:

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from rtradar.checks import shown
 from rtradar.errors import InputError
-from rtradar.scene.checks import shown
 
 Table = Mapping[str, Any]
 

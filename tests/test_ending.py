@@ -1,0 +1,79 @@
+"""Ctrl-C and SIGTERM, from outside: the end comes soon, in one line, and nothing is left."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
+
+SOON_S = 10.0  # two seconds on a quiet machine, which validation/interruptions.py holds it to; tests share theirs
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "says"), [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "ended by SIGTERM")])
+def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(tmp_path: Path, number: signal.Signals, says: str) -> None:
+    (tmp_path / "maps.h5").write_text("old")
+    command = [sys.executable, "-m", "rtradar", "run", "synthetic:walk", "--fidelity", "analytic", "--out", str(tmp_path)]
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # what is ignored here would be ignored there
+    try:
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    while not list(tmp_path.glob(".rtradar-*/maps.h5")):
+        assert process.poll() is None
+        time.sleep(0.01)
+    began = time.monotonic()
+    process.send_signal(number)
+    _, said = process.communicate(timeout=60)
+    assert time.monotonic() - began < SOON_S
+    assert process.returncode == 1
+    assert said.splitlines()[-1] == f"rtradar: {says}; nothing was left half-written"
+    assert "Traceback" not in said
+    assert {path.name for path in tmp_path.iterdir()} == {"maps.h5"}
+    assert (tmp_path / "maps.h5").read_text() == "old"
+
+
+def runs(process: int) -> bool:
+    """Whether a process is there that has not ended; where nobody asks for its end, the system keeps its number."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+CHILD = """
+import subprocess, sys, time
+from rtradar.cli.ending import end_well
+from rtradar.files import atomic_file, temporary_folder
+end_well(lambda: "two\\nlines")
+child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
+with temporary_folder(inside=sys.argv[1]) as folder, atomic_file(sys.argv[1] + "/new") as file:
+    file.write(b"half")
+    file.flush()
+    print(child.pid, flush=True)
+    time.sleep(600)
+"""
+
+
+def test_children_files_and_folders_go_too(tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [sys.executable, "-c", CHILD, str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    assert process.stdout is not None
+    child = int(process.stdout.readline())
+    assert len(list(tmp_path.iterdir())) == 2
+    time.sleep(0.2)
+    process.send_signal(signal.SIGTERM)
+    try:
+        _, said = process.communicate(timeout=SOON_S)
+    finally:
+        process.kill()
+    assert said == "rtradar: ended by SIGTERM; two lines\n"
+    assert list(tmp_path.iterdir()) == []
+    assert not runs(child)

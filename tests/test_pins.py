@@ -1,0 +1,60 @@
+"""Versions are pinned: every package that rtradar brings, with all its extras, stands in constraints.txt."""
+
+from __future__ import annotations
+
+import re
+from importlib.metadata import PackageNotFoundError, requires, version
+from pathlib import Path
+
+import pytest
+
+CONSTRAINTS = Path(__file__).resolve().parents[1] / "constraints.txt"
+
+
+def plain(name: str) -> str:
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def needed() -> set[str]:
+    """All that is installed of what rtradar needs, and of what that needs."""
+    found: set[str] = set()
+    waiting = [("rtradar", "all")]
+    while waiting:
+        name, extras = waiting.pop()
+        try:
+            listed = requires(name) or []
+        except PackageNotFoundError:
+            continue  # of another system or Python, or of an extra that is not installed
+        for line in listed:
+            requirement, _, marker = line.partition(";")
+            if "extra ==" in marker and extras != "all":
+                continue
+            found_name = re.match(r"\s*([A-Za-z0-9._-]+)(\[.*?\])?", requirement)
+            assert found_name is not None
+            child = plain(found_name[1])
+            if child not in found:
+                found.add(child)
+                waiting.append((child, ""))
+    return {name for name in found if installed(name)} - {"rtradar", "pip"}  # pip is what reads the constraints
+
+
+def installed(name: str) -> bool:
+    try:
+        version(name)
+    except PackageNotFoundError:
+        return False
+    return True
+
+
+def test_every_package_has_one_pinned_version() -> None:
+    lines = [line for line in CONSTRAINTS.read_text().splitlines() if line and not line.startswith("#")]
+    pins = dict(line.split("==") for line in lines)
+    assert len(pins) == len(lines)
+    missing = sorted(needed() - {plain(name) for name in pins})
+    assert missing == []
+
+
+def test_the_search_follows_what_needs_what() -> None:
+    if not installed("rtradar"):
+        pytest.skip("rtradar runs from its source, and is not installed")
+    assert {"numpy", "mitsuba", "drjit", "llvmlite"} <= needed()

@@ -1,0 +1,219 @@
+"""Commands that are told to end, or killed, at several moments: what is left on the disk, how soon, and what is said.
+
+Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
+build`` and ``train``, each into a folder where an older result of the same command lies. Claimed is: every file is as it was
+before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes within two seconds, with
+status 1, one line and no traceback, and no process is left. What SIGKILL leaves beside is gone after the next run.
+
+    python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import psutil
+from rows import Row, judged, main
+
+SAYS = "a command that is told to end: "
+PATIENCE_S = 300.0
+SPEC = """
+[windows]
+duration_s = 0.5
+[each]
+radar = ["small.toml"]
+fidelity = ["analytic"]
+[[synthetic]]
+label = "walk"
+count = {half}
+[[synthetic]]
+label = "kick"
+count = {half}
+"""
+RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nchirp_duration_s = 250e-6\nsamples_per_chirp = 128\nframe_duration_s = 0.05\n"
+
+
+@dataclass(frozen=True)
+class Case:
+    """A command, the file or words by which its stages are told, and the seconds after each at which it is disturbed."""
+
+    name: str
+    words: tuple[str, ...]
+    stages: tuple[tuple[str, str, float], ...]  # name; what appears under the folder, or "" for the start; seconds after that
+    cold: bool = False  # without what was compiled before
+
+
+def cases(work: Path, quick: bool) -> list[Case]:
+    walk = ("run", "synthetic:walk", "--duration", "0.5", "--save-if")
+    run = Case(
+        "run",
+        walk,
+        (
+            ("imports", "", 0.1),
+            ("warm-up", "", 2.0),
+            ("scatter", ".rtradar-*/maps.h5", 0.3),
+            ("pictures", ".rtradar-*/*.png", 0.1),
+            ("report", ".rtradar-*/report.html", 0.0),
+        ),
+    )
+    compiles = Case(
+        "run, nothing compiled yet", (*walk, "--fidelity", "fresnel"), (("compiling", "", 4.0), ("compiling on", "", 8.0)), True
+    )
+    traces = Case(
+        "run in a room",
+        ("run", "synthetic:walk", "--duration", "0.5", "--scene", "living-room"),
+        (("tracing", "", 5.0), ("tracing on", "", 9.0)),
+    )
+    compare = Case(
+        "compare",
+        ("compare", "synthetic:kick", "--duration", "0.5", "--fidelities", "analytic,specular"),
+        (
+            ("first rung", ".rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
+            ("second rung", ".rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
+        ),
+    )
+    build = Case(
+        "dataset build",
+        ("dataset", "build", str(work / "set.toml"), "--workers", "2"),
+        (("cluster starts", "collection.json", 0.8), ("samples", "[!.]*.npz", 0.1)),
+    )
+    train = Case(
+        "train",
+        ("train", str(work / "clouds"), "--points", "64", "--folds", "2", "--epochs", "4000"),
+        (("first epochs", "plan.json", 2.0), ("past a checkpoint", "training-01/checkpoint.pt", 0.5)),
+    )
+    return [run, build] if quick else [run, compiles, traces, compare, build, train]
+
+
+def start(case: Case, out: Path, work: Path) -> subprocess.Popen[str]:
+    environment = dict(os.environ)
+    if case.cold:
+        cold = Path(tempfile.mkdtemp(dir=work))
+        environment |= {"NUMBA_CACHE_DIR": str(cold / "numba"), "DRJIT_CACHE_DIR": str(cold / "drjit")}
+    command = [sys.executable, "-m", "rtradar", *case.words, "--out", str(out)]
+    pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+    return subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
+
+
+def contents(folder: Path) -> dict[str, int]:
+    """Every file, and when it was written."""
+    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in sorted(folder.rglob("*")) if path.is_file()}
+
+
+def wait_for(pattern: str, out: Path, since: float, process: subprocess.Popen[str]) -> bool:
+    """Until a file of that name that is newer than ``since`` is there; whether the process still runs."""
+    while process.poll() is None:
+        # A second thread waits for signals as soon as rtradar, not Python, has the word.
+        if psutil.Process(process.pid).num_threads() > 1 and not pattern:
+            return True
+        if pattern and any(path.stat().st_mtime >= since for path in _found(out, pattern)):
+            return True
+        time.sleep(0.005)
+    return False
+
+
+def _found(out: Path, pattern: str) -> list[Path]:
+    try:
+        return [path for path in out.glob(pattern) if path.exists()]
+    except OSError:  # it vanished meanwhile
+        return []
+
+
+def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, before: Path, work: Path) -> tuple[str, list[Row]]:
+    """One command, disturbed once: its line of the table, and what is claimed of it."""
+    out = work / "out"
+    shutil.rmtree(out, ignore_errors=True)
+    if before.exists():
+        shutil.copytree(before, out)
+    old = contents(out) if out.exists() else {}
+    since = time.time()
+    process = start(case, out, work)
+    alive = wait_for(pattern, out, since, process)
+    time.sleep(delay_s)
+    claim = f"{case.name}, {stage}: {name}"
+    if not alive or process.poll() is not None:
+        process.communicate()
+        return f"{case.name:26} {stage:18} {name:8} it had ended before", []
+    children = psutil.Process(process.pid).children(recursive=True)
+    began = time.monotonic()
+    if name == "SIGINT":
+        os.killpg(process.pid, signal.SIGINT)
+    else:
+        process.send_signal(getattr(signal, name))
+    try:
+        _, said = process.communicate(timeout=PATIENCE_S)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        _, said = process.communicate()
+    seconds = time.monotonic() - began
+    _, orphans = psutil.wait_procs(children, timeout=10)
+    after = contents(out) if out.exists() else {}
+    hidden = [path for path in after if any(part.startswith(".") for part in Path(path).parts)]
+    lost = [path for path in old if path not in after]
+    changed = [path for path in after if path in old and after[path] != old[path]]
+    new = [path for path in after if path not in old and path not in hidden]
+    lines = [line for line in said.replace("\r", "\n").splitlines() if line.startswith("rtradar: ")]
+    left = f"{len(old) - len(lost) - len(changed)} old, {len(changed) + len(new)} new, {len(hidden)} unfinished"
+    row = f"{case.name:26} {stage:18} {name:8} {seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
+    found = [
+        judged(claim, "old files lost", "1", len(lost), 0, says=SAYS + "old files lost"),
+        judged(claim, "processes left", "1", len(orphans), 0, says=SAYS + "processes left"),
+    ]
+    whole = case.name in ("dataset build", "train")  # their files are single ones, each whole
+    if not whole:
+        mixed = len(changed) + len(new) if len(lost) + len(changed) < len(old) else 0
+        found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed"))
+    if name != "SIGKILL":
+        found += [
+            judged(claim, "end", "s", seconds, 2.0, says=SAYS + "seconds until it has ended"),
+            judged(claim, "exit status", "1", process.returncode, 0, reference=1, says=SAYS + "exit status (error against 1)"),
+            judged(claim, "lines said, but one", "1", len(lines), 0, reference=1, says=SAYS + "lines other than one"),
+            judged(claim, "tracebacks", "1", said.count("Traceback"), 0, says=SAYS + "tracebacks"),
+            judged(claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"),
+        ]
+    elif case.name == "run" and hidden:
+        start(case, out, work).communicate(timeout=PATIENCE_S)
+        still = [path for path in contents(out) if path in hidden]
+        found.append(
+            judged(
+                claim, "still there after the next run", "1", len(still), 0, says="SIGKILL: unfinished files after the next run"
+            )
+        )
+    return row, found
+
+
+def measure(quick: bool) -> list[Row]:
+    found: list[Row] = []
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # else what is started with "&" would pass on that it is ignored
+    with tempfile.TemporaryDirectory() as folder:
+        work = Path(folder)
+        (work / "small.toml").write_text(RADAR)
+        (work / "set.toml").write_text(SPEC.format(half=6))
+        build = [sys.executable, "-m", "rtradar", "dataset", "build", str(work / "set.toml"), "--workers", "1"]
+        subprocess.run([*build, "--out", str(work / "clouds")], check=True, capture_output=True)
+        (work / "set.toml").write_text(SPEC.format(half=200))
+        for case in cases(work, quick):
+            before = work / f"before-{case.name.replace(' ', '-')}"
+            if case.name in ("run", "compare"):
+                process = start(case, before, work)
+                _, said = process.communicate(timeout=PATIENCE_S)
+                if process.returncode:
+                    raise SystemExit(said)
+            for stage, pattern, delay_s in case.stages:
+                for name in ("SIGINT", "SIGTERM", "SIGKILL"):
+                    row, rows = disturb(case, stage, pattern, delay_s, name, before, work)
+                    print(row, flush=True)
+                    found += rows
+    return found
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__.splitlines()[0], measure))
