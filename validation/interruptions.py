@@ -2,7 +2,7 @@
 
 Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
 build`` and ``train``, each into a folder where an older result of the same command lies. Claimed is: every file is as it was
-before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes within two seconds, with
+before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes within 2 s, with
 status 1, one line and no traceback, and no process is left. What SIGKILL leaves beside is gone after the next run.
 
     python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
