@@ -5,7 +5,6 @@ from rtradar.clouds.files import RDT_AXES, RDT_UNITS, save_cloud_npz, save_ply
 from rtradar.clouds.rdt import RdtCloud, RdtCloudResult, rdt_isosurface, sample_centres
 from rtradar.clouds.sampling import UniformSample
 from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_points
-from rtradar.files import atomic_file
 
 __all__ = [
     "RDT_AXES",
@@ -16,7 +15,6 @@ __all__ = [
     "Sample",
     "SpatialCloud",
     "UniformSample",
-    "atomic_file",
     "rdt_isosurface",
     "sample_centres",
     "save_cloud_npz",

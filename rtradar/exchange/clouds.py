@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds import RDT_AXES, RDT_UNITS, atomic_file
+from rtradar.clouds import RDT_AXES, RDT_UNITS
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 
 _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
 """What a spatial cloud tells of its points beside their places."""

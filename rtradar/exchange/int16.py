@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.clouds import atomic_file
 from rtradar.errors import InputError
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+from rtradar.files import atomic_file
 
 _LARGEST = 32767
 _WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"

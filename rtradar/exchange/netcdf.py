@@ -8,8 +8,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rtradar.clouds import atomic_file
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+from rtradar.files import atomic_file
 
 _PARTS = ("if_real", "if_imag")
 """netCDF knows no complex numbers."""

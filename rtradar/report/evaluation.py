@@ -22,8 +22,8 @@ from rtradar.classify.scores import (
     transfer_table,
 )
 from rtradar.classify.study import Study
-from rtradar.clouds import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 from rtradar.report.classifier_figures import draw_accuracies, draw_confusion, draw_learning, draw_transfer
 
 Group = tuple[str, Sequence[Outcome]]

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.files import atomic_file
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 
 _FORMAT = 1
 _MOST_BYTES = 200_000_000

@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from rtradar.clouds.files import atomic_file
+from rtradar.files import atomic_file
 
 _PAGE = Template("""<!doctype html>
 <html lang="en">

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
-from rtradar.clouds.files import atomic_file
+from rtradar.files import atomic_file
 from rtradar.report.figures import new_figure
 from rtradar.report.linked import GROUPS, VELOCITY_COLOURS, Levels, Linked, group_of_parts
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 import trimesh
 
-from rtradar.clouds import atomic_file, save_cloud_npz, save_ply
+from rtradar.clouds import save_cloud_npz, save_ply
 from rtradar.errors import InputError
+from rtradar.files import atomic_file
 
 POINTS = np.random.default_rng(0).normal(size=(40, 3))
 
