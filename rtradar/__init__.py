@@ -13,11 +13,12 @@ if TYPE_CHECKING:
     from rtradar import classify, exchange, process, rcs, signal
     from rtradar.body import Body, Ellipsoids
     from rtradar.echoes import Echoes
-    from rtradar.errors import BackendError, InputError, ValidityWarning
-    from rtradar.motion import Motion, load_motion, synthetic_motion
+    from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
+    from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
     from rtradar.pipeline import Comparison, Result, compare, run
-    from rtradar.radar import Radar
-    from rtradar.scatter import scattering_length
+    from rtradar.process import register_detector
+    from rtradar.radar import Radar, register_radar
+    from rtradar.scatter import register_rung, scattering_length
     from rtradar.scene import Scene
 
 __version__ = "0.1.0"
@@ -32,6 +33,7 @@ _HOME = {
     "Comparison": "pipeline",
     "Echoes": "echoes",
     "Ellipsoids": "body",
+    "ExtensionError": "errors",
     "InputError": "errors",
     "Motion": "motion",
     "Radar": "radar",
@@ -40,6 +42,10 @@ _HOME = {
     "ValidityWarning": "errors",
     "compare": "pipeline",
     "load_motion": "motion",
+    "register_detector": "process",
+    "register_radar": "radar",
+    "register_reader": "motion",
+    "register_rung": "scatter",
     "run": "pipeline",
     "scattering_length": "scatter",
     "synthetic_motion": "motion",
@@ -52,6 +58,7 @@ __all__ = [
     "Comparison",
     "Echoes",
     "Ellipsoids",
+    "ExtensionError",
     "InputError",
     "Motion",
     "Radar",
@@ -64,6 +71,10 @@ __all__ = [
     "load_motion",
     "process",
     "rcs",
+    "register_detector",
+    "register_radar",
+    "register_reader",
+    "register_rung",
     "run",
     "scattering_length",
     "signal",

@@ -23,5 +23,12 @@ class CampaignError(RuntimeError):
     """
 
 
+class ExtensionError(RuntimeError):
+    """Something that another package adds to rtradar cannot be loaded, fails, or gives what it must not.
+
+    The message is one line that names it and its package. The command line prints it and exits with status 1.
+    """
+
+
 class ValidityWarning(UserWarning):
     """An approximation is used near or past the end of its validity."""

@@ -15,13 +15,15 @@ from numpy.typing import NDArray
 from rtradar.checks import shown
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.registry import Registry
 from rtradar.toml_tables import check_keys, read_toml
 
-PRESETS: dict[str, dict[str, Any]] = {
-    "paper-12ghz": {"start_frequency_hz": 12e9, "chirp_duration_s": 62.5e-6},
-    "paper-77ghz": {"start_frequency_hz": 77e9, "chirp_duration_s": 12.5e-6},
-}
-"""The paper's Table 1, and its 77 GHz sister with chirps five times shorter; what is not named is the default."""
+PRESETS = Registry(
+    "rtradar.radars", "radar", {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"}
+)
+"""Radars that have a name: what makes them, called without arguments."""
+
+register_radar = PRESETS.register
 
 _POSITIVE = (
     "start_frequency_hz",
@@ -164,10 +166,15 @@ class Radar:
         ------
         InputError
             Where there is no such preset.
+        ExtensionError
+            Where it is of another package, and fails.
         """
-        if name not in PRESETS:
-            raise InputError(f"radar '{name}' is unknown; allowed: {', '.join(PRESETS)}, or the path of a TOML file")
-        return cls(name=name, **PRESETS[name])
+        make = PRESETS.find(name, instead=", or the path of a TOML file")
+        with PRESETS.guarded(name):
+            radar = make()
+        if not isinstance(radar, cls):
+            raise PRESETS.refuse(name, f"gave a {type(radar).__name__}, not a Radar")
+        return dataclasses.replace(radar, name=name)
 
     @classmethod
     def load(cls, source: str | Path) -> Radar:

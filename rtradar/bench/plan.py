@@ -11,7 +11,7 @@ from rtradar.scatter import RUNGS
 PARTS = ("rungs", "growth")
 """What may be measured alone: rungs with baseline and floors, or growth with the size of the problem."""
 
-RADARS = tuple(PRESETS)
+RADARS = tuple(PRESETS.built_in)
 FIDELITIES = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics")
 """Radars and rungs by default: those that take less than minutes for seconds of radar."""
 

@@ -13,7 +13,7 @@ import sys
 import warnings
 from typing import TextIO
 
-from rtradar.errors import BackendError, CampaignError, InputError
+from rtradar.errors import BackendError, CampaignError, ExtensionError, InputError
 
 _WHOLE = "nothing was left half-written"
 
@@ -49,7 +49,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
         status: int = options.command(options)
     except InputError as error:
         return fail(2, error)
-    except (BackendError, CampaignError) as error:
+    except (BackendError, CampaignError, ExtensionError) as error:
         return fail(1, error)
     except KeyboardInterrupt:
         return fail(1, f"stopped by the user; {options.stopped.format(**vars(options))}")

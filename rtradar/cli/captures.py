@@ -23,7 +23,8 @@ def add(commands: Subcommands) -> None:
     run.add_argument(
         "--fidelity",
         default="specular",
-        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays, reference or auto (default: specular)",
+        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays, reference, auto, or of a package "
+        "(default: specular)",
     )
     run.add_argument(
         "--tolerance-db", type=number, metavar="X", help="of auto: error of a frame's power that will do [dB] (default: 0.5)"
@@ -40,6 +41,7 @@ def add(commands: Subcommands) -> None:
     run.add_argument(
         "--body-material", choices=("perfect-conductor", "skin"), default="perfect-conductor", help="(default: perfect-conductor)"
     )
+    run.add_argument("--detector", default="os-cfar", metavar="NAME", help="os-cfar, ca-cfar, or of a package (default: os-cfar)")
     run.add_argument("--order", type=whole, default=1, metavar="N", help="most walls on the way of an echo, 0 to 3 (default: 1)")
     run.add_argument("--keep-all", action="store_true", help="model walls, furniture and paths though they stay below the noise")
     run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
@@ -64,7 +66,10 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument("--skeleton", type=Path, metavar="ASF", help="the .asf of an .amc recording")
     run.add_argument(
-        "--radar", default="paper-12ghz", metavar="NAME|TOML", help=f"{', '.join(PRESETS)}, or a TOML file (default: paper-12ghz)"
+        "--radar",
+        default="paper-12ghz",
+        metavar="NAME|TOML",
+        help=f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: paper-12ghz)",
     )
     run.add_argument(
         "--scene", default="free-space", metavar="NAME|TOML", help="a scene by name, or a TOML file (default: free-space)"
@@ -102,6 +107,7 @@ def _run(options: argparse.Namespace) -> int:
         body_material=options.body_material,
         order=options.order,
         keep_all=options.keep_all,
+        detector=options.detector,
     )
     if options.json is not None:
         write_json(options.json, result.summary)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from pathlib import Path
 
 from rtradar.errors import InputError
@@ -9,6 +10,16 @@ from rtradar.motion.asf import load_amc, load_skeleton
 from rtradar.motion.bvh import load_bvh
 from rtradar.motion.c3d import load_c3d
 from rtradar.motion.motion import Motion
+from rtradar.registry import Registry
+
+READERS = Registry(
+    "rtradar.readers",
+    "motion reader",
+    {"amc": "rtradar.motion.load:read_amc", "bvh": "rtradar.motion.load:read_bvh", "c3d": "rtradar.motion.load:read_c3d"},
+)
+"""What reads motion files, by their ending without the dot."""
+
+register_reader = READERS.register
 
 
 def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m: float | None = None) -> Motion:
@@ -17,7 +28,7 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
     Parameters
     ----------
     path : path
-        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, or ``.c3d`` with the markers of CMU and HDM05.
+        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and HDM05, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
     unit_m : float, optional
@@ -33,21 +44,45 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
     ------
     InputError
         One line that names the file and, inside it, the line.
+    ExtensionError
+        Where the reader is of another package, and fails.
     """
     file = Path(path)
-    suffix = file.suffix.lower()
-    if suffix == ".amc":
-        if skeleton is None:
-            raise InputError(f"{file}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)")
-        if unit_m is not None:
-            raise InputError(f"{file}: unit_m belongs to BVH files; an ASF skeleton states its unit")
-        return load_amc(file, load_skeleton(Path(skeleton)))
-    if suffix == ".bvh":
-        if skeleton is not None:
-            raise InputError(f"{file}: a BVH file holds its own skeleton; leave {skeleton} out")
-        return load_bvh(file, unit_m)
-    if suffix == ".c3d":
-        if skeleton is not None:
-            raise InputError(f"{file}: a C3D file holds markers, from which joints are found; leave {skeleton} out")
-        return load_c3d(file, unit_m)
-    raise InputError(f"{file}: unknown kind of motion file {suffix!r}; allowed are .amc (with .asf), .bvh and .c3d")
+    name = file.suffix.lower().removeprefix(".")
+    if name not in READERS:
+        known = ", ".join(f".{known}" for known in READERS)
+        raise InputError(f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc with its .asf)")
+    read = READERS[name]
+    with READERS.guarded(name):
+        taken = inspect.signature(read).parameters
+        given = {"skeleton": None if skeleton is None else Path(skeleton), "unit_m": unit_m}
+        for option, value in given.items():
+            if value is not None and option not in taken:
+                raise InputError(f"{file}: {name.upper()} files take no {option}; leave it out")
+        motion = read(file, **{option: value for option, value in given.items() if option in taken})
+    if not isinstance(motion, Motion):
+        raise READERS.refuse(name, f"gave a {type(motion).__name__}, not a Motion")
+    return motion
+
+
+def read_amc(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+    """The reader of ``.amc``."""
+    if skeleton is None:
+        raise InputError(f"{file}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)")
+    if unit_m is not None:
+        raise InputError(f"{file}: unit_m belongs to BVH files; an ASF skeleton states its unit")
+    return load_amc(file, load_skeleton(skeleton))
+
+
+def read_bvh(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+    """The reader of ``.bvh``."""
+    if skeleton is not None:
+        raise InputError(f"{file}: a BVH file holds its own skeleton; leave {skeleton} out")
+    return load_bvh(file, unit_m)
+
+
+def read_c3d(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+    """The reader of ``.c3d``."""
+    if skeleton is not None:
+        raise InputError(f"{file}: a C3D file holds markers, from which joints are found; leave {skeleton} out")
+    return load_c3d(file, unit_m)

@@ -31,6 +31,7 @@ from rtradar.pipeline.received import ReceivedWindow
 from rtradar.pipeline.room_pictures import draw_room_pictures
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low, peak_memory_mb
+from rtradar.process import build_detector
 from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
@@ -85,6 +86,7 @@ def run(
     body_material: str = "perfect-conductor",
     order: int = 1,
     keep_all: bool = False,
+    detector: str = "os-cfar",
 ) -> Result:
     """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
 
@@ -106,7 +108,7 @@ def run(
     snr_db : float
         Power of the person's visible echoes over complex noise power per sample; ``inf`` for no noise.
     pfa : float
-        False-alarm rate asked of OS-CFAR in each cell.
+        False-alarm rate asked of the detector in each cell.
     seed : int
         Of noise and of the cloud's sampling.
     variant : {"auto", "llvm", "scalar", "cuda"}
@@ -127,6 +129,8 @@ def run(
         Most walls, floors and ceilings on the way of an echo.
     keep_all : bool
         Whether paths, walls and furniture are kept though they stay below the noise.
+    detector : str
+        What marks the cells of a map; `rtradar.process.DETECTORS` has the names.
 
     Returns
     -------
@@ -138,6 +142,8 @@ def run(
         Where something given has no meaning; nothing is written then.
     BackendError
         Where the rung traces and no backend of the kind asked for works.
+    ExtensionError
+        Where something of another package fails.
     """
     began = time.perf_counter()
     stages = Stages()
@@ -145,6 +151,7 @@ def run(
     forget_peak_memory()
     scene = scene or Scene()
     removal = make_removal(clutter_removal, radar)
+    detect = build_detector(detector, pfa=pfa, looks=radar.n_channels)
     capture = prepare(
         motion,
         radar,
@@ -171,7 +178,7 @@ def run(
     give_back_memory()  # what compiling and the pass over the whole recording took
     with all_or_nothing(Path(out)) as folder:
         products = Products(
-            folder / "maps.h5", radar, pfa=pfa, seed=seed, stages=stages, title=title, removal=removal, received=received
+            folder / "maps.h5", radar, detect=detect, seed=seed, stages=stages, title=title, removal=removal, received=received
         )
         try:
             kept = _if_array(folder / "if.zarr", capture) if save_if else None
@@ -220,6 +227,7 @@ def run(
                 "body_material": body_material,
                 "order": order,
                 "keep_all": keep_all,
+                "detector": detector,
                 "radar": dataclasses.asdict(radar),
             },
             "seed": seed,
@@ -314,7 +322,8 @@ def clouds_of(
         order=1,
         keep_all=False,
     )
-    maker = CloudMaker(capture.radar, pfa=pfa, seed=seed, stages=capture.stages, removal=removal)
+    detect = build_detector("os-cfar", pfa=pfa, looks=radar.n_channels)
+    maker = CloudMaker(capture.radar, detect=detect, seed=seed, stages=capture.stages, removal=removal)
     capture.stream(maker, progress=False)
     return maker.finish(), capture.warmup_s
 

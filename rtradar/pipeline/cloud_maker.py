@@ -13,11 +13,11 @@ from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,
     ClutterRemoval,
+    Detector,
     SlidingWindows,
     angle_spectra,
     cell_spectra,
     measures_angle,
-    os_cfar,
     power_map,
 )
 from rtradar.radar import Radar
@@ -58,8 +58,7 @@ class CloudMaker:
     Parameters
     ----------
     radar : Radar
-    pfa : float
-        False-alarm rate of OS-CFAR.
+    detect : Detector
     seed : int
         Of the sampling of clouds.
     stages : Stages
@@ -73,8 +72,8 @@ class CloudMaker:
         Chirps to take at once, so that memory stays low.
     """
 
-    def __init__(self, radar: Radar, *, pfa: float, seed: int, stages: Stages, removal: ClutterRemoval) -> None:
-        self._radar, self._pfa, self._stages, self._removal = radar, pfa, stages, removal
+    def __init__(self, radar: Radar, *, detect: Detector, seed: int, stages: Stages, removal: ClutterRemoval) -> None:
+        self._radar, self._detect, self._stages, self._removal = radar, detect, stages, removal
         self._sliding = SlidingWindows(radar)
         self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
@@ -100,7 +99,7 @@ class CloudMaker:
             with stages.time("doppler"):
                 power = power_map(cube, radar)
             with stages.time("cfar"):
-                mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
+                mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)

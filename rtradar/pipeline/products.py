@@ -14,9 +14,9 @@ from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     SPECTROGRAM_CYCLES,
     ClutterRemoval,
+    Detector,
     SlidingSpectrogram,
     angle_grid,
-    os_cfar,
     power_map,
     range_azimuth,
     range_elevation,
@@ -33,8 +33,7 @@ class Products:
     path : path
         HDF5 file of the maps, written anew.
     radar : Radar
-    pfa : float
-        False-alarm rate of OS-CFAR.
+    detect : Detector
     seed : int
         Of the sampling of clouds.
     stages : Stages
@@ -57,15 +56,15 @@ class Products:
         path: Path,
         radar: Radar,
         *,
-        pfa: float,
+        detect: Detector,
         seed: int,
         stages: Stages,
         title: str,
         removal: ClutterRemoval,
         received: ReceivedWindow | None = None,
     ) -> None:
-        self._radar, self._pfa, self._stages, self._received = radar, pfa, stages, received
-        self._clouds = CloudMaker(radar, pfa=pfa, seed=seed, stages=stages, removal=removal)
+        self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
+        self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal)
         self._spectrogram = SlidingSpectrogram(radar)
         self.piece = self._clouds.piece
         axes = {
@@ -108,7 +107,7 @@ class Products:
         radar = self._radar
         with self._stages.time("received"):
             power = power_map(cube, radar)
-            mask = os_cfar(power, pfa=self._pfa, looks=radar.n_channels)
+            mask = self._detect(power)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:
                 kept["range_azimuth_received"] = range_azimuth(window_angles(cube, mask, radar), radar)

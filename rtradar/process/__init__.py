@@ -7,6 +7,7 @@ from rtradar.process.cfar import ca_cfar, os_cfar
 from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
+from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
 from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum, range_time
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram
@@ -15,10 +16,12 @@ from rtradar.process.windows import SlidingWindows
 
 __all__ = [
     "CLUTTER_REMOVALS",
+    "DETECTORS",
     "SPECTROGRAM_CYCLES",
     "AngleSpectra",
     "ClutterMap",
     "ClutterRemoval",
+    "Detector",
     "RangeDoppler",
     "SlidingSpectrogram",
     "SlidingWindows",
@@ -26,6 +29,7 @@ __all__ = [
     "angle",
     "angle_grid",
     "angle_spectra",
+    "build_detector",
     "ca_cfar",
     "ca_scale",
     "cell_spectra",
@@ -40,5 +44,6 @@ __all__ = [
     "range_elevation",
     "range_spectrum",
     "range_time",
+    "register_detector",
     "spectrogram",
 ]

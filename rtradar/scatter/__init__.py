@@ -1,7 +1,16 @@
 """The fidelity ladder: from a posed body to `Echoes`, one module a rung."""
 
-from rtradar.scatter.ladder import RUNGS, build_rung
-from rtradar.scatter.poses import Accountable, Rung
+from rtradar.scatter.ladder import RUNGS, build_rung, register_rung
+from rtradar.scatter.poses import Accountable, Rung, chirp_poses, one_echo_a_part
 from rtradar.scatter.scattering_length import scattering_length
 
-__all__ = ["RUNGS", "Accountable", "Rung", "build_rung", "scattering_length"]
+__all__ = [
+    "RUNGS",
+    "Accountable",
+    "Rung",
+    "build_rung",
+    "chirp_poses",
+    "one_echo_a_part",
+    "register_rung",
+    "scattering_length",
+]

@@ -182,3 +182,13 @@ class Analytic:
             length, amplitude = far_field_echo(*at[1:], spreading=self._spreading)
         echo = self._surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
+
+
+def analytic(radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor") -> Analytic:
+    """`Analytic` as the rung of that name."""
+    return Analytic(radar, body, spreading=spreading, material=material)
+
+
+def analytic_paper(radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor") -> Analytic:
+    """`Analytic` as in the paper."""
+    return Analytic(radar, body, paper=True, spreading=spreading, material=material)

@@ -3,37 +3,38 @@
 from __future__ import annotations
 
 import inspect
-from importlib import import_module
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.poses import Rung
+from rtradar.registry import Registry
+from rtradar.scatter.poses import Accountable, Rung
 
+RUNGS = Registry(
+    "rtradar.rungs",
+    "fidelity",
+    {
+        "analytic-paper": "rtradar.scatter.analytic:analytic_paper",
+        "analytic": "rtradar.scatter.analytic:analytic",
+        "specular": "rtradar.scatter.specular:Specular",
+        "fresnel": "rtradar.scatter.fresnel:Fresnel",
+        "physical-optics": "rtradar.scatter.physical_optics:PhysicalOptics",
+        "rays": "rtradar.scatter.rays:Rays",
+        "reference": "rtradar.scatter.reference:Reference",
+        "auto": "rtradar.scatter.auto:Auto",
+    },
+)
+"""Every rung, cheapest first, the one that chooses among them, and those of other packages."""
 
-class _Home(NamedTuple):
-    """Where a rung is: module and class within this package, what is fixed of it, and whether it traces."""
+register_rung = RUNGS.register
 
-    module: str
-    kind: str
-    fixed: dict[str, Any]
-    traces: bool
-
-
-RUNGS: dict[str, _Home] = {
-    "analytic-paper": _Home("analytic", "Analytic", {"paper": True}, traces=False),
-    "analytic": _Home("analytic", "Analytic", {"paper": False}, traces=False),
-    "specular": _Home("specular", "Specular", {}, traces=True),
-    "fresnel": _Home("fresnel", "Fresnel", {}, traces=True),
-    "physical-optics": _Home("physical_optics", "PhysicalOptics", {}, traces=True),
-    "rays": _Home("rays", "Rays", {}, traces=True),
-    "reference": _Home("reference", "Reference", {}, traces=True),
-    "auto": _Home("auto", "Auto", {}, traces=True),
-}
-"""Every rung, cheapest first, and the one that chooses among them."""
-
-_COMMON = ("self", "radar", "body", "variant", "spreading")
+_COMMON = ("radar", "body", "variant", "spreading")
 
 
 def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **dials: Any) -> Rung:
@@ -62,16 +63,46 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
         Where there is no such rung, or it has no such dial.
     BackendError
         Where it traces and no backend of that kind works here.
+    ExtensionError
+        Where it is of another package, and fails.
     """
-    if fidelity not in RUNGS:
-        raise InputError(f"fidelity '{fidelity}' is unknown; allowed: {', '.join(RUNGS)}")
-    home = RUNGS[fidelity]
-    # On use: what traces brings Mitsuba, which the closed forms do without.
-    kind = getattr(import_module(f"rtradar.scatter.{home.module}"), home.kind)
-    known = [name for name in inspect.signature(kind).parameters if name not in (*_COMMON, *home.fixed)]
-    for dial in dials:
-        if dial not in known:
-            raise InputError(f"fidelity '{fidelity}' has no dial '{dial}'; it has: {', '.join(known) or 'none'}")
-    backend = {"variant": variant} if home.traces else {}
-    rung: Rung = kind(radar, body, spreading=spreading, **home.fixed, **backend, **dials)
-    return rung
+    kind = RUNGS.find(fidelity)
+    with RUNGS.guarded(fidelity):
+        taken = inspect.signature(kind).parameters
+        known = [name for name in taken if name not in _COMMON]
+        for dial in dials:
+            if dial not in known:
+                raise InputError(f"fidelity '{fidelity}' has no dial '{dial}'; it has: {', '.join(known) or 'none'}")
+        # What traces nothing takes no backend.
+        backend = {"variant": variant} if "variant" in taken else {}
+        rung: Rung = kind(radar, body, spreading=spreading, **backend, **dials)
+    return rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body)
+
+
+class _Checked:
+    """A rung of another package, which must give what the rest relies on."""
+
+    account: Callable[[], dict[str, Any]]
+
+    def __init__(self, name: str, rung: Rung, radar: Radar, body: Body) -> None:
+        self._name, self._rung, self._radar, self._parts = name, rung, radar, len(body.part_names)
+        self.variant: str | None = getattr(rung, "variant", None)
+        if isinstance(rung, Accountable):
+            self.account = rung.account
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        with RUNGS.guarded(self._name):
+            found = self._rung.echoes(chirps)
+        if not isinstance(found, Echoes):
+            raise RUNGS.refuse(self._name, f"gave a {type(found).__name__}, not Echoes")
+        expected = len(chirps), self._radar.n_rx
+        if found.length.shape[:2] != expected:
+            raise RUNGS.refuse(self._name, f"gave lengths of shape {found.length.shape}, not {expected} and echoes")
+        if not np.array_equal(found.tx, self._radar.tx_of_chirp(chirps)):
+            raise RUNGS.refuse(self._name, "named other Tx than those of its chirps (radar.tx_of_chirp)")
+        if len(found.part) and not 0 <= found.part.min() <= found.part.max() < self._parts:
+            raise RUNGS.refuse(self._name, f"named parts outside 0 to {self._parts - 1}")
+        if not (np.isfinite(found.length).all() and np.isfinite(found.amplitude).all()):
+            raise RUNGS.refuse(self._name, "gave lengths or amplitudes that are not finite")
+        return found

@@ -11,7 +11,7 @@ import pytest
 import rtradar as rt
 from rtradar.pipeline import cloud_maker, products
 from rtradar.pipeline.timing import Stages
-from rtradar.process import clutter_removal
+from rtradar.process import build_detector, clutter_removal
 
 RADAR = rt.Radar(
     name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=64, frame_duration_s=0.05
@@ -27,7 +27,15 @@ def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
     found = []
     for name, cut in (("whole", False), ("pieces", True)):
         path, removal = tmp_path / f"{name}.h5", clutter_removal("none", RADAR)
-        made = products.Products(path, RADAR, pfa=1e-4, seed=0, stages=Stages(), title="", removal=removal)
+        made = products.Products(
+            path,
+            RADAR,
+            detect=build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels),
+            seed=0,
+            stages=Stages(),
+            title="",
+            removal=removal,
+        )
         # 10 cycles of 0.5 ms are a step of range-time; a hop of the windows is 50 of them.
         assert made.piece == 10 * RADAR.n_tx
         for block in range(0, 800, 100):

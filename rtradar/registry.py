@@ -1,0 +1,144 @@
+"""What has a name on the command line and may come from other packages: rungs, motion readers, radars and detectors.
+
+Each kind has one `Registry`. What comes with rtradar stands in it by the place of its code, loaded on use; other packages add
+theirs by an entry point of the registry's group, found when a name is asked for; a running program adds its own by `register`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cached_property
+from importlib import import_module
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from rtradar.errors import BackendError, ExtensionError, InputError
+
+
+class Registry(Mapping[str, Callable[..., Any]]):
+    """Functions and classes of one kind by their names.
+
+    Parameters
+    ----------
+    group : str
+        Of the entry points that add to it, such as ``rtradar.rungs``.
+    noun : str
+        What one is called in messages.
+    built_in : mapping
+        What comes with rtradar: name to ``module:attribute``.
+    """
+
+    def __init__(self, group: str, noun: str, built_in: Mapping[str, str]) -> None:
+        self.group, self.noun, self.built_in = group, noun, dict(built_in)
+        self._registered: dict[str, Callable[..., Any]] = {}
+
+    @cached_property
+    def _installed(self) -> dict[str, list[EntryPoint]]:
+        found: dict[str, list[EntryPoint]] = {}
+        for entry in entry_points(group=self.group):
+            found.setdefault(entry.name, []).append(entry)
+        return found
+
+    def register(self, name: str, make: Callable[..., Any]) -> None:
+        """Add one to this process.
+
+        Parameters
+        ----------
+        name : str
+            By which it is asked for.
+        make : callable
+            Function or class; ``docs/extending.md`` says what each kind takes and gives.
+
+        Raises
+        ------
+        InputError
+            Where the name is taken, or the object cannot be called.
+        """
+        if name in self:
+            raise InputError(f"{self.noun} '{name}' is there already; choose another name")
+        if not callable(make):
+            raise InputError(f"{self.noun} '{name}': a {type(make).__name__} cannot be called; give a function or a class")
+        self._registered[name] = make
+
+    def find(self, name: str, *, instead: str = "") -> Callable[..., Any]:
+        """The one of that name.
+
+        Parameters
+        ----------
+        name : str
+        instead : str
+            What else is allowed, for the message.
+
+        Raises
+        ------
+        InputError
+            Where there is none; the message lists all.
+        ExtensionError
+            Where it cannot be loaded, or two packages have one of that name.
+        """
+        if name not in self:
+            raise InputError(f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}")
+        return self[name]
+
+    def __getitem__(self, name: str) -> Callable[..., Any]:
+        installed = self._installed.get(name, [])
+        if len(installed) + (name in self.built_in) + (name in self._registered) > 1:
+            owners = ["rtradar"] * (name in self.built_in) + [_package(entry) for entry in installed]
+            raise ExtensionError(f"{self.noun} '{name}' is claimed by {' and by '.join(owners)}; uninstall one of them")
+        if name in self._registered:
+            return self._registered[name]
+        if name in self.built_in:
+            module, _, attribute = self.built_in[name].partition(":")
+            made: Callable[..., Any] = getattr(import_module(module), attribute)
+            return made
+        if not installed:
+            raise KeyError(name)
+        with self.guarded(name):
+            made = installed[0].load()
+        if not callable(made):
+            raise ExtensionError(f"{self.owner(name)}: {installed[0].value} is a {type(made).__name__}, not a function or class")
+        return made
+
+    def __iter__(self) -> Iterator[str]:
+        yield from dict.fromkeys([*self.built_in, *sorted(self._installed), *self._registered])
+
+    def __len__(self) -> int:
+        return len(list(iter(self)))
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.built_in or name in self._registered or name in self._installed
+
+    def owner(self, name: str) -> str:
+        """What a message calls it: the kind, the name, and the package that it comes from."""
+        installed = self._installed.get(name, [])
+        return f"{self.noun} '{name}'" + (f" of package {_package(installed[0])}" if installed else "")
+
+    @contextmanager
+    def guarded(self, name: str) -> Iterator[None]:
+        """Around code that rtradar did not write: what goes wrong in it is said in one line.
+
+        Raises
+        ------
+        ExtensionError
+            In place of any error but those that have a meaning to the user already.
+        """
+        try:
+            yield
+        except (InputError, BackendError, ExtensionError, MemoryError):
+            raise
+        except (Exception, SystemExit) as error:
+            if name in self.built_in:
+                raise  # a fault of rtradar's own shows where it is
+            said = (str(error).splitlines() or [""])[0]
+            raise ExtensionError(
+                f"{self.owner(name)} failed: {type(error).__name__}{f': {said}' if said else ''}; mend or uninstall it"
+            ) from error
+
+    def refuse(self, name: str, why: str) -> ExtensionError:
+        """The error to raise where one gave what it must not."""
+        return ExtensionError(f"{self.owner(name)} {why}; see docs/extending.md")
+
+
+def _package(entry: EntryPoint) -> str:
+    return f"'{entry.dist.name}'" if entry.dist is not None else "unknown"

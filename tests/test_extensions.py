@@ -1,0 +1,234 @@
+"""The package of ``docs/extending.md``, used from outside, and packages that are broken."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.cli import main
+from rtradar.motion.load import READERS
+from rtradar.process import DETECTORS, build_detector
+from rtradar.radar import PRESETS
+from rtradar.registry import Registry
+from rtradar.scatter import RUNGS, build_rung
+
+ROOT = Path(__file__).resolve().parents[1]
+REGISTRIES: tuple[Registry, ...] = (RUNGS, READERS, PRESETS, DETECTORS)
+USED = ("--fidelity", "points", "--radar", "lane-60ghz", "--detector", "threshold")
+
+
+Install = Callable[..., None]
+Capture = pytest.CaptureFixture[str]
+
+
+def files_of_the_how_to() -> dict[str, str]:
+    """Each file by its name, as the page has it."""
+    page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    return dict(re.findall(r"^`([\w.]+)`\n\n```\w+\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL))
+
+
+def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None = None) -> None:
+    """What pip leaves of a package: its modules, and beside them its name and entry points."""
+    folder.mkdir()
+    project = tomllib.loads(files["pyproject.toml"])["project"]
+    about = folder / f"{project['name']}-{project['version']}.dist-info"
+    about.mkdir()
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    lines = []
+    for group, entries in project["entry-points"].items():
+        lines += [f"[{group}]", *(f"{name} = {value}" for name, value in entries.items())]
+    (about / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    for name, text in (files | (changes or {})).items():
+        (folder / name).write_text(text, encoding="utf-8")
+
+
+@pytest.fixture
+def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
+    """Installs the package for this process, as `install` does for another."""
+
+    def put(folder: Path, changes: dict[str, str] | None = None) -> None:
+        install(folder, files_of_the_how_to(), changes)
+        monkeypatch.syspath_prepend(str(folder))
+
+    forget()
+    yield put
+    forget()
+
+
+def forget() -> None:
+    for registry in REGISTRIES:
+        registry.__dict__.pop("_installed", None)
+    for module in [name for name in sys.modules if name.startswith("outside_")]:
+        del sys.modules[module]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
+    path = tmp_path_factory.mktemp("recording") / "walk.npz"
+    fields = ("joints", "parents", "offsets", "root_positions", "rotations", "rate_hz")
+    np.savez(path, **{field: np.asarray(getattr(motion, field)) for field in fields})
+    return path
+
+
+@pytest.mark.slow
+def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path) -> None:
+    files = files_of_the_how_to()
+    assert len(files) == 5
+    assert all(len(text.splitlines()) < 40 for text in files.values())
+    install(tmp_path / "site", files)
+    words = ["run", recording, *USED, "--duration", 0.2, "--out", tmp_path / "out"]
+    done = subprocess.run(
+        [sys.executable, "-m", "rtradar", *map(str, words)],
+        env=os.environ | {"PYTHONPATH": os.pathsep.join([str(tmp_path / "site"), str(ROOT)])},
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stderr
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    said = summary["parameters"]
+    assert (said["fidelity"], said["radar"]["name"], said["detector"]) == ("points", "lane-60ghz", "threshold")
+    # 21 parts of 0.01 m^2, 3 to 5 m from the radar.
+    assert 21 * 0.01 / 5**4 < summary["echo_power_m2"] < 21 * 0.01 / 3**4
+    assert summary["detections"] > 20
+    assert summary["variant"] is None
+
+
+@pytest.mark.parametrize(
+    ("option", "name", "known"),
+    [
+        ("--fidelity", "rough", "specular, fresnel, physical-optics, rays, reference, auto, points"),
+        ("--radar", "rough", "paper-12ghz, paper-77ghz, lane-60ghz, or the path"),
+        ("--detector", "rough", "os-cfar, ca-cfar, threshold"),
+        (None, "walk.rough", ".amc, .bvh, .npz"),
+    ],
+)
+def test_an_unknown_name_is_answered_with_all_that_there_are(
+    tmp_path: Path, here: Install, capsys: Capture, option: str | None, name: str, known: str
+) -> None:
+    here(tmp_path / "site")
+    words = ["synthetic:walk", option, name] if option else [str(tmp_path / name)]
+    assert main(["run", *words, "--duration", "0.2", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err
+    assert len(said.splitlines()) == 1
+    assert known in said
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("broken", "text", "said"),
+    [
+        ("outside_rung.py", "import nowhere_to_be_found", "fidelity 'points' of package 'outside' failed: ModuleNotFoundError"),
+        ("outside_rung.py", "Points = 3", "is a int, not a function or class"),
+        ("outside_detector.py", "def threshold(power, *, pfa, looks):\n    return power", "gave float32"),
+        ("outside_detector.py", "def threshold(power):\n    return power > 1", "failed: TypeError"),
+        ("outside_radar.py", "def lane():\n    raise SystemExit('no')", "radar 'lane-60ghz' of package 'outside' failed"),
+        ("outside_reader.py", "def read(path):\n    return path", "not a Motion"),
+    ],
+)
+def test_a_broken_package_is_one_line(
+    tmp_path: Path, here: Install, capsys: Capture, recording: Path, broken: str, text: str, said: str
+) -> None:
+    here(tmp_path / "site", {broken: text})
+    assert main(["run", str(recording), *USED, "--duration", "0.2", "--out", str(tmp_path / "out")]) == 1
+    lines = [line for line in capsys.readouterr().err.splitlines() if line and not line.startswith("rtradar: warning")]
+    assert len(lines) == 1
+    assert said in lines[0]
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.fixture
+def registered() -> Iterator[None]:
+    """Takes out again what a test registers."""
+    before = [dict(registry._registered) for registry in REGISTRIES]
+    yield
+    for registry, known in zip(REGISTRIES, before, strict=True):
+        registry._registered = known
+
+
+@pytest.mark.usefixtures("registered")
+def test_a_running_program_adds_its_own() -> None:
+    rt.register_radar("mine", lambda: rt.Radar(tx_z=0, rx_z=0))
+    assert rt.Radar.load("mine") == rt.Radar(name="mine", tx_z=0, rx_z=0)
+    rt.register_detector("all", lambda power, *, pfa, looks: power > 0)
+    assert build_detector("all", pfa=0.1, looks=1)(np.ones((2, 3))).all()
+    still = rt.synthetic_motion("walk", seed=0, duration_s=0.1)
+    rt.register_reader("mine", lambda path: still)
+    assert rt.load_motion("here.mine") is still
+    with pytest.raises(rt.InputError, match="take no skeleton"):
+        rt.load_motion("here.mine", skeleton="there.asf")
+    with pytest.raises(rt.InputError, match="there already"):
+        rt.register_radar("mine", rt.Radar)
+    with pytest.raises(rt.InputError, match="cannot be called"):
+        rt.register_radar("yours", 3)  # type: ignore[arg-type]
+
+
+class Wrong:
+    """A rung that spoils what `analytic` gives."""
+
+    def __init__(self, radar: rt.Radar, body: rt.Body, *, spreading: bool, spoil: str) -> None:
+        self._rung, self._spoil = build_rung("analytic", radar, body, spreading=spreading), spoil
+
+    def echoes(self, chirps: np.ndarray) -> object:
+        good = self._rung.echoes(chirps)
+        fields = {name: getattr(good, name) for name in ("length", "amplitude", "frequency", "tx", "part", "bounces")}
+        match self._spoil:
+            case "type":
+                return fields
+            case "rx":
+                fields |= {"length": good.length[:, :1], "amplitude": good.amplitude[:, :, :1]}
+            case "tx":
+                fields["tx"] = good.tx[::-1]
+            case "part":
+                fields["part"] = good.part + 1
+            case "value":
+                fields["amplitude"] = good.amplitude * np.nan
+        return rt.Echoes(**fields)
+
+
+@pytest.mark.usefixtures("registered")
+@pytest.mark.parametrize(
+    ("spoil", "said"),
+    [("type", "gave a dict"), ("rx", "of shape"), ("tx", "other Tx"), ("part", "parts outside 0 to 20"), ("value", "not finite")],
+)
+def test_a_rung_must_give_what_the_rest_relies_on(spoil: str, said: str) -> None:
+    rt.register_rung("wrong", Wrong)
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0)
+    good = build_rung("wrong", radar, body, spoil="nothing").echoes(np.arange(4))
+    assert good.length.shape == (4, 2, 21)
+    with pytest.raises(rt.ExtensionError, match=said):
+        build_rung("wrong", radar, body, spoil=spoil).echoes(np.arange(4))
+    with pytest.raises(rt.InputError, match=r"no dial 'depth'; it has: spoil"):
+        build_rung("wrong", radar, body, depth=3)
+
+
+def test_every_built_in_name_is_there() -> None:
+    for registry in REGISTRIES:
+        assert all(callable(registry[name]) for name in registry.built_in)
+
+
+def test_two_of_one_name_are_refused_by_that_name(tmp_path: Path, here: Install) -> None:
+    files = files_of_the_how_to()
+    here(tmp_path / "site", {})
+    taken = files["pyproject.toml"].replace("points =", "specular =").replace('"outside"', '"other"')
+    install(tmp_path / "other", {"pyproject.toml": taken})
+    sys.path.insert(0, str(tmp_path / "other"))
+    try:
+        with pytest.raises(rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"):
+            RUNGS.find("specular")
+        assert RUNGS.find("analytic") is not None
+        with pytest.raises(rt.ExtensionError, match="'threshold' is claimed by 'other' and by 'outside'"):
+            DETECTORS.find("threshold")
+    finally:
+        sys.path.remove(str(tmp_path / "other"))
