@@ -1,4 +1,4 @@
-"""The radar: waveform, array, TDM schedule, and every limit that follows from them (the paper's Tables 1 and 2)."""
+"""The radar: waveform, array, schedule of its Tx, and every limit that follows from them (the paper's Tables 1 and 2)."""
 
 from __future__ import annotations
 
@@ -35,6 +35,7 @@ _POSITIVE = (
     "rx_spacing_wavelengths",
 )
 _COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
+_CHOICES = {"channels": ("pairs", "all"), "polarization": ("v", "h"), "multiplexing": ("tdm", "fdm", "ddm")}
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
@@ -52,10 +53,11 @@ def _is_count(value: object) -> bool:
 
 @dataclass(frozen=True, kw_only=True)
 class Radar:
-    """A TDM-MIMO FMCW radar with a cross of two linear arrays.
+    """A MIMO FMCW radar with a cross of two linear arrays.
 
-    Antennas are numbered y-line first, then z-line; the index rises with y or z. Tx take turns chirp by chirp,
-    without a gap: chirp m comes from Tx ``m mod n_tx``.
+    Antennas are numbered y-line first, then z-line; the index rises with y or z. Chirp m comes from Tx ``m mod n_tx``. Under
+    TDM the Tx take turns chirp by chirp, without a gap. Under FDM and DDM all of them transmit at once: chirps 0 to
+    ``n_tx - 1`` are those that are on the air together first, and so on.
 
     Parameters
     ----------
@@ -79,6 +81,14 @@ class Radar:
         ``pairs``: y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper). ``all``: every Tx with every Rx (192).
     polarization : {"v", "h"}
         Co-polar: v is world z, h is world y.
+    multiplexing : {"tdm", "fdm", "ddm"}
+        What tells the Tx apart: their time (TDM), their carrier (FDM: Tx k sweeps ``tx_offset_hz[k]`` higher, and the receiver
+        parts the bands), or their Doppler (DDM, Doppler division: the IF of Tx k is turned by exp(j 2 pi k p / D) from chirp to
+        chirp p, which moves it k of D bands of the Doppler axis up; some bands stay empty and tell where the axis begins).
+    carrier_step_hz : float, optional
+        Of FDM: from one Tx's carrier to the next; the sample rate if left out, the least that keeps the bands apart.
+    doppler_bands : int, optional
+        Of DDM: D, more than there are Tx; a third more than Tx if left out.
 
     Raises
     ------
@@ -102,6 +112,9 @@ class Radar:
     position_m: tuple[float, float, float] = (-4.0, 1.0, 1.0)
     channels: Literal["pairs", "all"] = "pairs"
     polarization: Literal["v", "h"] = "v"
+    multiplexing: Literal["tdm", "fdm", "ddm"] = "tdm"
+    carrier_step_hz: float | None = None
+    doppler_bands: int | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name.isprintable()):
@@ -118,7 +131,7 @@ class Radar:
                     f"radar '{self.name}': {field} = {shown(value)}; it must be a whole number from {least} to {_MOST}"
                 )
             object.__setattr__(self, field, int(value))
-        for field, allowed in (("channels", ("pairs", "all")), ("polarization", ("v", "h"))):
+        for field, allowed in _CHOICES.items():
             if getattr(self, field) not in allowed:
                 raise InputError(f"radar '{self.name}': {field} = {shown(getattr(self, field))}; allowed: {', '.join(allowed)}")
         position = self.position_m
@@ -126,10 +139,12 @@ class Radar:
             raise InputError(f"radar '{self.name}': position_m = {shown(position)}; it must be three finite numbers [m]")
         object.__setattr__(self, "position_m", tuple(float(value) for value in position))
         self._check_array()
+        self._check_multiplexing()
         if self.cycles_per_frame < 1:
             raise InputError(
-                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole TDM cycle of "
-                f"{self.cycle_duration_s:.3g} s; lengthen the frame or shorten the chirp"
+                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole "
+                f"{self.multiplexing.upper()} cycle of {self.cycle_duration_s * self._cycles_together:.3g} s; "
+                "lengthen the frame or shorten the chirp"
             )
         samples = self.chirps_per_frame * self.n_rx * self.samples_per_chirp
         if samples > _MOST_SAMPLES_PER_FRAME:
@@ -148,6 +163,27 @@ class Radar:
                     f"radar '{self.name}': channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
                     f"{self.rx_y} and {self.rx_z}; make them equal or set channels = 'all'"
                 )
+
+    def _check_multiplexing(self) -> None:
+        for field, owner in (("carrier_step_hz", "fdm"), ("doppler_bands", "ddm")):
+            if getattr(self, field) is not None and self.multiplexing != owner:
+                raise InputError(f"radar '{self.name}': {field} belongs to multiplexing = '{owner}'; leave it out")
+        step, bands = self.carrier_step_hz, self.doppler_bands
+        if step is not None and not (_is_number(step) and self.sample_rate_hz <= step):
+            raise InputError(
+                f"radar '{self.name}': carrier_step_hz = {_shown(step)}; bands of the IF are {self.sample_rate_hz:g} Hz wide "
+                "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
+            )
+        if bands is not None and not (_is_count(bands) and self.n_tx < bands <= _MOST):
+            raise InputError(
+                f"radar '{self.name}': doppler_bands = {_shown(bands)}; it must be a whole number above {self.n_tx}, "
+                "the number of Tx"
+            )
+        if self.multiplexing == "ddm" and (self.rx_of_tx != self.rx_of_tx[0]).any():
+            raise InputError(
+                f"radar '{self.name}': under multiplexing = 'ddm' every Rx hears all Tx; set channels = 'all', "
+                "or give Tx on one line"
+            )
 
     @classmethod
     def preset(cls, name: str) -> Radar:
@@ -233,11 +269,11 @@ class Radar:
         """Complex IF samples a second [Hz]."""
         return self.samples_per_chirp / self.chirp_duration_s
 
-    # -- TDM schedule --------------------------------------------------------------------------------------------
+    # -- schedule ------------------------------------------------------------------------------------------------
 
     @property
     def n_tx(self) -> int:
-        """Transmitters, and chirps in one TDM cycle."""
+        """Transmitters, and chirps in one cycle."""
         return self.tx_y + self.tx_z
 
     @property
@@ -252,13 +288,59 @@ class Radar:
 
     @property
     def cycle_duration_s(self) -> float:
-        """One turn through all Tx [s]."""
-        return self.n_tx * self.chirp_duration_s
+        """Time until the same Tx transmits again [s]: one turn through all Tx under TDM, else one chirp."""
+        return self.chirp_duration_s if self.at_once else self.n_tx * self.chirp_duration_s
+
+    @property
+    def at_once(self) -> bool:
+        """Whether all Tx transmit at once."""
+        return self.multiplexing != "tdm"
+
+    @property
+    def chirp_interval_s(self) -> float:
+        """Mean time from one chirp to the next, counted over all Tx [s]."""
+        return self.chirp_duration_s / self.n_tx if self.at_once else self.chirp_duration_s
+
+    @cached_property
+    def tx_delay_s(self) -> NDArray[np.float64]:
+        """How long after the first Tx each Tx transmits in a cycle, (tx,) [s]."""
+        return np.asarray(np.arange(self.n_tx) * (0.0 if self.at_once else self.chirp_duration_s), dtype=np.float64)
+
+    @cached_property
+    def tx_offset_hz(self) -> NDArray[np.float64]:
+        """How far the sweep of each Tx lies above that of `start_frequency_hz`, (tx,) [Hz]; their mean is 0."""
+        if self.multiplexing != "fdm":
+            return np.zeros(self.n_tx)
+        step = self.sample_rate_hz if self.carrier_step_hz is None else float(self.carrier_step_hz)
+        return np.asarray((np.arange(self.n_tx) - (self.n_tx - 1) / 2) * step)
+
+    @property
+    def occupied_bandwidth_hz(self) -> float:
+        """From the lowest to the highest frequency transmitted [Hz]; FDM takes more than the sweep."""
+        return self.bandwidth_hz + float(np.ptp(self.tx_offset_hz))
+
+    @property
+    def receiver_rate_hz(self) -> float:
+        """Complex samples a second of a receiver before it parts the bands of FDM [Hz]; else the `sample_rate_hz`."""
+        return self.sample_rate_hz + float(np.ptp(self.tx_offset_hz))
+
+    @property
+    def n_doppler_bands(self) -> int:
+        """Bands of the Doppler axis under DDM, else 1."""
+        if self.multiplexing != "ddm":
+            return 1
+        return self.n_tx + math.ceil(self.n_tx / 3) if self.doppler_bands is None else int(self.doppler_bands)
+
+    @property
+    def _cycles_together(self) -> int:
+        """A frame holds a multiple of so many cycles: with DDM, each Tx then moves by whole Doppler bins."""
+        return self.n_doppler_bands
 
     @property
     def cycles_per_frame(self) -> int:
-        """Whole TDM cycles in one frame (133 of the paper's 133.3)."""
-        return math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
+        """Whole cycles in one frame (133 of the paper's 133.3); under DDM a multiple of `n_doppler_bands`."""
+        cycles = math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
+        return cycles - cycles % self._cycles_together
 
     @property
     def chirps_per_frame(self) -> int:
@@ -303,7 +385,12 @@ class Radar:
         -----
         Equation :eq:`tdm` of the theory page.
         """
-        return np.asarray((np.arange(first, first + n) + 0.5) * self.chirp_duration_s, dtype=np.float64)
+        return self.centres_of(np.arange(first, first + n))
+
+    def centres_of(self, chirps: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Centres of these chirps, (chirp,) [s] since the start of the capture."""
+        slots = np.asarray(chirps) // self.n_tx if self.at_once else np.asarray(chirps)
+        return np.asarray((slots + 0.5) * self.chirp_duration_s, dtype=np.float64)
 
     def window_starts(self, n_chirps: int) -> NDArray[np.int64]:
         """First cycle of each processing window in a capture of ``n_chirps``, (window,).

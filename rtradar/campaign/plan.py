@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, fields, replace
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from rtradar.radar import Radar
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _BODY = ("build", "height_m")
+_LATER = ("multiplexing", "carrier_step_hz", "doppler_bands")
 """What a synthetic subject has for life, and is drawn with the subject."""
 
 
@@ -129,6 +130,9 @@ def _recipe(interval: _Interval, setting: Setting, common: Mapping[str, Any]) ->
 @lru_cache(maxsize=16)
 def _radar_parameters(radar: Radar) -> dict[str, Any]:
     told = asdict(radar)
+    # Left out where they are the default: these came later, and the names of samples made before shall stay.
+    later = {field.name: field.default for field in fields(radar) if field.name in _LATER}
+    told = {name: value for name, value in told.items() if name not in later or value != later[name]}
     return told | {"position_m": list(told["position_m"])}
 
 

@@ -26,7 +26,7 @@ from rtradar.radar import Radar
 from rtradar.scatter import Rung, build_rung
 from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
-from rtradar.signal import Noise, synthesize
+from rtradar.signal import Noise, receive, separate, synthesize
 
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
@@ -95,7 +95,7 @@ class Capture:
         taker : Taker
             Gets the range spectra.
         kept : array-like, optional
-            Gets the IF samples (chirp, rx, sample), `block` chirps at a time.
+            Gets the IF samples as received (chirp, rx, sample), `block` chirps at a time; under DDM those of a cycle are one.
         progress : bool
             Whether a bar is shown, on a terminal.
         """
@@ -110,12 +110,14 @@ class Capture:
                 with stages.time("clutter"):
                     room.add(samples, np.arange(first, first + len(samples)))
             with stages.time("noise"):
-                noise.add(samples, radar, first)
+                received = receive(samples, radar, first)
+                noise.add(received, radar, first)
             if kept is not None:
                 with stages.time("write"):
-                    kept[first : first + len(samples)] = samples
+                    begin = first * len(received) // len(samples)
+                    kept[begin : begin + len(received)] = received
             with stages.time("range"):
-                return range_spectrum(samples, radar)
+                return range_spectrum(separate(received, radar, first), radar)
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

@@ -197,7 +197,7 @@ def run(
             pictures = draw_pictures(folder, radar, clouds, title)
             if inside:
                 pictures |= draw_room_pictures(folder, radar, body, scene, inside, title)
-        capture_s = n_chirps * radar.chirp_duration_s
+        capture_s = n_chirps * radar.chirp_interval_s
 
         def cost() -> dict[str, Any]:
             wall_s = time.perf_counter() - began - warmup_s
@@ -332,11 +332,12 @@ def _if_array(path: Path, capture: Capture) -> Any:
     import zarr
 
     radar = capture.radar
-    shape = (capture.n_chirps, radar.n_rx, radar.samples_per_chirp)
-    array = zarr.create_array(
-        path, shape=shape, chunks=(capture.block, *shape[1:]), dtype="complex64", dimension_names=("chirp", "rx", "sample")
-    )
-    array.attrs.update({"units": "m", "chirp_duration_s": radar.chirp_duration_s, "sample_rate_hz": radar.sample_rate_hz})
+    together = radar.n_tx if radar.multiplexing == "ddm" else 1  # one receiver gets the sum of all Tx
+    shape = (capture.n_chirps // together, radar.n_rx, radar.samples_per_chirp)
+    chunks = (capture.block // together, *shape[1:])
+    array = zarr.create_array(path, shape=shape, chunks=chunks, dtype="complex64", dimension_names=("chirp", "rx", "sample"))
+    told = {name: getattr(radar, name) for name in ("multiplexing", "chirp_duration_s", "sample_rate_hz")}
+    array.attrs.update({"units": "m", **told})
     return array
 
 

@@ -12,7 +12,6 @@ from rtradar.pipeline.received import ReceivedWindow
 from rtradar.pipeline.store import MapStore
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
-    SPECTROGRAM_CYCLES,
     ClutterRemoval,
     Detector,
     SlidingSpectrogram,
@@ -21,6 +20,7 @@ from rtradar.process import (
     range_azimuth,
     range_elevation,
     range_time,
+    window_cycles,
 )
 from rtradar.radar import Radar
 
@@ -70,7 +70,7 @@ class Products:
         axes = {
             "range": radar.range_m,
             "velocity": radar.velocity_mps(radar.cycles_per_frame),
-            "spectrogram_velocity": radar.velocity_mps(SPECTROGRAM_CYCLES),
+            "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
         }
         # Two channels on a line tell a direction along it.
         lines = {"azimuth": radar.tx_y * radar.rx_y > 1, "elevation": radar.tx_z * radar.rx_z > 1}

@@ -111,7 +111,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     seen_in_band = False
     for first in range(0, len(chirps), _CHIRPS_AT_ONCE):
         chosen = chirps[first : first + _CHIRPS_AT_ONCE]
-        times = np.minimum((chosen + 0.5) * radar.chirp_duration_s, body.duration_s)
+        times = np.minimum(radar.centres_of(chosen), body.duration_s)
         _refuse_too_near(radar, body, times)
         echoes = rung.echoes(chosen)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
@@ -134,7 +134,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
             "nearer (position_m) or raise samples_per_chirp"
         )
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
-    looked_at = np.asarray((chirps + 0.5) * radar.chirp_duration_s, dtype=np.float64)
+    looked_at = radar.centres_of(chirps)
     power = float(power_at.sum())
     if power == 0:
         # A point of 1 m^2 at the world's origin stands in for the person.

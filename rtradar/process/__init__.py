@@ -10,7 +10,7 @@ from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
 from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum, range_time
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
-from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram
+from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
 from rtradar.process.steering import measures_angle
 from rtradar.process.windows import SlidingWindows
 
@@ -46,4 +46,5 @@ __all__ = [
     "range_time",
     "register_detector",
     "spectrogram",
+    "window_cycles",
 ]

@@ -22,6 +22,7 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.process.cells import cell_spectra
 from rtradar.process.spectra import range_spectrum
@@ -107,7 +108,9 @@ def angle_spectra(
     bins = np.rint(ranges / radar.range_bin_m).astype(np.int64)
     if len(bins) and not 0 <= bins.min() <= bins.max() < radar.samples_per_chirp:
         raise InputError(f"angle: range_m must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin")
-    turns = np.outer(rates * (2 / radar.wavelength_m * radar.chirp_duration_s), np.arange(radar.n_tx))
+    # What a moving echo gains between the Tx of one cycle, and any echo on the way there and back by its Tx's own carrier.
+    turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
+    turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
     samples = cells.astype(np.complex64, copy=False)
     still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
 

@@ -240,6 +240,11 @@ def clutter_removal(
     """
     if method not in CLUTTER_REMOVALS:
         raise InputError(f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}")
+    if method != "none" and radar.multiplexing == "ddm":
+        raise InputError(
+            f"clutter removal '{method}': under multiplexing = 'ddm' what stands still has a Doppler of its own for each Tx, "
+            "which this would leave in; choose 'none', or another multiplexing"
+        )
     for name, value, owner in (("time_constant_s", time_constant_s, "exponential"), ("pulses", pulses, "mti")):
         if value is not None and method != owner:
             raise InputError(f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'")

@@ -19,6 +19,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.process.doppler_division import without_copies
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
 
@@ -186,7 +187,7 @@ def range_time(
     begins = np.arange(0, len(chirps), rows)
     middles = first_chirp + (begins + np.minimum(begins + rows, len(chirps))) / 2
     kind = chirps.real.dtype
-    return np.array(power, dtype=kind).reshape(len(power), chirps.shape[2]), middles * radar.chirp_duration_s
+    return np.array(power, dtype=kind).reshape(len(power), chirps.shape[2]), middles * radar.chirp_interval_s
 
 
 def power_map(
@@ -209,7 +210,8 @@ def power_map(
     -------
     (range, velocity) float32 or float64
         Power, in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian noise a cell follows the
-        Gamma law of as many looks as there are channels in the sum.
+        Gamma law of as many looks as there are channels in the sum. Under DDM an echo's copies are taken out, but of a single
+        channel.
 
     Raises
     ------
@@ -244,6 +246,9 @@ def power_map(
     power = np.zeros((n_cycles, n_range), dtype=real)
     if channel is not None:
         add_channel(*divmod(channel, radar.n_rx), power)
+    elif radar.multiplexing == "ddm":
+        # The rows of all Tx are the same sum; those of the first are not turned.
+        power = without_copies(tx_power(0), radar, radar.n_rx)
     else:
         # The order of the sum is fixed, so the map does not depend on the number of threads.
         for own in in_threads(tx_power, range(radar.n_tx)):

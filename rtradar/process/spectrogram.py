@@ -20,12 +20,19 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.process.doppler_division import without_copies
 from rtradar.process.spectra import hann
 from rtradar.radar import Radar
 
 WINDOW_CYCLES = 128
 OVERLAP = 0.95
 """Window and overlap of the paper's spectrograms (section 3.2.3)."""
+
+
+def window_cycles(radar: Radar) -> int:
+    """Cycles in a window that lasts as long as the paper's `WINDOW_CYCLES` of TDM; under DDM a multiple of the bands."""
+    cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
+    return max(1, round(cycles / radar.n_doppler_bands)) * radar.n_doppler_bands
 
 
 @dataclass(frozen=True)
@@ -98,7 +105,7 @@ def spectrogram(
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
     values = values.astype(np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False)
     starts = np.arange(0, len(values) - window + 1, hop)
-    return Spectrogram(_columns(values, starts, window), _times(starts, radar, tx, window), radar.velocity_mps(window))
+    return Spectrogram(_columns(values, starts, window, radar), _times(starts, radar, tx, window), radar.velocity_mps(window))
 
 
 class SlidingSpectrogram:
@@ -113,7 +120,7 @@ class SlidingSpectrogram:
     channel : int
         tx * n_rx + rx.
     window, overlap
-        As of `spectrogram`.
+        As of `spectrogram`; `window_cycles` of them if left out.
 
     Raises
     ------
@@ -121,7 +128,8 @@ class SlidingSpectrogram:
         Where there is no such channel, or ``window`` or ``overlap`` have no meaning.
     """
 
-    def __init__(self, radar: Radar, *, channel: int = 0, window: int = WINDOW_CYCLES, overlap: float = OVERLAP) -> None:
+    def __init__(self, radar: Radar, *, channel: int = 0, window: int | None = None, overlap: float = OVERLAP) -> None:
+        window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:
             raise InputError(f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
         self._radar, self._window = radar, window
@@ -161,7 +169,7 @@ class SlidingSpectrogram:
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
-        power = _columns(cycles, starts, self._window)
+        power = _columns(cycles, starts, self._window, radar)
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop
@@ -184,10 +192,11 @@ def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
 
 def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDArray[np.float64]:
     """Middle of the windows that begin with these cycles (time,) [s]: a DFT-even window is even about sample window / 2."""
-    return np.asarray((starts + window / 2) * radar.cycle_duration_s + (tx + 0.5) * radar.chirp_duration_s, dtype=np.float64)
+    own = float(radar.tx_delay_s[tx]) + radar.chirp_duration_s / 2
+    return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
 
 
-def _columns(signals: NDArray[np.complexfloating], starts: NDArray[np.int64], window: int) -> NDArray[np.floating]:
+def _columns(signals: NDArray[np.complexfloating], starts: NDArray[np.int64], window: int, radar: Radar) -> NDArray[np.floating]:
     """Power (time, velocity) of the windows that begin at these rows of the signals (cycle, range)."""
     real = np.float32 if signals.dtype == np.complex64 else np.float64
     weights = (hann(window) / hann(window).sum()).astype(real)[:, None]
@@ -196,5 +205,10 @@ def _columns(signals: NDArray[np.complexfloating], starts: NDArray[np.int64], wi
     for row, start in enumerate(starts):
         spectra = scipy.fft.fft(signals[start : start + window] * weights, axis=0, overwrite_x=True)
         parts = spectra.view(real)
-        power[row] = np.square(parts, out=parts).sum(axis=1)
+        squares = np.square(parts, out=parts)
+        if radar.multiplexing == "ddm":
+            own = without_copies(squares[:, ::2] + squares[:, 1::2], radar, 1) / radar.n_tx
+            power[row] = own.sum(axis=1)
+        else:
+            power[row] = squares.sum(axis=1)
     return np.fft.fftshift(power, axes=1)

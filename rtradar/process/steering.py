@@ -192,6 +192,7 @@ def steering(radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, tape
         raise InputError(f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one")
     reach, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
     weights = np.empty((1 if range_bins is None else len(range_bins), len(line.channels), len(sines)), dtype=np.complex64)
+    carrier = radar.centre_frequency_hz + radar.tx_offset_hz[line.channels // radar.n_rx]
     runs = []
     for place in range(len(weights)):
         range_m = None if range_bins is None else radar.range_bin_m * int(range_bins[place])
@@ -199,7 +200,7 @@ def steering(radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, tape
         steps = np.zeros(excess.shape) if range_m is None else np.rint(excess / (2 * radar.range_bin_m))
         offsets = np.clip(steps, -reach, reach).astype(np.int64)
         # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
-        turns = excess * (radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS) - offsets / 2
+        turns = excess * (carrier / SPEED_OF_LIGHT_MPS) - offsets / 2
         weights[place] = (np.exp(-2j * np.pi * turns) * own).T
         runs.append(_runs(offsets.T + reach))
     return Steering(weights, np.concatenate(runs), np.cumsum([0, *map(len, runs)]))

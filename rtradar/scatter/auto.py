@@ -97,7 +97,7 @@ class Auto:
         # A decibel down is a smaller share than one up.
         self._power_share = 1 - 10 ** (-tolerance_db / 10)
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
-        self._step = max(1, round(_INSTANTS_S / radar.chirp_duration_s))
+        self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
         self._planned: dict[int, Planned] = {}
         self.variant: str | None = None
 
@@ -184,7 +184,7 @@ class Auto:
 
     def _hiders(self, time: float) -> NDArray[np.bool_]:
         """What may stand before the parts that go by `fresnel` within an instant or two of a time [s], (part, part)."""
-        before = int(time / self._radar.chirp_duration_s) // self._step
+        before = int(time / self._radar.chirp_interval_s) // self._step
         instants = [self._plan(max(0, before + i)) for i in (-1, 0, 1, 2)]
         edges = np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
         hiders = np.any([planned.told.hiders[row] for planned, row in instants], axis=0)
@@ -196,7 +196,7 @@ class Auto:
         if chunk not in self._planned:
             # One more on either side, for what a part needs there it is given here, too.
             instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
-            times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_duration_s
+            times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
             poses = self._body.at(np.minimum(times, self._body.duration_s))
             told = forecast(self._radar, poses, spreading=self._spreading)
             chosen = choose(told, self._power_share, self._complex_share)

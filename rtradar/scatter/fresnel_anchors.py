@@ -207,7 +207,7 @@ class ZoneShares:
 
     def _time(self, chirp: float) -> float:
         # Past the end of the recording the body rests in its last pose; before the capture nothing moved.
-        return min((max(chirp, 0.0) + 0.5) * self._radar.chirp_duration_s, self._body.duration_s)
+        return min((max(chirp, 0.0) + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
 
     def _anchor(self, number: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
         """Who hides whom at an anchor (part, part), and shares (frequency, pair, part)."""

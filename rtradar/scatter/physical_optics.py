@@ -121,12 +121,12 @@ class PhysicalOptics:
         # From coarse nodes to fine ones, which stand at antennas or between them.
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
-        self._step = max(1, round(anchor_s / radar.chirp_duration_s))
+        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         self._envelope = Envelope(self._sample, len(body.part_names), tolerance)
 
     def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
         """Envelope at the fine nodes: computed there where it differs over the array, else spread from the coarse ones."""
-        time = min((place * self._step + 0.5) * self._radar.chirp_duration_s, self._body.duration_s)
+        time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose = self._body.at([time])
         coarse = self._at_nodes(pose, self._coarse, parts)
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength

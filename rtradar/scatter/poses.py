@@ -19,7 +19,7 @@ def anchor_step(radar: Radar, apart_s: float = _ANCHORS_S) -> int:
 
     A limb at 5 m/s goes 5 cm in 10 ms.
     """
-    return max(1, round(apart_s / radar.chirp_duration_s))
+    return max(1, round(apart_s / radar.chirp_interval_s))
 
 
 class Rung(Protocol):
@@ -71,7 +71,7 @@ class ChirpPoses(NamedTuple):
 
 def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPoses:
     """Poses at the centres of these chirps; past the end of the recording the body rests in its last pose."""
-    times = np.minimum((np.asarray(chirps) + 0.5) * radar.chirp_duration_s, body.duration_s)
+    times = np.minimum(radar.centres_of(chirps), body.duration_s)
     poses = body.at(times)
     tx_index = radar.tx_of_chirp(chirps)
     return ChirpPoses(tx_index, radar.tx[tx_index], radar.rx[radar.rx_of_tx[tx_index]], *poses)

@@ -198,7 +198,7 @@ class Rays:
         if not 0 <= anchor_s < 1:
             raise InputError(f"rays: anchor_s = {anchor_s}; allowed are 0 (every chirp) to 1 s")
         self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces
-        self._step = max(1, round(anchor_s / radar.chirp_duration_s))
+        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
         self._grid = EllipsoidGrid.cover(body.semi_axes, radar.wavelength_m / rays_per_wavelength)
         backend = select(variant)
         self.variant: str | None = backend.kind

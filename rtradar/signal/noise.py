@@ -54,9 +54,11 @@ class Noise:
         return cls(0.0 if math.isinf(snr_db) and snr_db > 0 else signal_power / 10 ** (snr_db / 10), seed)
 
     def add(self, samples: NDArray[np.complex64], radar: Radar, first_chirp: int) -> None:
-        """Add noise in place to a block of chirps ``(chirp, rx, sample)`` that starts at ``first_chirp``, a cycle's first.
+        """Add noise in place to what was received.
 
-        Each TDM cycle has a stream of its own, made from the seed and its number.
+        ``samples (row, rx, sample)`` are a block that starts at ``first_chirp``, a cycle's first. A row is a
+        chirp, and under DDM a cycle, for there all Tx share one receiver. Each cycle has a stream of its own, made from the seed
+        and its number.
 
         Parameters
         ----------
@@ -72,18 +74,20 @@ class Noise:
             Where the block does not start with a cycle.
         """
         if first_chirp % radar.n_tx:
-            raise ValueError(f"Noise.add: the block starts at chirp {first_chirp}; it must start with a TDM cycle")
+            raise ValueError(f"Noise.add: the block starts at chirp {first_chirp}; it must start with a cycle")
         if self.power == 0:
             return
+        rows = 1 if radar.multiplexing == "ddm" else radar.n_tx
+        first_cycle = first_chirp // radar.n_tx
         sigma = np.float32(math.sqrt(self.power / 2))
 
         def fill(first: int) -> None:
-            for begin in range(first, min(first + _CYCLES_AT_ONCE * radar.n_tx, len(samples)), radar.n_tx):
-                part = samples[begin : begin + radar.n_tx]
-                stream = np.random.SFC64([self.seed, (first_chirp + begin) // radar.n_tx])
+            for begin in range(first, min(first + _CYCLES_AT_ONCE * rows, len(samples)), rows):
+                part = samples[begin : begin + rows]
+                stream = np.random.SFC64([self.seed, first_cycle + begin // rows])
                 _add(stream.random_raw(part.size).reshape(part.shape), sigma, part)
 
-        in_threads(fill, range(0, len(samples), _CYCLES_AT_ONCE * radar.n_tx))
+        in_threads(fill, range(0, len(samples), _CYCLES_AT_ONCE * rows))
 
 
 # Compiled arithmetic stays in float32, and so in twice as many vector lanes, where every constant of it is one.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -211,6 +212,7 @@ def synthesize(
     (chirp, rx, sample) complex
         x[n] = sum over echoes of amplitude(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)), tau = length / c,
         t_n = n / sample rate, f_n = f_c + s t_n; paper, eq. 9, with its neglected last term. Hidden echoes add nothing.
+        Under FDM f_c is that of each Tx, `Radar.tx_offset_hz` higher, but for amplitudes, which hardly change by so little.
 
     Raises
     ------
@@ -230,6 +232,8 @@ def synthesize(
     if times.shape != echoes.length.shape[:1]:
         raise ValueError(f"synthesize: times has shape {times.shape}; with these echoes it must be {echoes.length.shape[:1]}")
     _warn_of_motion_in_chirp(echoes, radar, times)
+    if radar.tx_offset_hz.any():
+        echoes = _on_own_carriers(echoes, radar)
     out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
     many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES and out.dtype == np.complex64
     length, powers = np.ascontiguousarray(echoes.length), _powers_of_sample_number(echoes.frequency, radar)
@@ -248,6 +252,12 @@ def synthesize(
 
         in_threads(fill, range(0, len(out), _CHIRPS_A_THREAD))
     return out
+
+
+def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
+    """A carrier that is higher by an offset turns every echo by the offset times its delay."""
+    turns = radar.tx_offset_hz[echoes.tx][:, None, None] * (echoes.length / SPEED_OF_LIGHT_MPS)
+    return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
 
 def _powers_of_sample_number(frequency: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
