@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rtradar import classify, exchange, process, rcs, signal
+    from rtradar.antenna import Antenna
     from rtradar.body import Body, Ellipsoids
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
@@ -28,6 +29,7 @@ __version__ = "0.1.0"
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {
+    "Antenna": "antenna",
     "BackendError": "errors",
     "Body": "body",
     "Comparison": "pipeline",
@@ -53,6 +55,7 @@ _HOME = {
 _MODULES = ("classify", "exchange", "process", "rcs", "signal")
 
 __all__ = [
+    "Antenna",
     "BackendError",
     "Body",
     "Comparison",

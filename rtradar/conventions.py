@@ -21,7 +21,13 @@ Phase
 
 Spreading
     Spherical spreading sits in ``amplitude``, a factor 1 / (R1 R2) normalised to 1 at R1 = R2 = 1 m, so that the
-    amplitude stays in metres.
+    amplitude stays in metres. So does the pattern of antennas, relative to its peak; gains at the peak belong to watts.
+
+Watts
+    |amplitude|^2 and the power of IF samples, in m^2, times P_t G_t G_r lambda^2 / (4 pi)^3 (`Radar.watts_per_m2`) are the
+    received power of the radar equation P_r = P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R1^2 R2^2) [W] (Skolnik, Introduction to
+    Radar Systems, 3rd ed., section 1.2), lambda at the sweep centre. A complex sample holds noise of k T F Fs watts, for the
+    ideal IF low-pass is as wide as the sample rate Fs (Richards, Fundamentals of Radar Signal Processing, section 2.3).
 
 Wavelength
     Doppler, angle and near-field phases belong to the CENTRE frequency of the sweep, for that is how fast the phase
@@ -37,6 +43,9 @@ Windows
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 """Speed of light in vacuum [m/s], exact by the definition of the metre."""
+
+BOLTZMANN_J_PER_K = 1.380649e-23
+"""Boltzmann's constant [J/K], exact by the definition of the kelvin."""
 
 MINIMUM_ANTENNA_DISTANCE_M = 0.3
 """A body part nearer to an antenna than this is refused: the echo model has no meaning there."""

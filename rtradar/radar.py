@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -12,8 +13,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.antenna import Antenna
 from rtradar.checks import shown
-from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.conventions import BOLTZMANN_J_PER_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.registry import Registry
 from rtradar.toml_tables import check_keys, read_toml
@@ -89,6 +91,14 @@ class Radar:
         Of FDM: from one Tx's carrier to the next; the sample rate if left out, the least that keeps the bands apart.
     doppler_bands : int, optional
         Of DDM: D, more than there are Tx; a third more than Tx if left out.
+    transmit_power_dbm : float, optional
+        Of one Tx, at its antenna. With it powers are known in watts.
+    noise_figure_db : float, optional
+        Of the receiver, everything from the antenna to the IF samples. With the transmit power it says how strong noise is.
+    noise_temperature_k : float
+        Of what the antennas see; 290 K is the one that noise figures refer to.
+    tx_antenna, rx_antenna : Antenna, optional
+        Of each Tx and Rx, a table in TOML; isotropic if left out.
 
     Raises
     ------
@@ -115,6 +125,11 @@ class Radar:
     multiplexing: Literal["tdm", "fdm", "ddm"] = "tdm"
     carrier_step_hz: float | None = None
     doppler_bands: int | None = None
+    transmit_power_dbm: float | None = None
+    noise_figure_db: float | None = None
+    noise_temperature_k: float = 290.0
+    tx_antenna: Antenna | None = None
+    rx_antenna: Antenna | None = None
 
     def __post_init__(self) -> None:
         if not (isinstance(self.name, str) and self.name.isprintable()):
@@ -138,6 +153,16 @@ class Radar:
         if not isinstance(position, list | tuple | np.ndarray) or len(position) != 3 or not all(map(_is_number, position)):
             raise InputError(f"radar '{self.name}': position_m = {shown(position)}; it must be three finite numbers [m]")
         object.__setattr__(self, "position_m", tuple(float(value) for value in position))
+        self._check_power()
+        for field in ("tx_antenna", "rx_antenna"):
+            antenna = getattr(self, field)
+            try:
+                made = Antenna.of(antenna) if isinstance(antenna, Mapping) else antenna
+            except InputError as error:
+                raise InputError(f"radar '{self.name}': {field}: {error}") from None
+            if made is not None and not isinstance(made, Antenna):
+                raise InputError(f"radar '{self.name}': {field} = {shown(antenna)}; it must be a table of an antenna's fields")
+            object.__setattr__(self, field, made)
         self._check_array()
         self._check_multiplexing()
         if self.cycles_per_frame < 1:
@@ -164,6 +189,19 @@ class Radar:
                     f"{self.rx_y} and {self.rx_z}; make them equal or set channels = 'all'"
                 )
 
+    def _check_power(self) -> None:
+        for field, least, most in (
+            ("transmit_power_dbm", -200, 200),
+            ("noise_figure_db", 0, 100),
+            ("noise_temperature_k", 0, 1e6),
+        ):
+            value = getattr(self, field)
+            if value is None and field != "noise_temperature_k":
+                continue
+            if not (_is_number(value) and least <= value <= most):
+                raise InputError(f"radar '{self.name}': {field} = {shown(value)}; it must lie between {least} and {most:g}")
+            object.__setattr__(self, field, float(value))
+
     def _check_multiplexing(self) -> None:
         for field, owner in (("carrier_step_hz", "fdm"), ("doppler_bands", "ddm")):
             if getattr(self, field) is not None and self.multiplexing != owner:
@@ -171,12 +209,12 @@ class Radar:
         step, bands = self.carrier_step_hz, self.doppler_bands
         if step is not None and not (_is_number(step) and self.sample_rate_hz <= step):
             raise InputError(
-                f"radar '{self.name}': carrier_step_hz = {_shown(step)}; bands of the IF are {self.sample_rate_hz:g} Hz wide "
+                f"radar '{self.name}': carrier_step_hz = {shown(step)}; bands of the IF are {self.sample_rate_hz:g} Hz wide "
                 "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
             )
         if bands is not None and not (_is_count(bands) and self.n_tx < bands <= _MOST):
             raise InputError(
-                f"radar '{self.name}': doppler_bands = {_shown(bands)}; it must be a whole number above {self.n_tx}, "
+                f"radar '{self.name}': doppler_bands = {shown(bands)}; it must be a whole number above {self.n_tx}, "
                 "the number of Tx"
             )
         if self.multiplexing == "ddm" and (self.rx_of_tx != self.rx_of_tx[0]).any():
@@ -429,6 +467,36 @@ class Radar:
             Since the start of the capture [s].
         """
         return np.asarray((np.asarray(starts) + self.cycles_per_frame / 2) * self.cycle_duration_s, dtype=np.float64)
+
+    # -- watts ---------------------------------------------------------------------------------------------------
+
+    @property
+    def watts_per_m2(self) -> float:
+        r"""P_t G_t G_r lambda^2 / (4 pi)^3: what turns \|amplitude\|^2 [m^2] into received power [W]; `conventions` has the rest.
+
+        Raises
+        ------
+        InputError
+            Where the radar does not state its transmit power.
+        """
+        if self.transmit_power_dbm is None:
+            raise InputError(f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are not known; give it")
+        gains = math.prod(antenna.peak_gain for antenna in (self.tx_antenna, self.rx_antenna) if antenna is not None)
+        return float(1e-3 * 10 ** (self.transmit_power_dbm / 10) * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
+
+    @property
+    def noise_power_w(self) -> float:
+        """K T F B of one complex IF sample [W], B the sample rate.
+
+        Raises
+        ------
+        InputError
+            Where the radar does not state its noise figure.
+        """
+        if self.noise_figure_db is None:
+            raise InputError(f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; give it")
+        factor = 10 ** (self.noise_figure_db / 10)
+        return float(BOLTZMANN_J_PER_K * self.noise_temperature_k * factor * self.sample_rate_hz)
 
     # -- array ---------------------------------------------------------------------------------------------------
 

@@ -110,7 +110,7 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
         ("--fidelity", "rough", "specular, fresnel, physical-optics, rays, reference, auto, points"),
         ("--radar", "rough", "paper-12ghz, paper-77ghz, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, threshold"),
-        (None, "walk.rough", ".amc, .bvh, .npz"),
+        (None, "walk.rough", ".amc, .bvh, .c3d, .npz"),
     ],
 )
 def test_an_unknown_name_is_answered_with_all_that_there_are(

@@ -21,7 +21,16 @@ from rtradar.radar import Radar
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _BODY = ("build", "height_m")
-_LATER = ("multiplexing", "carrier_step_hz", "doppler_bands")
+_LATER = (
+    "multiplexing",
+    "carrier_step_hz",
+    "doppler_bands",
+    "transmit_power_dbm",
+    "noise_figure_db",
+    "noise_temperature_k",
+    "tx_antenna",
+    "rx_antenna",
+)
 """What a synthetic subject has for life, and is drawn with the subject."""
 
 

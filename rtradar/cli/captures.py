@@ -80,7 +80,11 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
         "--heading", type=number, default=0.0, metavar="DEG", help="turn the person, anticlockwise from above (default: 0)"
     )
     run.add_argument(
-        "--snr-db", type=decibels, default=20.0, metavar="X|inf", help="echo power over noise power per sample (default: 20)"
+        "--snr-db",
+        type=decibels,
+        default=20.0,
+        metavar="X|inf|physical",
+        help="echo power over noise power per sample, or by the radar's watts (default: 20)",
     )
     run.add_argument("--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)")
     run.add_argument("--seed", type=whole, default=0, metavar="N", help="of synthetic motion, noise and sampling (default: 0)")

@@ -50,8 +50,10 @@ def seconds(text: str) -> float:
     return value
 
 
-def decibels(text: str) -> float:
-    """May be inf [dB]."""
+def decibels(text: str) -> float | str:
+    """May be inf [dB], or physical."""
+    if text == "physical":
+        return text
     value = float(text)
     if math.isnan(value) or value == -math.inf:
         raise ValueError
@@ -82,7 +84,7 @@ def count(text: str) -> int:
 for _kind, _name in (
     (number, "finite number"),
     (seconds, "number of seconds, not negative"),
-    (decibels, "number of decibels, or inf"),
+    (decibels, "number of decibels, inf or physical"),
     (whole, "whole number, not negative"),
     (numbers, "list of whole numbers, such as 1,2,3"),
     (count, "whole number, at least 1"),

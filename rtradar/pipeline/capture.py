@@ -8,7 +8,7 @@ import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +24,7 @@ from rtradar.pipeline.timing import Stages
 from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import Rung, build_rung
+from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -141,7 +142,7 @@ def prepare(
     start_s: float,
     duration_s: float | None,
     heading_deg: float,
-    snr_db: float,
+    snr_db: float | Literal["physical"],
     pfa: float,
     seed: int,
     variant: str,
@@ -157,6 +158,10 @@ def prepare(
     Parameters are those of `rtradar.run`, and so are the errors.
     """
     _check(snr_db, pfa, seed)
+    if isinstance(snr_db, str):
+        if not spreading:
+            raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
+        radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
     walled = bool(scene.walls or scene.furniture)
     with stages.time("motion"):
         radar = scene.place(radar)
@@ -175,6 +180,11 @@ def prepare(
     paths: Multipath | None = None
     rung: Rung
     if walled:
+        if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
+            raise InputError(
+                f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths over walls, whose "
+                "directions at the antennas are not followed; take free-space, or antennas with pattern = 'isotropic'"
+            )
         if dials:
             raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
         paths = Multipath(
@@ -191,7 +201,12 @@ def prepare(
         surveyed = survey(rung, radar, body, n_chirps, spreading=spreading)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    noise = Noise.for_snr(surveyed.power, snr_db, seed) if noise_power_m2 is None else Noise(noise_power_m2, seed)
+    if noise_power_m2 is not None:
+        noise = Noise(noise_power_m2, seed)
+    elif isinstance(snr_db, str):
+        noise = Noise(radar.noise_power_w / radar.watts_per_m2, seed)
+    else:
+        noise = Noise.for_snr(surveyed.power, snr_db, seed)
     inside = None
     if paths is not None:
         with stages.time("room"):
@@ -231,8 +246,11 @@ def _chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
 
 
-def _check(snr_db: float, pfa: float, seed: int) -> None:
-    if not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
+def _check(snr_db: float | Literal["physical"], pfa: float, seed: int) -> None:
+    if isinstance(snr_db, str):
+        if snr_db != "physical":
+            raise InputError(f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)")
+    elif not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
         raise InputError(f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)")
     if not 0 < pfa < 1:
         raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")

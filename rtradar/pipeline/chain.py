@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,7 +74,7 @@ def run(
     start_s: float = 0.0,
     duration_s: float | None = None,
     heading_deg: float = 0.0,
-    snr_db: float = 20.0,
+    snr_db: float | Literal["physical"] = 20.0,
     pfa: float = 1e-6,
     seed: int = 0,
     variant: str = "auto",
@@ -105,8 +105,9 @@ def run(
         Interval of the recording [s]; to its end if no duration is given.
     heading_deg : float
         Turns the person, anticlockwise seen from above, on top of the standard placement.
-    snr_db : float
-        Power of the person's visible echoes over complex noise power per sample; ``inf`` for no noise.
+    snr_db : float or "physical"
+        Power of the person's visible echoes over complex noise power per sample; ``inf`` for no noise; ``physical`` for the noise
+        that follows from the radar's transmit power, gains and noise figure.
     pfa : float
         False-alarm rate asked of the detector in each cell.
     seed : int
@@ -218,7 +219,7 @@ def run(
                 "start_s": start_s,
                 "duration_s": body.duration_s,
                 "heading_deg": heading_deg,
-                "snr_db": "inf" if math.isinf(snr_db) else snr_db,
+                "snr_db": "inf" if snr_db == math.inf else snr_db,
                 "pfa": pfa,
                 "variant": variant,
                 "spreading": spreading,
@@ -245,6 +246,7 @@ def run(
             "echo_power_m2": capture.survey.power if capture.survey.visible else 0.0,
             "part_power_m2": capture.survey.part_power,
             "noise_power_m2": capture.noise.power,
+            **({} if radar.transmit_power_dbm is None or not spreading else {"watts": _watts(capture)}),
             "limits": _limits(capture),
             **({"modelled": capture.rung.account()} if isinstance(capture.rung, Accountable) else {}),
             **({"room": inside.account} if inside else {}),
@@ -339,6 +341,12 @@ def _if_array(path: Path, capture: Capture) -> Any:
     told = {name: getattr(radar, name) for name in ("multiplexing", "chirp_duration_s", "sample_rate_hz")}
     array.attrs.update({"units": "m", **told})
     return array
+
+
+def _watts(capture: Capture) -> dict[str, float]:
+    """Powers per IF sample in watts, as received at the antenna's port: the radar equation's."""
+    scale = capture.radar.watts_per_m2
+    return {"watts_per_m2": scale, "echo_power_w": capture.survey.power * scale, "noise_power_w": capture.noise.power * scale}
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:

@@ -14,6 +14,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.registry import Registry
+from rtradar.scatter.antenna_gain import through_antennas
 from rtradar.scatter.poses import Accountable, Rung
 
 RUNGS = Registry(
@@ -38,7 +39,7 @@ _COMMON = ("radar", "body", "variant", "spreading")
 
 
 def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **dials: Any) -> Rung:
-    """The rung of that name, for this body and radar.
+    """The rung of that name, for this body and radar, through the radar's antennas.
 
     Parameters
     ----------
@@ -76,7 +77,7 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
         # What traces nothing takes no backend.
         backend = {"variant": variant} if "variant" in taken else {}
         rung: Rung = kind(radar, body, spreading=spreading, **backend, **dials)
-    return rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body)
+    return through_antennas(rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body), radar, body)
 
 
 class _Checked:

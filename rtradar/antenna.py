@@ -1,0 +1,141 @@
+"""Antenna elements: how much of what they radiate goes where, and how much they gain at most."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+
+_HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
+_PATTERNS = ("isotropic", "cosine", "dipole", "table")
+_CUTS = ("azimuth_deg", "azimuth_db", "elevation_deg", "elevation_db")
+_MOST_EXPONENT = 1e4
+
+
+@dataclass(frozen=True, kw_only=True)
+class Antenna:
+    """One element, in the radar's axes: boresight along x, y to the left, z up.
+
+    Parameters
+    ----------
+    pattern : {"isotropic", "cosine", "dipole", "table"}
+        ``cosine``: power falls as cos^exponent of the angle from boresight, and nothing goes behind. ``dipole``: half a
+        wavelength along the polarisation, z for v and y for h. ``table``: the cuts below, one over azimuth and one over
+        elevation; their decibels add up, and beyond their ends they stay as they are there.
+    exponent : float, optional
+        Of ``cosine``.
+    gain_dbi : float, optional
+        At the peak of the pattern; where left out, what follows from the pattern without losses: 0 for ``isotropic``,
+        2 (exponent + 1) for ``cosine``, 2.15 dBi for ``dipole``. Needed by ``table``.
+    azimuth_deg, azimuth_db, elevation_deg, elevation_db : sequence of float, optional
+        Of ``table``: angles, ascending, and power below the peak there (so 0 or less). A cut that is left out is flat.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning, is missing, or belongs to another pattern.
+    """
+
+    pattern: Literal["isotropic", "cosine", "dipole", "table"] = "isotropic"
+    exponent: float | None = None
+    gain_dbi: float | None = None
+    azimuth_deg: tuple[float, ...] = ()
+    azimuth_db: tuple[float, ...] = ()
+    elevation_deg: tuple[float, ...] = ()
+    elevation_db: tuple[float, ...] = ()
+
+    def __post_init__(self) -> None:
+        if self.pattern not in _PATTERNS:
+            raise InputError(f"antenna: pattern = {self.pattern!r}; allowed: {', '.join(_PATTERNS)}")
+        if (self.exponent is not None) != (self.pattern == "cosine"):
+            raise InputError(
+                f"antenna: pattern = '{self.pattern}' with exponent = {self.exponent}; only 'cosine' has one, and needs it"
+            )
+        if self.exponent is not None:
+            object.__setattr__(self, "exponent", _number("exponent", self.exponent, 0, _MOST_EXPONENT))
+        if self.gain_dbi is not None:
+            object.__setattr__(self, "gain_dbi", _number("gain_dbi", self.gain_dbi, -100, 100))
+        elif self.pattern == "table":
+            raise InputError("antenna: pattern = 'table' needs gain_dbi, the gain at its peak")
+        for cut in _CUTS:
+            values = getattr(self, cut)
+            if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
+                raise InputError(f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {str(values)[:60]!r}")
+            limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
+            object.__setattr__(self, cut, tuple(_number(cut, value, *limits) for value in values))
+        for name in ("azimuth", "elevation"):
+            angles, levels = getattr(self, f"{name}_deg"), getattr(self, f"{name}_db")
+            if len(angles) != len(levels) or (np.diff(angles) <= 0).any():
+                raise InputError(f"antenna: {name}_deg and {name}_db must be as many, and the angles ascend")
+        if self.pattern == "table" and not (self.azimuth_deg or self.elevation_deg):
+            raise InputError("antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and elevation_db")
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Antenna:
+        """From a table of a TOML file, whose keys are the fields of this class.
+
+        Raises
+        ------
+        InputError
+            Where there is an unknown key, or a value without meaning.
+        """
+        known = [field.name for field in dataclasses.fields(cls)]
+        for key in table:
+            if key not in known:
+                raise InputError(f"antenna: unknown key '{key}'; allowed: {', '.join(known)}")
+        return cls(**table)
+
+    @property
+    def peak_gain(self) -> float:
+        """Gain over an isotropic antenna at the peak of the pattern, a ratio of powers."""
+        if self.gain_dbi is not None:
+            return float(10 ** (self.gain_dbi / 10))
+        if self.exponent is not None:
+            return 2 * (self.exponent + 1)
+        return _HALF_WAVE_DIRECTIVITY if self.pattern == "dipole" else 1.0
+
+    def relative(self, directions: NDArray[np.float64], polarization: str) -> NDArray[np.float64]:
+        """Power in these directions over that at the peak.
+
+        Parameters
+        ----------
+        directions : (..., 3) float64
+            From the antenna, of any length.
+        polarization : {"v", "h"}
+            Of the radar.
+
+        Returns
+        -------
+        (...) float64
+            0 to 1.
+        """
+        unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+        if self.exponent is not None:
+            ahead = unit[..., 0]
+            return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)
+        if self.pattern == "dipole":
+            along = unit[..., 2] if polarization == "v" else unit[..., 1]
+            across = np.maximum(1 - along**2, 1e-12)  # on the axis itself it is 0 / 0, and its limit 0
+            return np.asarray(np.cos(np.pi / 2 * along) ** 2 / across)
+        level = np.zeros(unit.shape[:-1])
+        if self.azimuth_deg:
+            level += np.interp(np.degrees(np.arctan2(unit[..., 1], unit[..., 0])), self.azimuth_deg, self.azimuth_db)
+        if self.elevation_deg:
+            level += np.interp(np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1))), self.elevation_deg, self.elevation_db)
+        return np.asarray(10 ** (level / 10))
+
+
+def _number(name: str, value: object, least: float, most: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
+        raise InputError(f"antenna: {name} = {str(value)[:60]!r}; it must be a number")
+    number = float(value)
+    if not (math.isfinite(number) and least <= number <= most):
+        raise InputError(f"antenna: {name} = {number:g}; it must lie between {least:g} and {most:g}")
+    return number

@@ -1,0 +1,74 @@
+"""Echoes through antennas that do not look everywhere alike: any rung, weighted by the directions of its legs."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.antenna import Antenna
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.radar import Radar
+from rtradar.scatter.poses import Accountable, ChirpPoses, Rung, chirp_poses
+
+
+def mirror_points(at: ChirpPoses) -> NDArray[np.float64]:
+    """Where each part has its normal halfway between Tx and Rx as its centre sees them, (chirp, rx, part, 3) [m].
+
+    The mirror point but for terms of the part's size over its distance, and what is seen of a part lies about it.
+    """
+    tx, rx = (_unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None]))
+    normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
+    # A normal of a unit sphere that is stretched to the ellipsoid.
+    local = at.semi_axes * _unit(normal)
+    return np.asarray(at.centres[:, None] + np.einsum("tpij,trpj->trpi", at.frames, local))
+
+
+def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
+    """Amplitude that both antennas leave of a part's echo, relative to the peaks of their patterns, (chirp, rx, part).
+
+    The square root of the power pattern of the Tx in the direction of the part, times that of the Rx.
+    """
+    points = mirror_points(at)
+    gain = np.ones(points.shape[:-1])
+    for antenna, place in ((radar.tx_antenna, at.tx[:, None, None]), (radar.rx_antenna, at.rx[:, :, None])):
+        if antenna is not None:
+            gain *= np.sqrt(antenna.relative(points - place, radar.polarization))
+    return gain
+
+
+def through_antennas(rung: Rung, radar: Radar, body: Body) -> Rung:
+    """The rung as the radar's antennas let it through; itself where they look everywhere alike."""
+    shaped = is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna)
+    return _ThroughAntennas(rung, radar, body) if shaped else rung
+
+
+def is_shaped(antenna: Antenna | None) -> bool:
+    """Whether the antenna looks more into some directions than into others."""
+    return antenna is not None and antenna.pattern != "isotropic"
+
+
+class _ThroughAntennas:
+    """Echoes of several bounces are given the directions of the part they bounce off last."""
+
+    account: Callable[[], dict[str, Any]]
+
+    def __init__(self, rung: Rung, radar: Radar, body: Body) -> None:
+        self._rung, self._radar, self._body = rung, radar, body
+        self.variant = rung.variant
+        if isinstance(rung, Accountable):
+            self.account = rung.account
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        echoes = self._rung.echoes(chirps)
+        gain = leg_gain(self._radar, chirp_poses(self._radar, self._body, chirps))
+        return dataclasses.replace(echoes, amplitude=echoes.amplitude * gain[..., echoes.part])
+
+
+def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -1,0 +1,145 @@
+"""Antenna patterns against closed forms, and what they do to echoes."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import quad
+
+import rtradar as rt
+from rtradar.antenna import Antenna
+from rtradar.scatter import build_rung, chirp_poses
+from rtradar.scatter.antenna_gain import mirror_points
+from rtradar.scatter.mirror import mirror
+
+BODY = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
+
+
+def towards(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
+    azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
+    across = math.cos(elevation)
+    return 7.0 * np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
+
+
+@pytest.mark.parametrize("exponent", [0.0, 1.0, 2.5, 20.0])
+def test_cosine(exponent: float) -> None:
+    antenna = Antenna(pattern="cosine", exponent=exponent)
+    for azimuth, elevation in ((0, 0), (40, 0), (0, -25), (30, 30)):
+        ahead = math.cos(math.radians(azimuth)) * math.cos(math.radians(elevation))
+        assert antenna.relative(towards(azimuth, elevation), "v") == pytest.approx(ahead**exponent)
+    assert antenna.relative(towards(120, 0), "v") == 0
+    # Without losses gain averages to 1 over the sphere.
+    power, _ = quad(lambda t: math.cos(t) ** exponent * math.sin(t) / 2, 0, math.pi / 2)
+    assert antenna.peak_gain * power == pytest.approx(1)
+
+
+def test_dipole() -> None:
+    antenna = Antenna(pattern="dipole")
+    # Balanis, eq. 4-84: [cos(pi/2 cos t) / sin t]^2, t from the wire; 3 dB at 51 and 129 degrees.
+    assert antenna.relative(towards(77, 0), "v") == pytest.approx(1)
+    assert antenna.relative(towards(0, 45), "v") == pytest.approx((math.cos(math.pi / 2 * math.sqrt(0.5)) ** 2) * 2)
+    assert antenna.relative(towards(45, 0), "h") == pytest.approx(antenna.relative(towards(0, 45), "v"))
+    assert antenna.relative(np.array([0, 0, 1.0]), "v") == pytest.approx(0, abs=1e-12)
+    power, _ = quad(lambda t: (math.cos(math.pi / 2 * math.cos(t)) / math.sin(t)) ** 2 * math.sin(t) / 2, 0, math.pi)
+    assert antenna.peak_gain * power == pytest.approx(1)
+    assert 10 * math.log10(antenna.peak_gain) == pytest.approx(2.15, abs=0.005)
+
+
+def test_table() -> None:
+    antenna = Antenna(
+        pattern="table",
+        gain_dbi=10,
+        azimuth_deg=(-60, 0, 60),
+        azimuth_db=(-12, 0, -12),
+        elevation_deg=(-15, 15),
+        elevation_db=(-6, 0),
+    )
+    assert antenna.peak_gain == pytest.approx(10)
+    for azimuth, elevation, level in ((0, 15, 0), (30, 15, -6), (-30, 0, -9), (60, -15, -18), (90, -40, -18)):
+        assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(level)
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"pattern": "yagi"}, "allowed: isotropic, cosine, dipole, table"),
+        ({"pattern": "cosine"}, "only 'cosine' has one, and needs it"),
+        ({"exponent": 2}, "only 'cosine' has one"),
+        ({"pattern": "cosine", "exponent": -1}, "must lie between 0"),
+        ({"pattern": "cosine", "exponent": "two"}, "must be a number"),
+        ({"pattern": "table", "azimuth_deg": [0], "azimuth_db": [0]}, "needs gain_dbi"),
+        ({"pattern": "table", "gain_dbi": 3}, "needs azimuth_deg"),
+        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0, 0], "azimuth_db": [0, -1]}, "angles ascend"),
+        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0, 1], "azimuth_db": [0]}, "as many"),
+        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0], "azimuth_db": [1]}, "must lie between -300 and 0"),
+        ({"azimuth_deg": [0]}, "of pattern = 'table'"),
+        ({"gain": 3}, "unknown key 'gain'"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(fields: dict[str, Any], said: str) -> None:
+    with pytest.raises(rt.InputError, match=f"tx_antenna: antenna: .*{said}"):
+        rt.Radar(tx_antenna=fields)  # type: ignore[arg-type]
+
+
+def test_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "patch.toml"
+    path.write_text(
+        'tx_y = 1\n[tx_antenna]\npattern = "cosine"\nexponent = 2\n[rx_antenna]\npattern = "dipole"\ngain_dbi = 1.5\n'
+    )
+    radar = rt.Radar.load(path)
+    assert radar.tx_antenna == Antenna(pattern="cosine", exponent=2.0)
+    assert radar.rx_antenna == Antenna(pattern="dipole", gain_dbi=1.5)
+    assert hash(radar) == hash(dataclasses.replace(radar))
+
+
+@pytest.mark.parametrize("fidelity", ["analytic", "specular"])
+def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> None:
+    plain = rt.Radar(tx_y=2, tx_z=1, rx_y=3, rx_z=3, position_m=(-2.0, 1.5, 0.8))
+    shaped = dataclasses.replace(
+        plain, tx_antenna=Antenna(pattern="cosine", exponent=6.0), rx_antenna=Antenna(pattern="dipole", gain_dbi=0.0)
+    )
+    chirps = np.arange(6)
+    before, after = (build_rung(fidelity, radar, BODY).echoes(chirps) for radar in (plain, shaped))
+    np.testing.assert_array_equal(after.length, before.length)
+    at = chirp_poses(plain, BODY, chirps)
+    found = []
+    for chirp, rx, part in np.ndindex(6, 3, 21):
+        if before.amplitude[0, chirp, rx, part] == 0:
+            assert after.amplitude[0, chirp, rx, part] == 0
+            continue
+        centre = at.centres[chirp, part]
+        out, back = centre - at.tx[chirp], centre - at.rx[chirp, rx]
+        ahead = out[0] / np.linalg.norm(out)
+        along = back[2] / np.linalg.norm(back)
+        expected = ahead**3 * math.cos(math.pi / 2 * along) / math.sqrt(1 - along**2)
+        found.append(abs(after.amplitude[0, chirp, rx, part] / before.amplitude[0, chirp, rx, part]) / expected)
+    # By the centres of the parts here, by their mirror points there: up to a few degrees at 2 m.
+    assert np.median(found) == pytest.approx(1, abs=0.02)
+    assert max(np.abs(np.log(found))) < 0.3
+
+
+def test_directions_are_those_of_the_mirror_points() -> None:
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0))
+    at = chirp_poses(radar, BODY, np.arange(2))
+    # The length over the exact mirror point is the least of all ways over the surface's near side; one over a point beside it is
+    # longer by the square of how far beside.
+    points = mirror_points(at)
+    ways = np.linalg.norm(points - at.tx[:, None, None], axis=-1) + np.linalg.norm(points - at.rx[:, :, None], axis=-1)
+    exact = mirror(*at[1:])[0]
+    assert (ways - exact).min() > -1e-9
+    assert (ways - exact).max() < 5e-3
+    assert np.median(ways - exact) < 1e-4
+
+
+def test_patterns_are_refused_where_paths_lead_over_walls(tmp_path: Path) -> None:
+    motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
+    radar = rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, tx_antenna=Antenna(pattern="dipole"))
+    with pytest.raises(rt.InputError, match="not followed; take free-space"):
+        rt.run(motion, radar, rt.Scene.load("living-room"), out=tmp_path / "out")
+    assert not (tmp_path / "out").exists()
