@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.process import angle, build_detector, os_cfar, power_map, range_spectrum, spectrogram, window_cycles
+from rtradar.process import angle, build_detector, os_cfar, power_map, range_spectrum, range_time, spectrogram, window_cycles
 from rtradar.signal import Noise, receive, separate, synthesize
 
 ALL = ("tdm", "fdm", "ddm")
@@ -261,3 +261,13 @@ def test_clutter_removal_is_refused_where_it_would_leave_copies() -> None:
     with pytest.raises(rt.InputError, match="a Doppler of its own for each Tx"):
         clutter_removal("mean", radar("ddm"))
     assert clutter_removal("none", radar("ddm")) is not None
+
+
+@pytest.mark.parametrize("multiplexing", ALL)
+def test_range_time_is_the_mean_power_of_a_channel(multiplexing: str) -> None:
+    made = radar(multiplexing, tx_z=0, rx_z=0)
+    # At rest in the middle of bin 128, broadside; moving from chirp to chirp would spread what the Tx of DDM add up to.
+    cube = window(made, point(made, (128 * made.range_bin_m, 0.0, 0.0), 0.0, 0.3))
+    power, times = range_time(cube.reshape(-1, *cube.shape[2:]), made, step_s=made.frame_duration_s)
+    assert power[0, 128] == pytest.approx(0.3**2, rel=5e-3)
+    assert times[0] == pytest.approx(made.cycles_per_frame * made.cycle_duration_s / 2)

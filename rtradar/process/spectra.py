@@ -175,13 +175,14 @@ def range_time(
         raise InputError(
             f"range_time: spectra have shape {chirps.shape}; radar '{radar.name}' needs (chirp, {radar.n_rx}, range)"
         )
+    together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
     rows = max(1, round(step_s / radar.cycle_duration_s)) * radar.n_tx
 
     def mean_power(begin: int) -> NDArray[np.floating]:
         # Row by row: no squares of a whole block are kept.
         parts = np.ascontiguousarray(chirps[begin : begin + rows]).view(chirps.real.dtype).reshape(-1, 2 * chirps.shape[2])
         squares = np.einsum("ri,ri->i", parts, parts).reshape(-1, 2).sum(axis=1)
-        return np.asarray(squares / len(parts))
+        return np.asarray(squares / (len(parts) * together))
 
     power = in_threads(mean_power, range(0, len(chirps), rows))
     begins = np.arange(0, len(chirps), rows)
