@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.exchange.recording import open_recording
 from rtradar.process import angle, build_detector, os_cfar, power_map, range_spectrum, range_time, spectrogram, window_cycles
 from rtradar.signal import Noise, receive, separate, synthesize
 
@@ -234,6 +235,11 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
     assert zarr.open_array(tmp_path / "out" / "if.zarr", mode="r").shape == (rows, 4, 128)
     assert result.summary["capture_s"] == pytest.approx(0.2)
     assert result.summary["detections"] > 0
+    if multiplexing == "ddm":
+        with pytest.raises(rt.InputError, match="the sum of all Tx"):
+            open_recording(tmp_path / "out")
+    else:
+        assert open_recording(tmp_path / "out").shape == (2000, 4, 4, 128)
     # A walk's limbs, in a map that reaches to 54 m/s; where four Tx fade against each other, a copy may be taken for the echo.
     assert (np.abs(result.points[:, 2]) < 6.0).mean() > 0.99
 

@@ -93,6 +93,11 @@ def open_recording(folder: Path) -> IfRecording:
         radar = Radar(**summary["parameters"]["radar"])
     except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
         raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
+    if radar.multiplexing == "ddm":
+        raise InputError(
+            f"'{folder}' holds the sum of all Tx, as Doppler division receives it, which has no tx axis; "
+            "export a run under tdm or fdm"
+        )
     try:
         stored = zarr.open_array(folder / "if.zarr", mode="r")
         shape, kind = stored.shape, np.dtype(stored.dtype)
