@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter
 from scipy.special import gammainccinv, gammaincinv
 
 from rtradar.errors import InputError
@@ -64,9 +65,13 @@ def without_copies(band_power: NDArray[np.floating], radar: Radar, receivers: in
     empty = (power.sum(axis=0) - strongest) / (bands - n_tx)
     usual = np.median(filled, axis=(0, 1))
     looks = n_tx * receivers
-    echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))
-    # Band by band: how many filled bands of the copy that begins there the echo explains, and with what power.
     place = (np.arange(bands)[:, None, None] - begin) % bands
+    echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))
+    # Its skirts have copies, too, weaker than what passes for an echo by itself.
+    echoes = ((place == 0) & echo).reshape(band_power.shape)
+    near = maximum_filter(echoes, size=2 * _SKIRT + 1, mode=("wrap", "nearest")).reshape(power.shape)
+    echo = np.take_along_axis(near, begin[None], axis=0)[0]
+    # Band by band: how many filled bands of the copy that begins there the echo explains, and with what power.
     explained = np.where(place < n_tx, power - empty, 0)
     copies = _block_sums(explained, n_tx)
     # Few looks are left in a copy's place, and their tail must not be detected: no more than what is usual at that range.
