@@ -18,10 +18,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.scatter.triangle_share import positive_share
+from rtradar.threads import in_threads
 
 RIM = 7.0
 """Where the window ends at the latest, sqrt(k dL): 7.8 wavelengths of excess path."""
@@ -29,6 +30,50 @@ RIM = 7.0
 _TAPER = 0.4  # of the way to the rim the window stays 1
 _MERIDIANS, _CELLS = 24, 48
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
+
+
+# Three by three, one by one: products of small arrays call a library, and take seconds to compile.
+
+
+@njit(cache=True, error_model="numpy")
+def _dot(a, b):  # type: ignore[no-untyped-def]
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit(cache=True, error_model="numpy")
+def _apply(matrix, vector, out):  # type: ignore[no-untyped-def]
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        out[i] = matrix[i, 0] * x + matrix[i, 1] * y + matrix[i, 2] * z
+
+
+@njit(cache=True, error_model="numpy")
+def _apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        out[i] = matrix[0, i] * x + matrix[1, i] * y + matrix[2, i] * z
+
+
+@njit(cache=True, error_model="numpy")
+def _less(a, b, out):  # type: ignore[no-untyped-def]
+    for i in range(3):
+        out[i] = a[i] - b[i]
+
+
+@njit(cache=True, error_model="numpy")
+def _normalize(vector):  # type: ignore[no-untyped-def]
+    """Make a unit vector of it; its length is returned."""
+    length = math.sqrt(_dot(vector, vector))
+    for i in range(3):
+        vector[i] /= length
+    return length
+
+
+@njit(cache=True, error_model="numpy")
+def _cap(antenna, centre, back, way, out):  # type: ignore[no-untyped-def]
+    """The antenna from the centre, in axes in which the ellipsoid is the unit sphere."""
+    _less(antenna, centre, way)
+    _apply(back, way, out)
 
 
 @njit(cache=True, error_model="numpy")
@@ -42,32 +87,32 @@ def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back,
         for j in range(3):
             stretch[i, j] = frame[i, j] * axes[j]
             back[j, i] = frame[i, j] / axes[j]
-    for i in range(3):
-        pole[i] = 0.0
-        for j in range(3):
-            pole[i] += back[i, j] * (point[j] - centre[j])
-    pole /= math.sqrt(pole[0] ** 2 + pole[1] ** 2 + pole[2] ** 2)
-    normal = back.T @ pole
-    gradient = math.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
-    normal /= gradient
+    work = np.empty((7, 3))
+    normal, e, f, way_t, way_r, curve_e, curve_f = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
+    _less(point, centre, normal)
+    _apply(back, normal, pole)
+    _normalize(pole)
+    _apply_transposed(back, pole, normal)
+    gradient = _normalize(normal)
     # Tangents that turn with nothing but the normal, so that the pattern does not jump: level, and upward of it.
-    e = np.array([-normal[1], normal[0], 0.0])
+    e[0], e[1], e[2] = -normal[1], normal[0], 0.0
     if normal[0] ** 2 + normal[1] ** 2 < 1e-8:
-        e = np.array([0.0, normal[2], -normal[1]])
-    e /= math.sqrt(e[0] ** 2 + e[1] ** 2 + e[2] ** 2)
-    f = np.array([normal[1] * e[2] - normal[2] * e[1], normal[2] * e[0] - normal[0] * e[2], normal[0] * e[1] - normal[1] * e[0]])
-    way_t, way_r = tx - point, rx - point
-    range_t = math.sqrt(way_t[0] ** 2 + way_t[1] ** 2 + way_t[2] ** 2)
-    range_r = math.sqrt(way_r[0] ** 2 + way_r[1] ** 2 + way_r[2] ** 2)
-    way_t /= range_t
-    way_r /= range_r
-    facing = (way_t + way_r) @ normal
-    curve_e, curve_f = back @ e, back @ f
+        e[0], e[1], e[2] = 0.0, normal[2], -normal[1]
+    _normalize(e)
+    f[0] = normal[1] * e[2] - normal[2] * e[1]
+    f[1] = normal[2] * e[0] - normal[0] * e[2]
+    f[2] = normal[0] * e[1] - normal[1] * e[0]
+    _less(tx, point, way_t)
+    _less(rx, point, way_r)
+    range_t, range_r = _normalize(way_t), _normalize(way_r)
+    facing = _dot(way_t, normal) + _dot(way_r, normal)
+    _apply(back, e, curve_e)
+    _apply(back, f, curve_f)
     bend = facing / gradient
-    te, tf, re, rf = way_t @ e, way_t @ f, way_r @ e, way_r @ f
-    h_ee = (1 - te * te) / range_t + (1 - re * re) / range_r + bend * (curve_e @ curve_e)
-    h_ff = (1 - tf * tf) / range_t + (1 - rf * rf) / range_r + bend * (curve_f @ curve_f)
-    h_ef = -te * tf / range_t - re * rf / range_r + bend * (curve_e @ curve_f)
+    te, tf, re, rf = _dot(way_t, e), _dot(way_t, f), _dot(way_r, e), _dot(way_r, f)
+    h_ee = (1 - te * te) / range_t + (1 - re * re) / range_r + bend * _dot(curve_e, curve_e)
+    h_ff = (1 - tf * tf) / range_t + (1 - rf * rf) / range_r + bend * _dot(curve_f, curve_f)
+    h_ef = -te * tf / range_t - re * rf / range_r + bend * _dot(curve_e, curve_f)
     determinant = h_ee * h_ff - h_ef * h_ef
     if not (facing > 0 and determinant > 0):
         return False
@@ -75,8 +120,9 @@ def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back,
     root = 1 / math.sqrt(determinant)
     scale = math.sqrt(2 / wavenumber) / math.sqrt((h_ee + h_ff) / determinant + 2 * root)
     s_ee, s_ff, s_ef = (h_ff / determinant + root) * scale, (h_ee / determinant + root) * scale, -h_ef / determinant * scale
-    along[0] = back @ (s_ee * e + s_ef * f)
-    along[1] = back @ (s_ef * e + s_ff * f)
+    for i in range(3):
+        along[0, i] = s_ee * curve_e[i] + s_ef * curve_f[i]
+        along[1, i] = s_ef * curve_e[i] + s_ff * curve_f[i]
     return True
 
 
@@ -85,12 +131,11 @@ def _meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untype
     """Direction of one meridian on the unit sphere into ``step (3,)``; its radians a unit of rho, and rho at its end."""
     for i in range(3):
         step[i] = math.cos(angle) * along[0, i] + math.sin(angle) * along[1, i]
-    pace = math.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
-    step /= pace
+    pace = _normalize(step)
     # An antenna at T lights the cap u.T' > 1, T' = A^-1 (T - centre).
     end = math.inf
     for cap in (cap_t, cap_r):
-        ahead, aside = cap @ pole, cap @ step
+        ahead, aside = _dot(cap, pole), _dot(cap, step)
         end = min(end, math.atan2(aside, ahead) + math.acos(min(1.0, 1 / math.hypot(ahead, aside))))
     return pace, min(RIM, end / pace)
 
@@ -99,18 +144,27 @@ def _meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untype
 def _lay_rays(tx, rx, centres, frames, semi_axes, points, wavenumber, out):  # type: ignore[no-untyped-def]
     zones, rays = out.shape[:2]
     stretch, back, pole, along, step = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty(3)
+    cap_t, cap_r, way = np.empty(3), np.empty(3), np.empty(3)
     for zone in range(zones):
         centre = centres[zone]
         there = _axes_of_zone(
             tx[zone], rx[zone], centre, frames[zone], semi_axes[zone], points[zone], wavenumber[zone], stretch, back, pole, along
         )
-        cap_t, cap_r = back @ (tx[zone] - centre), back @ (rx[zone] - centre)
+        _cap(tx[zone], centre, back, way, cap_t)
+        _cap(rx[zone], centre, back, way, cap_r)
         for ray in range(rays):
-            out[zone, ray] = points[zone]
-            if there:
-                pace, end = _meridian(ray * _GOLDEN_ANGLE, pole, along, cap_t, cap_r, step)
-                turn = math.sqrt((ray + 0.5) / rays) * end * pace
-                out[zone, ray] = centre + stretch @ (math.cos(turn) * pole + math.sin(turn) * step)
+            if not there:
+                for i in range(3):
+                    out[zone, ray, i] = points[zone, i]
+                continue
+            pace, end = _meridian(ray * _GOLDEN_ANGLE, pole, along, cap_t, cap_r, step)
+            turn = math.sqrt((ray + 0.5) / rays) * end * pace
+            cosine, sine = math.cos(turn), math.sin(turn)
+            for i in range(3):
+                way[i] = cosine * pole[i] + sine * step[i]
+            _apply(stretch, way, out[zone, ray])
+            for i in range(3):
+                out[zone, ray, i] += centre[i]
 
 
 def zone_rays(
@@ -222,24 +276,30 @@ def _zone_share(  # type: ignore[no-untyped-def]
     n_antennas = len(antennas)
     stretch, back, pole, along, step = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty(3)
     centre = centres[part]
-    out[:] = 1.0
+    for f in range(frequencies):
+        for pair in range(n_pairs):
+            out[f, pair] = 1.0
     if not _axes_of_zone(tx, rx, centre, frames[part], semi_axes[part], point, laid_for, stretch, back, pole, along):
         return
-    cap_t, cap_r = back @ (tx - centre), back @ (rx - centre)
+    cap_t, cap_r, way = np.empty(3), np.empty(3), np.empty(3)
+    _cap(tx, centre, back, way, cap_t)
+    _cap(rx, centre, back, way, cap_r)
     clear = _outlines(part, centres, frames, semi_axes, antennas, hiders, cap_t, cap_r, stretch, pole, along)
 
     # Area of a cell, without what changes along a meridian.
     y0, y1 = along[0], along[1]
     area = pole[0] * (y0[1] * y1[2] - y0[2] * y1[1])
     area = abs(area + pole[1] * (y0[2] * y1[0] - y0[0] * y1[2]) + pole[2] * (y0[0] * y1[1] - y0[1] * y1[0]))
-    up = stretch @ pole
+    up, side, normal_up, normal_side = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    _apply(stretch, pole, up)
+    _apply_transposed(back, pole, normal_up)
     share, facing = np.empty((n_antennas, _CELLS)), np.empty((n_antennas, _CELLS))
     length, turns, weight = np.empty(_CELLS), np.empty(_CELLS), np.empty(_CELLS)
     real, imaginary = np.empty((frequencies, n_antennas, _CELLS)), np.empty((frequencies, n_antennas, _CELLS))
     near = np.empty(n_antennas)
     for a in range(n_antennas):
-        way = antennas[a] - point
-        near[a] = math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
+        _less(antennas[a], point, way)
+        near[a] = math.sqrt(_dot(way, way))
     sums = np.zeros((frequencies, n_pairs, 5))
     cosine, sine = np.empty(_CELLS), np.empty(_CELLS)
     for m in range(_MERIDIANS):
@@ -252,15 +312,16 @@ def _zone_share(  # type: ignore[no-untyped-def]
             if way_share > _TAPER:
                 weight[j] *= math.cos(0.5 * math.pi * (way_share - _TAPER) / (1 - _TAPER)) ** 2
         after = (m + 1) % _MERIDIANS
-        side, normal_up, normal_side = stretch @ step, back.T @ pole, back.T @ step
+        _apply(stretch, step, side)
+        _apply_transposed(back, step, normal_side)
         for a in range(n_antennas):
             # The innermost cell has three corners.
             share[a, 0] = positive_share(clear[m, a, 0], clear[m, a, 1], clear[after, a, 1])
             for j in range(1, _CELLS):
                 share[a, j] = _open_share(clear[m, a, j], clear[m, a, j + 1], clear[after, a, j], clear[after, a, j + 1])
-            way = antennas[a] - centre
+            _less(antennas[a], centre, way)
             # On the ellipsoid itself normal . point is 1.
-            normal_1, normal_2 = normal_up @ way, normal_side @ way
+            normal_1, normal_2 = _dot(normal_up, way), _dot(normal_side, way)
             for j in range(_CELLS):
                 x = way[0] - cosine[j] * up[0] - sine[j] * side[0]
                 y = way[1] - cosine[j] * up[1] - sine[j] * side[1]
@@ -283,49 +344,55 @@ def _zone_share(  # type: ignore[no-untyped-def]
                 _add(weight, facing[t], facing[r], re[t], im[t], re[r], im[r], share[t], share[r], sums[f, pair])
     for f in range(frequencies):
         for pair in range(n_pairs):
-            free_re, free_im, lost_re, lost_im, open_ = sums[f, pair]
-            if open_ == 0:
+            one = sums[f, pair]
+            if one[4] == 0:
                 out[f, pair] = 0.0
-            elif lost_re != 0 or lost_im != 0:
-                out[f, pair] = 1 - complex(lost_re, lost_im) / complex(free_re, free_im)
+            elif one[2] != 0 or one[3] != 0:
+                out[f, pair] = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
 
 
 @njit(cache=True, error_model="numpy")
 def _outlines(part, centres, frames, semi_axes, antennas, hiders, cap_t, cap_r, stretch, pole, along):  # type: ignore[no-untyped-def]
     """Least clearance of the rays from each antenna to the corners of the cells: (meridian, antenna, corner)."""
-    others = np.flatnonzero(hiders)
-    n_antennas = len(antennas)
-    inverse, o, u = np.empty((len(others), 3, 3)), np.empty((len(others), 3)), np.empty((len(others), 3))
-    seen_from = np.empty((len(others), n_antennas, 3))
-    up = stretch @ pole
-    for i in range(len(others)):
+    n_antennas, n_others = len(antennas), 0
+    others = np.empty(len(hiders), dtype=np.int64)
+    for q in range(len(hiders)):
+        if hiders[q]:
+            others[n_others] = q
+            n_others += 1
+    inverse, o, u = np.empty((n_others, 3, 3)), np.empty((n_others, 3)), np.empty((n_others, 3))
+    seen_from = np.empty((n_others, n_antennas, 3))
+    up, side, way, other_side = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    _apply(stretch, pole, up)
+    for i in range(n_others):
         q = others[i]
         for row in range(3):
             for column in range(3):
                 inverse[i, row, column] = frames[q, column, row] / semi_axes[q, row]
-        o[i] = inverse[i] @ (centres[part] - centres[q])
-        u[i] = inverse[i] @ up
+        _cap(centres[part], centres[q], inverse[i], way, o[i])
+        _apply(inverse[i], up, u[i])
         for a in range(n_antennas):
-            seen_from[i, a] = inverse[i] @ (antennas[a] - centres[q])
+            _cap(antennas[a], centres[q], inverse[i], way, seen_from[i, a])
     step, cosine, sine = np.empty(3), np.empty(_CELLS + 1), np.empty(_CELLS + 1)
-    clear = np.full((_MERIDIANS, n_antennas, _CELLS + 1), 1.0)
+    clear = np.ones((_MERIDIANS, n_antennas, _CELLS + 1))
     for m in range(_MERIDIANS):
         pace, end = _meridian(m * 2 * math.pi / _MERIDIANS, pole, along, cap_t, cap_r, step)
         turn = end * pace / _CELLS
         for j in range(_CELLS + 1):
             cosine[j], sine[j] = math.cos(j * turn), math.sin(j * turn)
-        side = stretch @ step
-        for i in range(len(others)):
-            other_side = inverse[i] @ side
+        _apply(stretch, step, side)
+        for i in range(n_others):
+            _apply(inverse[i], side, other_side)
             for a in range(n_antennas):
                 _clearance(seen_from[i, a], o[i], u[i], other_side, cosine, sine, clear[m, a])
     return clear
 
 
+@njit(cache=True, nogil=True, error_model="numpy")
 def _zone_shares(  # type: ignore[no-untyped-def]
-    tx, rx, points, part, pose, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out
+    begin, end, tx, rx, points, part, pose, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out
 ):
-    for zone in prange(len(points)):
+    for zone in range(begin, end):
         _zone_share(
             tx[zone],
             rx[zone],
@@ -343,10 +410,8 @@ def _zone_shares(  # type: ignore[no-untyped-def]
         )
 
 
-_zone_shares_parallel = njit(cache=True, error_model="numpy", parallel=True)(_zone_shares)
-_zone_shares_serial = njit(cache=True, error_model="numpy")(_zone_shares)
-_PARALLEL_ZONES = 8
-"""Below this many zones waking threads costs more than the work."""
+_ZONES_A_THREAD = 8
+"""For fewer, waking threads costs more than the work."""
 
 
 def zone_shares(
@@ -395,6 +460,11 @@ def zone_shares(
     part, pose, pairs = (np.ascontiguousarray(a, dtype=np.int64) for a in (part, pose, pairs))
     out = np.empty((len(points), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
     hiders = np.ascontiguousarray(hiders)
-    kernel = _zone_shares_parallel if len(points) >= _PARALLEL_ZONES else _zone_shares_serial
-    kernel(tx, rx, points, part, pose, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out)
+
+    def share(begin: int) -> None:
+        end = min(begin + _ZONES_A_THREAD, len(points))
+        body = centres, frames, semi_axes
+        _zone_shares(begin, end, tx, rx, points, part, pose, *body, antennas, pairs, hiders, wavenumber, laid_for, out)
+
+    in_threads(share, range(0, len(points), _ZONES_A_THREAD))
     return out
