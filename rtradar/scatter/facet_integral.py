@@ -16,10 +16,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.scatter.facets import Facets
+from rtradar.threads import in_threads
 
 _SERIES = 4.0
 """Largest p for the series: what it leaves out, p^6 2 / 14!, is then 1e-7 of a facet."""
@@ -179,16 +180,21 @@ def _largest(u, v):  # type: ignore[no-untyped-def]
     return largest
 
 
-def _integrate(vertices, faces, normals, areas, bend, both, part, antennas, row, seen, pairs, carrier, k, spreading, out):  # type: ignore[no-untyped-def]
-    tasks, count_antennas = antennas.shape[:2]
+@njit(cache=True, nogil=True, error_model="numpy")
+def _integrate(  # type: ignore[no-untyped-def]
+    begin, end, vertices, faces, normals, areas, bend, both, part, antennas, row, seen, pairs, carrier, k, spreading, out
+):
+    """Fill the tasks from begin to end."""
+    count_antennas = antennas.shape[1]
     n_vertices, n_facets = vertices.shape[1], faces.shape[0]
-    for task in prange(tasks):
+    for task in range(begin, end):
         own = part[task]
         # Coordinate by coordinate: loops over vertices run in vector lanes.
-        x, y, z = vertices[own, :, 0].copy(), vertices[own, :, 1].copy(), vertices[own, :, 2].copy()
+        x, y, z = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
         planes = np.empty(n_facets)
         size = 0.0
         for i in range(n_vertices):
+            x[i], y[i], z[i] = vertices[own, i, 0], vertices[own, i, 1], vertices[own, i, 2]
             size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
         for f in range(n_facets):
             i = faces[f, 0]
@@ -202,7 +208,9 @@ def _integrate(vertices, faces, normals, areas, bend, both, part, antennas, row,
             place = antennas[task, antenna]
             far[antenna] = _excess(place, x, y, z, excess)
             _see(place, far[antenna], excess, faces, planes, normals[own], chosen, seen[row[task, antenna]], view[antenna])
-        own_areas, own_bend = areas[own][chosen], bend[own][chosen]
+        own_areas, own_bend = np.empty(count), np.empty(count)
+        for i in range(count):
+            own_areas[i], own_bend[i] = areas[own, chosen[i]], bend[own, chosen[i]]
         mean, u, v, strength = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
         for pair in range(pairs.shape[0]):
             t, r = pairs[pair, 0], pairs[pair, 1]
@@ -218,8 +226,6 @@ def _integrate(vertices, faces, normals, areas, bend, both, part, antennas, row,
                 out[task, pair, node] = total * complex(0.0, wave / math.sqrt(math.pi))
 
 
-_integrate_parallel = njit(cache=True, error_model="numpy", parallel=True)(_integrate)
-_integrate_serial = njit(cache=True, error_model="numpy")(_integrate)
 _PARALLEL_SHARES = 4_000_000
 """Below this many facets times pairs times frequencies waking threads costs as much as the work: some 12 ms."""
 
@@ -265,8 +271,7 @@ def facet_integral(
         F [m], for exp(+j omega t); 0 where nothing is lit.
     """
     out = np.empty((len(part), len(pairs), wavenumber.shape[1]), dtype=np.complex128)
-    kernel = _integrate_parallel if out.size * len(facets.faces) >= _PARALLEL_SHARES else _integrate_serial
-    kernel(
+    given = (
         facets.vertices,
         facets.faces,
         facets.normals,
@@ -283,4 +288,6 @@ def facet_integral(
         spreading,
         out,
     )
+    at_once = 1 if out.size * len(facets.faces) >= _PARALLEL_SHARES else max(1, len(part))
+    in_threads(lambda first: _integrate(first, min(first + at_once, len(part)), *given), range(0, len(part), at_once))
     return out

@@ -98,9 +98,13 @@ def _facing(local, vertices, axes, margin, chosen, begin):  # type: ignore[no-un
 
 
 @njit(cache=True, error_model="numpy")
-def _grown(array):  # type: ignore[no-untyped-def]
-    out = np.empty((*array.shape[:-1], 2 * array.shape[-1]), dtype=array.dtype)
-    out[..., : array.shape[-1]] = array
+def _grown(rays):  # type: ignore[no-untyped-def]
+    """Twice the room; number by number, as to assign slices takes seconds to compile."""
+    rows, columns = rays.shape
+    out = np.empty((rows, 2 * columns), dtype=rays.dtype)
+    for row in range(rows):
+        for column in range(columns):
+            out[row, column] = rays[row, column]
     return out
 
 
@@ -117,8 +121,13 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
     chosen, hiders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
     begin, places = np.empty(n_vertices), np.empty((3, n_vertices))
     rays, whose, count = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64), 0
+    entry, first, nearest = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
+    wider = np.empty((every, 3))
+    for part in range(every):
+        for i in range(3):
+            wider[part, i] = semi_axes[part, i] * (1 + _NEAR)
     for a in range(len(antennas)):
-        outlines(antennas[a], centres, frames, semi_axes * (1 + _NEAR), low, high, near, far)
+        outlines(antennas[a], centres, frames, wider, low, high, near, far)
         for n in range(len(parts)):
             part = parts[n]
             found = 0
@@ -138,7 +147,7 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
             for i in range(facing):
                 vertex = chosen[i]
                 x[i], y[i], z[i] = vertices[part, vertex, 0], vertices[part, vertex, 1], vertices[part, vertex, 2]
-            entry, first, nearest = np.full(facing, np.inf), np.full(facing, -1.0), np.empty(facing)
+                entry[i], first[i] = math.inf, -1.0
             before, slot = count, (a * len(parts) + n) * n_vertices
             for k in range(found):
                 _before(part, hiders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
@@ -164,7 +173,9 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
             kept = before
             for ray in range(before, count):
                 i = whose[0, ray]
-                rays[:, kept], whose[0, kept], whose[1, kept] = rays[:, ray], slot + chosen[i], whose[1, ray]
+                for row in range(7):
+                    rays[row, kept] = rays[row, ray]
+                whose[0, kept], whose[1, kept] = slot + chosen[i], whose[1, ray]
                 kept += entry[i] >= begin[i]
             count = kept
             for i in range(facing):

@@ -12,26 +12,44 @@ VIEWS = 8
 
 
 @njit(cache=True, error_model="numpy")
+def _normalize(vector):  # type: ignore[no-untyped-def]
+    length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
+    for i in range(3):
+        vector[i] /= length
+
+
+@njit(cache=True, error_model="numpy")
+def _cross(a, b, out):  # type: ignore[no-untyped-def]
+    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@njit(cache=True, error_model="numpy")
 def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type: ignore[no-untyped-def]
     """How parts stand before an antenna: from where to where (part, view) across the view, and along it (part,).
 
     Across: the slopes x.d / x.w of the planes through the antenna that touch the ellipsoid, w the way to the middle of the
     body and d a direction across it; infinite where a part reaches beside the antenna.
     """
-    way = np.zeros(3)
-    for i in range(3):
-        way[i] = centres[:, i].mean() - antenna[i]
-    way /= math.sqrt(way[0] ** 2 + way[1] ** 2 + way[2] ** 2)
-    side = np.zeros(3)
-    side[np.argmin(np.abs(way))] = 1.0
-    first = np.cross(way, side)
-    first /= math.sqrt(first[0] ** 2 + first[1] ** 2 + first[2] ** 2)
-    second = np.cross(way, first)
+    # Number by number: operations on whole small arrays take seconds to compile.
+    way, side, first, second, place, w = np.zeros(3), np.zeros(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for part in range(len(centres)):
-        place = centres[part] - antenna
-        along = 0.0
-        w = np.zeros(3)
         for i in range(3):
+            way[i] += centres[part, i] / len(centres)
+    for i in range(3):
+        way[i] -= antenna[i]
+    _normalize(way)
+    least = 0
+    for i in range(1, 3):
+        if abs(way[i]) < abs(way[least]):
+            least = i
+    side[least] = 1.0
+    _cross(way, side, first)
+    _normalize(first)
+    _cross(way, first, second)
+    for part in range(len(centres)):
+        along = 0.0
+        for i in range(3):
+            place[i], w[i] = centres[part, i] - antenna[i], 0.0
             along += place[i] * way[i]
             for j in range(3):
                 w[i] += semi_axes[part, i] * frames[part, j, i] * way[j]
