@@ -28,6 +28,7 @@ from rtradar.process.cells import cell_spectra
 from rtradar.process.spectra import range_spectrum
 from rtradar.process.steering import Taper, range_walk, sine_grid, steering, steering_everywhere, virtual_lines
 from rtradar.radar import Radar
+from rtradar.threads import in_threads
 
 
 @dataclass(frozen=True)
@@ -126,7 +127,9 @@ def angle_spectra(
         else:
             used, place = np.unique(bins, return_inverse=True)
             known = steering(radar, axis, used, taper)
-        _power(samples, still, place, line.channels, known.weights, known.runs, known.starts, result)
+        given = samples, still, place, line.channels, known.weights, known.runs, known.starts, result
+        begins = range(0, len(samples), _CELLS_A_THREAD)
+        in_threads(lambda begin: _power(begin, min(begin + _CELLS_A_THREAD, len(samples)), *given), begins)
         return result
 
     return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)
@@ -227,15 +230,23 @@ def refine(
     return sines[index] + shift * (sines[1] - sines[0]), np.exp(middle - 0.25 * (left - right) * shift)
 
 
+_CELLS_A_THREAD = 64
+
+
 # By hand: for products of this size the threads of BLAS wait for each other longer than they work.
-@numba.njit(cache=True, fastmath=True, parallel=True)
-def _power(values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
-    """Fill power (cell, sine) from values (cell, offset, channel) turned by still (cell, channel), weights by place."""
+@numba.njit(cache=True, nogil=True, fastmath=True)
+def _power(begin, end, values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
+    """Fill power (cell, sine) of the cells from begin to end.
+
+    From values (cell, offset, channel) turned by still (cell, channel), weights by place.
+    """
     n_sines = weights.shape[2]
-    for cell in numba.prange(len(values)):
-        real, imaginary = np.zeros(n_sines, dtype=np.float32), np.zeros(n_sines, dtype=np.float32)
+    real, imaginary = np.empty(n_sines, dtype=np.float32), np.empty(n_sines, dtype=np.float32)
+    for cell in range(begin, end):
+        for sine in range(n_sines):
+            real[sine], imaginary[sine] = 0.0, 0.0
         for run in range(starts[place[cell]], starts[place[cell] + 1]):
-            element, offset, first, last = runs[run]
+            element, offset, first, last = runs[run, 0], runs[run, 1], runs[run, 2], runs[run, 3]
             channel = channels[element]
             value = values[cell, offset, channel] * still[cell, channel]
             # Counted from 0: an index that may be negative keeps the compiler from using vectors.

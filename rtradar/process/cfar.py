@@ -14,6 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.process.cfar_law import ca_scale, check_looks, check_pfa, check_quantile, order_rank, os_scale
+from rtradar.threads import in_threads
+
+_ROWS_A_THREAD = 64
 
 
 def os_cfar(
@@ -60,7 +63,7 @@ def os_cfar(
     check_quantile(quantile)
     scales = _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale)
     ranks = _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
-    return _os_kernel(cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train)
+    return _by_rows(_os_kernel, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train)
 
 
 def ca_cfar(
@@ -85,7 +88,7 @@ def ca_cfar(
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     scales = _by_count(counts, lambda n: ca_scale(n, pfa, looks) if scale is None else scale)
-    return _ca_kernel(cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train)
+    return _by_rows(_ca_kernel, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train)
 
 
 def _checked(
@@ -131,15 +134,24 @@ def _by_count(counts: NDArray[np.int32], of_count: Callable[[int], float]) -> ND
     return table[counts]
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _os_kernel(cells, thresholds, ranks, counts, guard, reach):  # type: ignore[no-untyped-def]
-    """Detected where at least ``rank`` training cells lie below the threshold, that is the cell over its multiplier.
+def _by_rows(kernel: Callable[..., None], cells: NDArray[np.floating], *given: object) -> NDArray[np.bool_]:
+    """Mask of a map, some rows to a thread."""
+    mask = np.empty(cells.shape, dtype=np.bool_)
+    in_threads(
+        lambda first: kernel(first, min(first + _ROWS_A_THREAD, len(cells)), cells, *given, mask),
+        range(0, len(cells), _ROWS_A_THREAD),
+    )
+    return mask
+
+
+@numba.njit(cache=True, nogil=True)
+def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):  # type: ignore[no-untyped-def]
+    """Mask of the rows from begin to end: at least ``rank`` training cells lie below the threshold, the cell over its multiplier.
 
     Counting needs no sorting, and stops after the first rows that settle the question.
     """
     n_range, n_velocity = cells.shape
-    mask = np.zeros((n_range, n_velocity), dtype=np.bool_)
-    for i in numba.prange(n_range):
+    for i in range(begin, end):
         top, bottom = max(i - reach, 0), min(i + reach, n_range - 1)
         for j in range(n_velocity):
             left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
@@ -164,18 +176,16 @@ def _os_kernel(cells, thresholds, ranks, counts, guard, reach):  # type: ignore[
                 if missing <= 0 or spare < 0:
                     break
             mask[i, j] = missing <= 0
-    return mask
 
 
-@numba.njit(cache=True, nogil=True, parallel=True)
-def _ca_kernel(cells, sums_wanted, guard, reach):  # type: ignore[no-untyped-def]
-    """Detected where the sum of the training cells is less than the cell times their number over the multiplier.
+@numba.njit(cache=True, nogil=True)
+def _ca_kernel(begin, end, cells, sums_wanted, guard, reach, mask):  # type: ignore[no-untyped-def]
+    """Mask of the rows from begin to end: the training cells sum to less than the cell times their number over the multiplier.
 
     Summed afresh for each cell: running sums would drown the weak cells beside a strong one in its rounding.
     """
     n_range, n_velocity = cells.shape
-    mask = np.zeros((n_range, n_velocity), dtype=np.bool_)
-    for i in numba.prange(n_range):
+    for i in range(begin, end):
         top, bottom = max(i - reach, 0), min(i + reach, n_range - 1)
         for j in range(n_velocity):
             left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
@@ -191,4 +201,3 @@ def _ca_kernel(cells, sums_wanted, guard, reach):  # type: ignore[no-untyped-def
                     for b in range(inner_right + 1, right + 1):
                         total += cells[a, b]
             mask[i, j] = total < sums_wanted[i, j]
-    return mask
