@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
-from rtradar.checks import shown
 from rtradar.conventions import BOLTZMANN_J_PER_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.radar_checks import check_array, check_multiplexing, checked_values
 from rtradar.registry import Registry
 from rtradar.toml_tables import check_keys, read_toml
 
@@ -27,30 +26,7 @@ PRESETS = Registry(
 
 register_radar = PRESETS.register
 
-_POSITIVE = (
-    "start_frequency_hz",
-    "bandwidth_hz",
-    "chirp_duration_s",
-    "frame_duration_s",
-    "frame_hop_s",
-    "tx_spacing_wavelengths",
-    "rx_spacing_wavelengths",
-)
-_COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
-_CHOICES = {"channels": ("pairs", "all"), "polarization": ("v", "h"), "multiplexing": ("tdm", "fdm", "ddm")}
-# Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
-_LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
 _MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
-
-
-def _is_number(value: Any) -> bool:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        return False
-    return bool(-_LARGEST < value < _LARGEST)
-
-
-def _is_count(value: object) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,39 +108,18 @@ class Radar:
     rx_antenna: Antenna | None = None
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and self.name.isprintable()):
-            raise InputError(f"radar: name = {shown(self.name)}; it must be one line of text")
-        for field in _POSITIVE:
-            value = getattr(self, field)
-            if not (_is_number(value) and _LEAST < value < _LARGEST):
-                raise InputError(f"radar '{self.name}': {field} = {shown(value)}; it must be a positive, finite number")
-            object.__setattr__(self, field, float(value))
-        for field, least in _COUNTS.items():
-            value = getattr(self, field)
-            if not (_is_count(value) and least <= value <= _MOST):
-                raise InputError(
-                    f"radar '{self.name}': {field} = {shown(value)}; it must be a whole number from {least} to {_MOST}"
-                )
-            object.__setattr__(self, field, int(value))
-        for field, allowed in _CHOICES.items():
-            if getattr(self, field) not in allowed:
-                raise InputError(f"radar '{self.name}': {field} = {shown(getattr(self, field))}; allowed: {', '.join(allowed)}")
-        position = self.position_m
-        if not isinstance(position, list | tuple | np.ndarray) or len(position) != 3 or not all(map(_is_number, position)):
-            raise InputError(f"radar '{self.name}': position_m = {shown(position)}; it must be three finite numbers [m]")
-        object.__setattr__(self, "position_m", tuple(float(value) for value in position))
-        self._check_power()
-        for field in ("tx_antenna", "rx_antenna"):
-            antenna = getattr(self, field)
-            try:
-                made = Antenna.of(antenna) if isinstance(antenna, Mapping) else antenna
-            except InputError as error:
-                raise InputError(f"radar '{self.name}': {field}: {error}") from None
-            if made is not None and not isinstance(made, Antenna):
-                raise InputError(f"radar '{self.name}': {field} = {shown(antenna)}; it must be a table of an antenna's fields")
-            object.__setattr__(self, field, made)
-        self._check_array()
-        self._check_multiplexing()
+        for field, value in checked_values({field.name: getattr(self, field.name) for field in dataclasses.fields(self)}).items():
+            object.__setattr__(self, field, value)
+        check_array(self.name, (self.tx_y, self.tx_z), (self.rx_y, self.rx_z), self.channels)
+        check_multiplexing(
+            self.name,
+            self.multiplexing,
+            carrier_step_hz=self.carrier_step_hz,
+            sample_rate_hz=self.sample_rate_hz,
+            doppler_bands=self.doppler_bands,
+            n_tx=self.n_tx,
+            all_heard=not (self.rx_of_tx != self.rx_of_tx[0]).any(),
+        )
         if self.cycles_per_frame < 1:
             raise InputError(
                 f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole "
@@ -176,51 +131,6 @@ class Radar:
             raise InputError(
                 f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds {samples:.2g} samples, more than "
                 f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps"
-            )
-
-    def _check_array(self) -> None:
-        if self.n_tx == 0 or self.rx_y + self.rx_z == 0:
-            raise InputError(f"radar '{self.name}': the array has no Tx or no Rx; give at least one of each")
-        if self.channels == "pairs":
-            lines = [rx for tx, rx in ((self.tx_y, self.rx_y), (self.tx_z, self.rx_z)) if tx]
-            if min(lines) == 0 or len(set(lines)) > 1:
-                raise InputError(
-                    f"radar '{self.name}': channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
-                    f"{self.rx_y} and {self.rx_z}; make them equal or set channels = 'all'"
-                )
-
-    def _check_power(self) -> None:
-        for field, least, most in (
-            ("transmit_power_dbm", -200, 200),
-            ("noise_figure_db", 0, 100),
-            ("noise_temperature_k", 0, 1e6),
-        ):
-            value = getattr(self, field)
-            if value is None and field != "noise_temperature_k":
-                continue
-            if not (_is_number(value) and least <= value <= most):
-                raise InputError(f"radar '{self.name}': {field} = {shown(value)}; it must lie between {least} and {most:g}")
-            object.__setattr__(self, field, float(value))
-
-    def _check_multiplexing(self) -> None:
-        for field, owner in (("carrier_step_hz", "fdm"), ("doppler_bands", "ddm")):
-            if getattr(self, field) is not None and self.multiplexing != owner:
-                raise InputError(f"radar '{self.name}': {field} belongs to multiplexing = '{owner}'; leave it out")
-        step, bands = self.carrier_step_hz, self.doppler_bands
-        if step is not None and not (_is_number(step) and self.sample_rate_hz <= step):
-            raise InputError(
-                f"radar '{self.name}': carrier_step_hz = {shown(step)}; bands of the IF are {self.sample_rate_hz:g} Hz wide "
-                "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
-            )
-        if bands is not None and not (_is_count(bands) and self.n_tx < bands <= _MOST):
-            raise InputError(
-                f"radar '{self.name}': doppler_bands = {shown(bands)}; it must be a whole number above {self.n_tx}, "
-                "the number of Tx"
-            )
-        if self.multiplexing == "ddm" and (self.rx_of_tx != self.rx_of_tx[0]).any():
-            raise InputError(
-                f"radar '{self.name}': under multiplexing = 'ddm' every Rx hears all Tx; set channels = 'all', "
-                "or give Tx on one line"
             )
 
     @classmethod
