@@ -40,7 +40,10 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         from dask.system import CPU_COUNT
         from distributed import Client, LocalCluster
     except ImportError as error:
-        raise InputError(f"data sets are built on Dask ({error}); install it: pip install 'rtradar[campaign]'") from None
+        raise InputError(
+            f"data sets are built on Dask ({error}); "
+            "install the extra 'campaign' of rtradar, in a checkout: pip install -e '.[campaign]'"
+        ) from None
     # What goes wrong is said in one line, and once. Loggers of Dask and of what it talks through have levels of their own.
     for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("asyncio", "distributed", "tornado")]:
         logging.getLogger(name).setLevel(logging.CRITICAL)

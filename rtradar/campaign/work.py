@@ -73,7 +73,7 @@ def work(client: Client, missing: Sequence[Recipe], folder: Path, made: Callable
             ) from None
         except ImportError as error:
             raise CampaignError(
-                f"a worker cannot load what it needs ({error}); install the same 'rtradar[campaign]' there"
+                f"a worker cannot load what it needs ({error}); install rtradar with its extra 'campaign' there, the same version"
             ) from None
         except (CancelledError, CommClosedError, TimeoutError, OSError):
             raise CampaignError(f"the scheduler was lost; {_kept(done, missing)}") from None

@@ -122,4 +122,4 @@ def test_without_dask_it_says_what_to_install(tmp_path: Path) -> None:
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert found.returncode == 2
     assert found.stderr.count("\n") == 1
-    assert "pip install 'rtradar[campaign]'" in found.stderr
+    assert "in a checkout: pip install -e '.[campaign]'" in found.stderr

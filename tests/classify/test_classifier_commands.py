@@ -172,5 +172,5 @@ def test_a_missing_extra_is_named(
         assert rtradar(*command) == 2
         error = capsys.readouterr().err
         assert error.count("\n") == 1
-        assert "pip install 'rtradar[learn]'" in error
+        assert "in a checkout: pip install -e '.[learn]'" in error
     assert not (tmp_path / "out").exists()
