@@ -19,7 +19,7 @@ import api_pages  # noqa: E402
 import rtradar  # noqa: E402
 
 project, author, release = "rtradar", "rtradar developers", rtradar.__version__
-extensions = ["sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
 exclude_patterns = ["gallery"]
 default_role = "py:obj"
 html_theme = "alabaster"

@@ -24,7 +24,7 @@ Spreading
     amplitude stays in metres. So does the pattern of antennas, relative to its peak; gains at the peak belong to watts.
 
 Watts
-    |amplitude|^2 and the power of IF samples, in m^2, times P_t G_t G_r lambda^2 / (4 pi)^3 (`Radar.watts_per_m2`) are the
+    ``|amplitude|^2`` and the power of IF samples, in m^2, times P_t G_t G_r lambda^2 / (4 pi)^3 (`Radar.watts_per_m2`) are the
     received power of the radar equation P_r = P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R1^2 R2^2) [W] (Skolnik, Introduction to
     Radar Systems, 3rd ed., section 1.2), lambda at the sweep centre. A complex sample holds noise of k T F Fs watts, for the
     ideal IF low-pass is as wide as the sample rate Fs (Richards, Fundamentals of Radar Signal Processing, chapter 2).
