@@ -34,7 +34,7 @@ _POWERS = 3
 """Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
 def _powers(turn, real, imaginary):  # type: ignore[no-untyped-def]
     """Powers of ``turn`` from the 0th on; the one after the last is returned."""
     real[0], imaginary[0] = 1.0, 0.0
@@ -50,7 +50,7 @@ def _powers(turn, real, imaginary):  # type: ignore[no-untyped-def]
     return turn
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
 def _add_constant(real, imaginary, start, block_turn, now, out_re, out_im):  # type: ignore[no-untyped-def]
     """Add a tone to ``out``, block by block: the powers of its turn, times its value at the first sample of the block.
 
@@ -66,7 +66,7 @@ def _add_constant(real, imaginary, start, block_turn, now, out_re, out_im):  # t
         start = start * block_turn
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
 def _add_parabola(real, imaginary, ramp, start, block_turn, step, c0, c1, c2, now, out_re, out_im):  # type: ignore[no-untyped-def]
     """Add a tone whose amplitude is c0 + c1 x + c2 x^2, x the sample number times ``step``; ``ramp`` counts the lanes."""
     for block in range(len(out_re) // _LANES):
@@ -84,7 +84,7 @@ def _add_parabola(real, imaginary, ramp, start, block_turn, step, c0, c1, c2, no
         start = start * block_turn
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: ignore[no-untyped-def]
     """Which echoes (echo,) are in the band and not hidden; ``amplitude (node, echo)``. Their count."""
     count = 0

@@ -1,4 +1,4 @@
-"""The same seed gives the same bits, with any number of threads."""
+"""The same seed gives the same bits, with any number of threads, and in the run that compiles as in the next."""
 
 from __future__ import annotations
 
@@ -44,3 +44,27 @@ def test_one_thread_and_three_give_the_same_bits(tmp_path: Path, options: list[A
         found.append(bits(out))
     assert len(found[0]) > 10
     assert [name for name in found[0] if found[0][name] != found[1].get(name)] == []
+
+
+ADD_TONES = """
+import hashlib, numpy as np, rtradar as rt
+from rtradar.signal import synthesize
+radar, draw = rt.Radar(tx_y=1, tx_z=0, rx_y=4, rx_z=0, samples_per_chirp=128), np.random.default_rng(0)
+length, amplitude = draw.uniform(6, 9, (4, 4, 20)), draw.normal(size=(1, 4, 4, 20)) + 0j
+one, tx = np.ones(20, dtype=int), np.zeros(4, dtype=int)
+echoes = rt.Echoes(length=length, amplitude=amplitude, frequency=np.array([14e9]), tx=tx, part=one, bounces=one)
+samples = synthesize(echoes, radar, np.arange(4.0), dtype=np.complex64)
+print(hashlib.sha256(samples.tobytes()).hexdigest())
+"""
+
+
+@pytest.mark.slow
+def test_what_is_just_compiled_gives_the_bits_of_what_was_compiled_before(tmp_path: Path) -> None:
+    """A compiled function that calls another one may be linked to that one's own code, or to its copy: not the same roundings."""
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    command = [sys.executable, "-W", "ignore", "-c", ADD_TONES]
+    first, second = (
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout for _ in range(2)
+    )
+    assert list(tmp_path.rglob("*.nbc"))
+    assert first == second
