@@ -79,7 +79,16 @@ class Antenna:
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Antenna:
-        """From a table of a TOML file, whose keys are the fields of this class.
+        """From a table of a TOML file.
+
+        Parameters
+        ----------
+        table : mapping
+            Its keys are the fields of this class.
+
+        Returns
+        -------
+        Antenna
 
         Raises
         ------

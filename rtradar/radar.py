@@ -336,7 +336,18 @@ class Radar:
         return self.centres_of(np.arange(first, first + n))
 
     def centres_of(self, chirps: NDArray[np.integer]) -> NDArray[np.float64]:
-        """Centres of these chirps, (chirp,) [s] since the start of the capture."""
+        """When the centres of some chirps are.
+
+        Parameters
+        ----------
+        chirps : (chirp,) int
+            Counted from the start of the capture.
+
+        Returns
+        -------
+        (chirp,) float64
+            [s] since the start of the capture.
+        """
         slots = np.asarray(chirps) // self.n_tx if self.at_once else np.asarray(chirps)
         return np.asarray((slots + 0.5) * self.chirp_duration_s, dtype=np.float64)
 

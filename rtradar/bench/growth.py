@@ -65,8 +65,14 @@ def arrays(radar: Radar) -> list[Radar]:
 
 def as_toml(radar: Radar) -> str:
     """The fields of a radar as a TOML file that `Radar.load` reads."""
+    fields = {name: value for name, value in dataclasses.asdict(radar).items() if value is not None}
+    tables = {name: fields.pop(name) for name, value in list(fields.items()) if isinstance(value, dict)}
+    return _lines(fields) + "".join(f"[{name}]\n{_lines(table)}" for name, table in tables.items())
+
+
+def _lines(fields: dict[str, Any]) -> str:
     # A JSON string, number or list of numbers is one of TOML.
-    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in dataclasses.asdict(radar).items())
+    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in fields.items() if value is not None)
 
 
 def with_echoes(radar: Radar) -> list[dict[str, Any]]:

@@ -32,6 +32,11 @@ def build_detector(name: str, *, pfa: float, looks: int) -> Detector:
     looks : int
         Channels summed in the power.
 
+    Returns
+    -------
+    callable
+        From power (range, velocity) to a bool mask of the same shape.
+
     Raises
     ------
     InputError

@@ -30,7 +30,17 @@ OVERLAP = 0.95
 
 
 def window_cycles(radar: Radar) -> int:
-    """Cycles in a window that lasts as long as the paper's `WINDOW_CYCLES` of TDM; under DDM a multiple of the bands."""
+    """Cycles in a window of the spectrogram.
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    int
+        As long as the paper's `WINDOW_CYCLES` of TDM; under Doppler division a multiple of the bands.
+    """
     cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
     return max(1, round(cycles / radar.n_doppler_bands)) * radar.n_doppler_bands
 

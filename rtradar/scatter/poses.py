@@ -70,7 +70,20 @@ class ChirpPoses(NamedTuple):
 
 
 def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPoses:
-    """Poses at the centres of these chirps; past the end of the recording the body rests in its last pose."""
+    """Poses at the centres of some chirps; past the end of the recording the body rests in its last pose.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    chirps : (chirp,) int64
+        Counted from the start of the capture.
+
+    Returns
+    -------
+    ChirpPoses
+        World [m].
+    """
     times = np.minimum(radar.centres_of(chirps), body.duration_s)
     poses = body.at(times)
     tx_index = radar.tx_of_chirp(chirps)
@@ -80,7 +93,24 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
 def one_echo_a_part(
     tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.float64], frequency_hz: float
 ) -> Echoes:
-    """`Echoes` of single reflections, one a part, that do not change over the sweep."""
+    """Echoes of single reflections, one a part, that do not change over the sweep.
+
+    Parameters
+    ----------
+    tx : (chirp,) int64
+        Which Tx each chirp is from.
+    length : (chirp, rx, part) float64
+        Of the path from Tx to Rx [m].
+    amplitude : (chirp, rx, part) float64 or complex128
+        As of `Echoes` [m].
+    frequency_hz : float
+        That the amplitudes are for.
+
+    Returns
+    -------
+    Echoes
+        Of one node and one bounce.
+    """
     parts = length.shape[2]
     return Echoes(
         length=length,

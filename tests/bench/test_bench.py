@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 import rtradar.bench
+from rtradar.antenna import Antenna
 from rtradar.bench import paper, runs
 from rtradar.bench.floors import Rates
 from rtradar.bench.growth import arrays, as_toml, with_echoes
@@ -192,7 +193,8 @@ def test_a_process_that_fails_says_its_last_line(monkeypatch: pytest.MonkeyPatch
 def test_arrays_of_fewer_and_more_channels_go_through_toml(tmp_path: Path) -> None:
     radars = arrays(Radar.preset("paper-77ghz"))
     assert [radar.n_channels for radar in radars] == [24, 48, 96, 192]
-    for radar in radars:
+    shaped = Radar(tx_antenna=Antenna(pattern="cosine", exponent=4), transmit_power_dbm=12, noise_figure_db=11)
+    for radar in [*radars, shaped]:
         (tmp_path / "radar.toml").write_text(as_toml(radar))
         assert Radar.load(tmp_path / "radar.toml") == radar
     single = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)

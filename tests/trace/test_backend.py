@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -166,12 +167,12 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "cache"
 
 
-def _counted(monkeypatch: pytest.MonkeyPatch, finding: str) -> list[str]:
+def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> list[str]:
     probes: list[str] = []
 
-    def probe(variant: str, library: Library | None) -> Verdict:
+    def probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
         probes.append(variant)
-        return Verdict(finding)
+        return Verdict(finding), ended
 
     monkeypatch.setattr(verdict, "_probe", probe)
     return probes
@@ -190,6 +191,16 @@ def test_a_verdict_is_kept_until_the_library_changes(empty_cache: Path, tmp_path
     verdict.judge("llvm_ad_rgb", library)
     assert len(probes) == 3
     assert [path.name for path in empty_cache.iterdir()] == ["verdicts.json"]
+
+
+@pytest.mark.parametrize(("ended", "probed"), [(-signal.SIGABRT, 1), (-signal.SIGKILL, 2), (-signal.SIGTERM, 2)])
+def test_a_probe_that_was_told_to_end_says_nothing_of_the_library(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, ended: int, probed: int
+) -> None:
+    probes = _counted(monkeypatch, "aborts the process", ended)
+    for _ in range(2):
+        verdict.judge("scalar_rgb", None)
+    assert len(probes) == probed
 
 
 def test_verdicts_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
