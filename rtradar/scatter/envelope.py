@@ -166,7 +166,7 @@ def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, 
             left = place
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def stretch(known, place):  # type: ignore[no-untyped-def]
     """The known places (place,) on either side of one in 0 to `PIECES`."""
     left = min(int(place), PIECES - 1)
@@ -178,7 +178,7 @@ def stretch(known, place):  # type: ignore[no-untyped-def]
     return left, right
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def hermite(place, left, right):  # type: ignore[no-untyped-def]
     """Weights of the values at two places and of the slopes there in the cubic between them."""
     step = right - left

@@ -33,7 +33,7 @@ _LEAST = 1e-4
 """Least spread of the phases over a facet in the formula for large ones: what is less is taken for it, 1e-9 of a facet."""
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _phasor(angle):  # type: ignore[no-untyped-def]
     """Cosine and sine by Taylor's series of half the angle, within 1e-11: branch-free, and so in vector lanes."""
     turns = angle * (0.5 / math.pi)
@@ -47,7 +47,7 @@ def _phasor(angle):  # type: ignore[no-untyped-def]
     return 1 - 2 * sine * sine, 2 * sine * cosine
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _sine(angle):  # type: ignore[no-untyped-def]
     """Sine of an angle from 0 on, within 1e-12 of itself where it is small."""
     halves = np.floor(angle * (1 / math.pi) + 0.5)
@@ -58,7 +58,7 @@ def _sine(angle):  # type: ignore[no-untyped-def]
     return sine * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), of facets with small deviations."""
     real, imaginary = 0.0, 0.0
@@ -77,7 +77,7 @@ def _sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     return complex(real, imaginary)
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     """The same for any deviations, by differences.
 
@@ -101,7 +101,7 @@ def _sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     return complex(real, imaginary)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):  # type: ignore[no-untyped-def]
     """Facets that any of the antennas may light, by the ball round them all; their count."""
     count_antennas = len(antennas)
@@ -122,7 +122,7 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
     return count
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
     """Path from the antenna to each vertex less that to the origin, which is returned."""
     a, b, c = antenna[0], antenna[1], antenna[2]
@@ -135,7 +135,7 @@ def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
     return distance
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):  # type: ignore[no-untyped-def]
     """Rows of ``view`` for the chosen facets: mean path, two deviations from it, n.s, and the share that is seen."""
     for i in range(len(chosen)):
@@ -150,7 +150,7 @@ def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):
         view[4, i] = seen[f]
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST)
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST)
 def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u, v, strength):  # type: ignore[no-untyped-def]
     """Mean path, two deviations from it and strength of facets under two views."""
     tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
@@ -170,7 +170,7 @@ def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u,
         strength[i] = size
 
 
-@njit(cache=True, error_model="numpy", fastmath=_FAST | {"nnan"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath=_FAST | {"nnan"})
 def _largest(u, v):  # type: ignore[no-untyped-def]
     """The largest p, for k = 1. Apart, for only without regard to NaN does a maximum run in vector lanes."""
     largest = 0.0

@@ -20,7 +20,7 @@ from rtradar.trace.clearance import clearance
 from rtradar.trace.facet_visibility import FacetTracer
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, around, out):  # type: ignore[no-untyped-def]
     """Shares of the facets of one part for one antenna; whether any of it is hidden."""
     corner, value, hiders = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)

@@ -35,32 +35,32 @@ _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 # Three by three, one by one: products of small arrays call a library, and take seconds to compile.
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _dot(a, b):  # type: ignore[no-untyped-def]
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _apply(matrix, vector, out):  # type: ignore[no-untyped-def]
     x, y, z = vector[0], vector[1], vector[2]
     for i in range(3):
         out[i] = matrix[i, 0] * x + matrix[i, 1] * y + matrix[i, 2] * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
     x, y, z = vector[0], vector[1], vector[2]
     for i in range(3):
         out[i] = matrix[0, i] * x + matrix[1, i] * y + matrix[2, i] * z
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _less(a, b, out):  # type: ignore[no-untyped-def]
     for i in range(3):
         out[i] = a[i] - b[i]
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _normalize(vector):  # type: ignore[no-untyped-def]
     """Make a unit vector of it; its length is returned."""
     length = math.sqrt(_dot(vector, vector))
@@ -69,14 +69,14 @@ def _normalize(vector):  # type: ignore[no-untyped-def]
     return length
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _cap(antenna, centre, back, way, out):  # type: ignore[no-untyped-def]
     """The antenna from the centre, in axes in which the ellipsoid is the unit sphere."""
     _less(antenna, centre, way)
     _apply(back, way, out)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, pole, along):  # type: ignore[no-untyped-def]
     """Fill in the map of one zone; False where there is no mirror point.
 
@@ -126,7 +126,7 @@ def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back,
     return True
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untyped-def]
     """Direction of one meridian on the unit sphere into ``step (3,)``; its radians a unit of rho, and rho at its end."""
     for i in range(3):
@@ -205,7 +205,7 @@ def zone_rays(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untyped-def]
     """Lower ``clear`` to how far outside the unit sphere the ray from ``antenna`` to each o + cos u + sin t passes."""
     a0, a1, a2 = antenna[0], antenna[1], antenna[2]
@@ -220,7 +220,7 @@ def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untype
         clear[j] = min(clear[j], math.sqrt(n0 * n0 + n1 * n1 + n2 * n2) - 1)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _open_share(a, b, c, d):  # type: ignore[no-untyped-def]
     """Share of a cell where a function is positive, from its values a, b and c, d at the ends of two opposite sides.
 
@@ -233,7 +233,7 @@ def _open_share(a, b, c, d):  # type: ignore[no-untyped-def]
     return (positive_share(a, b, c) + positive_share(d, b, c) + positive_share(a, b, d) + positive_share(a, c, d)) / 4
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
     """exp(-2 pi j turns) to 1e-7, in vector lanes, which the library's sine does not take."""
     for j in range(len(turns)):
@@ -245,7 +245,7 @@ def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
         real[j], imaginary[j] = 1 - 2 * sine * sine, -2 * sine * cosine
 
 
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):  # type: ignore[no-untyped-def]
     """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
     free_re, free_im, lost_re, lost_im, open_ = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -267,7 +267,7 @@ def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, s
     sums[4] += open_
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _zone_share(  # type: ignore[no-untyped-def]
     tx, rx, point, part, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out
 ):
@@ -351,7 +351,7 @@ def _zone_share(  # type: ignore[no-untyped-def]
                 out[f, pair] = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _outlines(part, centres, frames, semi_axes, antennas, hiders, cap_t, cap_r, stretch, pole, along):  # type: ignore[no-untyped-def]
     """Least clearance of the rays from each antenna to the corners of the cells: (meridian, antenna, corner)."""
     n_antennas, n_others = len(antennas), 0

@@ -54,7 +54,7 @@ class Nearby(NamedTuple):
         return np.asarray(ends[0] + self.share[:, None, None] * (ends[1] - ends[0]), dtype=np.float64)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
     """Range from ``point``, and its direction along two tangents: ``out`` = range, e, f."""
     x, y, z = antenna[0] - point[0], antenna[1] - point[1], antenna[2] - point[2]
@@ -64,14 +64,14 @@ def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
     out[2] = (x * to_f[0] + y * to_f[1] + z * to_f[2]) / distance
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _facing(point, normal, antenna, distance):  # type: ignore[no-untyped-def]
     return (
         (antenna[0] - point[0]) * normal[0] + (antenna[1] - point[1]) * normal[1] + (antenna[2] - point[2]) * normal[2]
     ) / distance
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untyped-def]
     """Tangents and normal in world axes at a point in the part's own; ``bend`` = ee, ff, ef of the shape operator."""
     n0, n1, n2 = local[0] / axes[0] ** 2, local[1] / axes[1] ** 2, local[2] / axes[2] ** 2

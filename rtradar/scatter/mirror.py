@@ -86,7 +86,7 @@ def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, hori
     return ROOT_PI * facing / math.sqrt(determinant) * polarization if there else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
     """Mirror point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
 
@@ -140,7 +140,7 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
     out[2], out[3], out[4] = x, y, z
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
 def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
     """The same for up to `_LANES` receivers ``rx (3, rx)`` side by side, from a ``start`` near all of their mirror points.
 

@@ -7,7 +7,7 @@ import math
 from numba import njit
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-def]
     """Least distance of the way from antenna to point from the ellipsoid's middle, in its own unit, less 1.
 

@@ -57,7 +57,7 @@ def clearances(
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, forceinline=True, error_model="numpy")
 def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
     """Mean (own, 3) of one end of the lines to each part, and how far (own,) squared they stray from it; added to zeros."""
     for ray in range(len(own)):
