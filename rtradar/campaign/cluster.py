@@ -70,6 +70,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
     }
     with (
         _environment_kept(),  # Dask puts what it starts workers with into that of this process
+        _silent_tracker(),
         dask.config.set(settings),
         LocalCluster(
             n_workers=count,
@@ -82,6 +83,13 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         Client(cluster, set_as_default=False) as client,
     ):
         yield client
+
+
+@contextmanager
+def _silent_tracker() -> Iterator[None]:
+    """Have semaphores that a killed build leaves taken away without a word: Python's process for that starts with this."""
+    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker")))
+    yield
 
 
 @contextmanager

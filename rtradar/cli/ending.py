@@ -16,6 +16,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from multiprocessing import resource_tracker
 from pathlib import Path
 
 from rtradar.files import discard_unfinished
@@ -65,12 +66,23 @@ def _wait(reader: int, told: Callable[[], str]) -> None:
 
 def _end_children(patience_s: float = 0.5) -> None:
     """Kill the processes that this one started, and theirs, and wait a little until they are gone."""
-    children = _descendants() or {child.pid for child in multiprocessing.active_children() if child.pid}
-    for child in children:
-        with contextlib.suppress(OSError):
-            os.kill(child, _KILL)
+    # One of them keeps account of semaphores, and takes them away when all others are gone. The main thread, which clears up
+    # after workers that are no more, must not tell it of that, too.
+    tracker = resource_tracker._resource_tracker
+    tracker._send = lambda *_: None  # type: ignore[attr-defined]
+    spared = {getattr(tracker, "_pid", None)}
     until = time.monotonic() + patience_s
-    while children & _descendants() and time.monotonic() < until:
+    killed: set[int] = set()
+    # Again, for the main thread may be starting some.
+    while (
+        children := (_descendants() or {child.pid for child in multiprocessing.active_children() if child.pid}) - spared
+    ) - killed:
+        for child in children:
+            with contextlib.suppress(OSError):
+                os.kill(child, _KILL)
+        killed |= children
+        time.sleep(0.01)
+    while killed & _descendants() and time.monotonic() < until:
         time.sleep(0.01)
 
 
