@@ -3,7 +3,8 @@
 Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
 build`` and ``train``, each into a folder where an older result of the same command lies. Claimed is: every file is as it was
 before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes within 2 s, with
-status 1, one line and no traceback, and no process is left. What SIGKILL leaves beside is gone after the next run.
+status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the next one that looks
+into the folder finds old files or new ones, not both, and takes away what is neither.
 
     python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
@@ -156,20 +157,22 @@ def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, bef
     seconds = time.monotonic() - began
     _, orphans = psutil.wait_procs(children, timeout=10)
     after = contents(out) if out.exists() else {}
-    hidden = [path for path in after if any(part.startswith(".") for part in Path(path).parts)]
-    lost = [path for path in old if path not in after]
-    changed = [path for path in after if path in old and after[path] != old[path]]
-    new = [path for path in after if path not in old and path not in hidden]
+    left = tally(old, after)
+    whole = case.name in ("dataset build", "train")  # their files are single ones, each whole
+    if name == "SIGKILL" and not whole:
+        look = [sys.executable, "-m", "rtradar", "export", str(out), "--out", str(work / "samples.mat")]
+        subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S)  # a folder without samples is refused
+        after = contents(out) if out.exists() else {}
+        left += f", then {tally(old, after)}"
+    hidden, lost, changed, new = compared(old, after)
     lines = [line for line in said.replace("\r", "\n").splitlines() if line.startswith("rtradar: ")]
-    left = f"{len(old) - len(lost) - len(changed)} old, {len(changed) + len(new)} new, {len(hidden)} unfinished"
     row = f"{case.name:26} {stage:18} {name:8} {seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
     found = [
         judged(claim, "old files lost", "1", len(lost), 0, says=SAYS + "old files lost"),
         judged(claim, "processes left", "1", len(orphans), 0, says=SAYS + "processes left"),
     ]
-    whole = case.name in ("dataset build", "train")  # their files are single ones, each whole
     if not whole:
-        mixed = len(changed) + len(new) if len(lost) + len(changed) < len(old) else 0
+        mixed = len(changed) + len(new) if len(changed) < len(old) else 0
         found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed"))
     if name != "SIGKILL":
         found += [
@@ -177,17 +180,25 @@ def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, bef
             judged(claim, "exit status", "1", process.returncode, 0, reference=1, says=SAYS + "exit status (error against 1)"),
             judged(claim, "lines said, but one", "1", len(lines), 0, reference=1, says=SAYS + "lines other than one"),
             judged(claim, "tracebacks", "1", said.count("Traceback"), 0, says=SAYS + "tracebacks"),
-            judged(claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"),
         ]
-    elif case.name == "run" and hidden:
-        start(case, out, work).communicate(timeout=PATIENCE_S)
-        still = [path for path in contents(out) if path in hidden]
-        found.append(
-            judged(
-                claim, "still there after the next run", "1", len(still), 0, says="SIGKILL: unfinished files after the next run"
-            )
-        )
+    if not (name == "SIGKILL" and whole):
+        found.append(judged(claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"))
     return row, found
+
+
+def compared(old: dict[str, int], after: dict[str, int]) -> tuple[list[str], list[str], list[str], list[str]]:
+    """Files that are unfinished, and of the others those that are gone, written anew, and new."""
+    hidden = [path for path in after if any(part.startswith(".") for part in Path(path).parts)]
+    lost = [path for path in old if path not in after]
+    changed = [path for path in after if path in old and after[path] != old[path]]
+    new = [path for path in after if path not in old and path not in hidden]
+    return hidden, lost, changed, new
+
+
+def tally(old: dict[str, int], after: dict[str, int]) -> str:
+    """Files by their kind, in words."""
+    hidden, lost, changed, new = compared(old, after)
+    return f"{len(old) - len(lost) - len(changed)} old, {len(changed) + len(new)} new, {len(hidden)} unfinished"
 
 
 def measure(quick: bool) -> list[Row]:

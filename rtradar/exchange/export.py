@@ -15,6 +15,7 @@ from rtradar.exchange.int16 import read_int16, write_int16
 from rtradar.exchange.mat import read_mat, write_mat
 from rtradar.exchange.netcdf import read_netcdf, write_netcdf
 from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
+from rtradar.output_folder import settle
 
 _T = TypeVar("_T")
 
@@ -82,6 +83,7 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     elif suffix in IF_FORMATS:
         raise InputError(f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made")
     else:
+        settle(origin.parent)
         cloud = read_cloud(origin)
         said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[suffix][0](target, cloud)
     return {"file": str(target)} | said

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
+from rtradar.output_folder import settle
 from rtradar.radar import Radar
 
 IF_AXES = ("chirp", "tx", "rx", "sample")
@@ -86,6 +87,7 @@ def open_recording(folder: Path) -> IfRecording:
     """
     import zarr  # slow to import
 
+    settle(folder)
     if not (folder / "if.zarr").is_dir():
         raise InputError(f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if")
     try:

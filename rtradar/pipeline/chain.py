@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion
+from rtradar.output_folder import all_or_nothing
 from rtradar.pipeline.capture import Capture, prepare
 from rtradar.pipeline.cloud_maker import CloudMaker, Clouds
-from rtradar.pipeline.folder import all_or_nothing
 from rtradar.pipeline.moments import moments
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.products import Products

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
+from rtradar.output_folder import all_or_nothing
 from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
 from rtradar.pipeline.chain import Result, run
-from rtradar.pipeline.folder import all_or_nothing
 from rtradar.pipeline.pictures import busiest_window, thinned
 from rtradar.radar import Radar
 from rtradar.report.comparison_page import write_comparison

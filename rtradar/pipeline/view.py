@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
+from rtradar.output_folder import settle
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
 from rtradar.report.linked import COLOURS, MOST_LEVEL, Levels, Linked, write_view
@@ -68,6 +69,7 @@ def view(
     """
     if colour not in COLOURS:
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
+    settle(Path(folder))
     linked = load_linked(Path(folder))
     times = linked.moments.times
     if time_s is not None and not times[0] - linked.radar.frame_duration_s <= time_s <= times[-1] + linked.radar.frame_duration_s:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.pipeline.folder import all_or_nothing
+from rtradar.output_folder import all_or_nothing, settle
 
 
 def fill(folder: Path, text: str) -> None:
@@ -61,6 +63,61 @@ def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot write to .*file.*--out"), all_or_nothing(tmp_path / "file" / "out"):
         pass
     assert contents(tmp_path) == {"file"}
+
+
+KILLED = """
+import os, pathlib, sys
+out, last = pathlib.Path(sys.argv[1]), int(sys.argv[2])
+from rtradar.output_folder import all_or_nothing
+calls = 0
+def killed_at(real):
+    def move(*places, **named):
+        global calls
+        if calls == last:
+            os._exit(9)
+        calls += 1
+        return real(*places, **named)
+    return move
+os.rename, os.replace, os.rmdir = killed_at(os.rename), killed_at(os.replace), killed_at(os.rmdir)
+with all_or_nothing(out) as folder:
+    for name in ("clouds", "maps"):
+        (folder / name).write_text("second")
+    for name in ("new", "store"):
+        (folder / name).mkdir()
+        (folder / name / "second").write_text("second")
+print("whole")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
+def test_a_process_killed_at_any_move_leaves_all_of_the_old_or_all_of_the_new_to_whoever_comes_next(tmp_path: Path) -> None:
+    ends = []
+    for last in range(20):
+        out = tmp_path / str(last)
+        with all_or_nothing(out) as folder:
+            fill(folder, "first")
+        done = subprocess.run([sys.executable, "-c", KILLED, str(out), str(last)], stdout=subprocess.PIPE, text=True, check=False)
+        settle(out)
+        ends.append((out / "maps").read_text())
+        if ends[-1] == "first":
+            assert contents(out) == {"maps", "store", "store/first"}
+        else:
+            assert contents(out) == {"clouds", "maps", "new", "new/second", "store", "store/second"}
+            assert (out / "clouds").read_text() == "second"
+        if done.stdout:
+            break
+    assert done.returncode == 0
+    # The folder takes its new name; four things move, one over an old folder; it takes its name back; its folders are removed.
+    assert ends[0] == "first"
+    assert ends.count("second") > 6
+
+
+def test_a_folder_in_use_is_let_be(tmp_path: Path) -> None:
+    with all_or_nothing(tmp_path) as folder:
+        (folder / "maps").write_text("new")
+        settle(tmp_path)
+        assert (folder / "maps").exists()
+    assert contents(tmp_path) == {"maps"}
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")

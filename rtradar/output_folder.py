@@ -1,0 +1,168 @@
+"""An output folder that gets all the files of a run, or none.
+
+They are written in a folder of their own inside it, and moved when all are there. Not even a process that is killed can part
+what belongs together for long: from the first move on the name of that folder says that it is whole, and whoever comes next to
+the output folder, to write or to read, goes on with the moves. What is not whole is removed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from rtradar.errors import InputError
+from rtradar.files import not_to_be_parted, unfinished
+
+_PREFIX = ".rtradar-"
+_WHOLE = f"{_PREFIX}whole-"
+_ASIDE = ".old-"
+
+
+@contextmanager
+def all_or_nothing(out: Path) -> Iterator[Path]:
+    """A folder to write into; at the end what is in it moves to ``out``, replacing what has the same name.
+
+    What a run that was killed left there is settled first.
+
+    Parameters
+    ----------
+    out : path
+        Made if it is not there; other files in it are left alone.
+
+    Yields
+    ------
+    path
+        A folder inside ``out``. After an error it is removed with all in it, and ``out`` too where it was made here.
+
+    Raises
+    ------
+    InputError
+        Where ``out`` cannot be made or written.
+    """
+    made = [folder for folder in (out, *out.parents) if not folder.exists()]
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        settle(out)
+        work, lock = _own_folder(out)
+    except OSError as error:
+        raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+
+    def give_up() -> None:
+        gone = work.with_name(f"{work.name}-gone")
+        with suppress(OSError):
+            work.rename(gone)  # nobody who still writes finds the way into it
+        shutil.rmtree(gone, ignore_errors=True)
+        for folder in made:
+            if folder.is_dir() and not any(folder.iterdir()):
+                folder.rmdir()
+
+    with unfinished(give_up):
+        try:
+            yield work
+            with not_to_be_parted():
+                whole = work.with_name(work.name.replace(_PREFIX, _WHOLE, 1))
+                try:
+                    work.rename(whole)
+                    _move(whole, out)
+                    whole.rename(work)  # what is left in it is of no use
+                except OSError as error:
+                    raise InputError(
+                        f"cannot put the files of '{whole}' into '{out}': {error.strerror}; mend that: the next rtradar command "
+                        "that uses the folder goes on with it"
+                    ) from None
+            shutil.rmtree(work)
+        except BaseException:
+            give_up()
+            raise
+        finally:
+            _let_go(lock)
+
+
+def _own_folder(out: Path) -> tuple[Path, int | None]:
+    """A new folder in ``out``, and the lock that says that its run still lives."""
+    while True:
+        work = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=out))
+        lock = _lock(work)
+        if work.exists():  # another run may have swept it before it was locked
+            return work, lock
+        _let_go(lock)
+
+
+def settle(out: Path) -> None:
+    """End what runs into ``out`` that were killed had begun: the system took their locks back.
+
+    Files of one that was moving them take their places; folders of others are removed. To be called before such a folder is
+    read. Nothing is done where ``out`` is not there, or while a run still writes into it.
+
+    Parameters
+    ----------
+    out : path
+
+    Raises
+    ------
+    InputError
+        Where the files cannot be moved.
+    """
+    for folder in out.glob(f"{_PREFIX}*") if sys.platform != "win32" else ():
+        whole = folder.name.startswith(_WHOLE)
+        try:
+            lock = _lock(folder)
+        except (BlockingIOError, FileNotFoundError):  # its run still lives, or another command was first
+            continue
+        except OSError as error:
+            if whole:
+                raise _parted(folder, error) from None
+            continue
+        try:
+            if whole and folder.exists():
+                _move(folder, out)
+        except OSError as error:
+            raise _parted(folder, error) from None
+        else:
+            shutil.rmtree(folder, ignore_errors=True)
+        finally:
+            _let_go(lock)
+
+
+def _parted(folder: Path, error: OSError) -> InputError:
+    return InputError(
+        f"'{folder.parent}' holds files of two runs, for the second was killed as it put them there; the rest in '{folder.name}' "
+        f"cannot be moved: {error.strerror}; run this once as somebody who may write there"
+    )
+
+
+def _move(work: Path, out: Path) -> None:
+    """Everything in ``work`` to its place; may be begun again at any point."""
+    for item in sorted(work.iterdir()):
+        if item.name.startswith(_ASIDE):
+            continue
+        place = out / item.name
+        if place.is_dir() and not place.is_symlink():
+            # A folder cannot be replaced in one step: the old one steps aside first.
+            os.replace(place, work / f"{_ASIDE}{item.name}")
+        os.replace(item, place)
+
+
+def _lock(folder: Path) -> int | None:
+    """Lock a folder until `_let_go`, or the end of the process; BlockingIOError where another has it. Not on Windows."""
+    if sys.platform == "win32":
+        return None
+    import fcntl
+
+    place = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(place)
+        raise
+    return place
+
+
+def _let_go(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)
