@@ -46,7 +46,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     except SystemExit as stop:
         return int(stop.code or 0)
     try:
-        status: int = options.command(options)
+        status = _done(options)
     except InputError as error:
         return fail(2, error)
     except (BackendError, CampaignError, ExtensionError) as error:
@@ -57,6 +57,17 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
         return fail(1, f"out of memory ({str(error) or 'no more to be had'}); {_WHOLE}")
     except BrokenPipeError:
         return 1
+    return status
+
+
+def _done(options: argparse.Namespace) -> int:
+    from rtradar.cli.ending import stay_if_ending
+
+    try:
+        status: int = options.command(options)
+    except BaseException:
+        stay_if_ending()  # it may have gone wrong for want of what is being taken away
+        raise
     return status
 
 

@@ -9,7 +9,7 @@ loops and linear algebra release.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
+import multiprocessing.util
 import os
 import signal
 import sys
@@ -70,10 +70,12 @@ def _end_children(patience_s: float = 0.5) -> None:
     # after workers that are no more, must not tell it of that, too.
     tracker = resource_tracker._resource_tracker
     tracker._send = lambda *_: None  # type: ignore[attr-defined]
+    # No more of Python's own: one that starts as this process goes would say that it is told nothing.
+    multiprocessing.util.spawnv_passfds = lambda *_: threading.Event().wait()
     spared = {getattr(tracker, "_pid", None)}
     until = time.monotonic() + patience_s
     killed: set[int] = set()
-    # Again, for the main thread may be starting some.
+    # Again, for others may be starting some by other ways.
     while (
         children := (_descendants() or {child.pid for child in multiprocessing.active_children() if child.pid}) - spared
     ) - killed:
