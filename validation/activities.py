@@ -46,6 +46,8 @@ TRAININGS = {
     "paper-1000": "paper-400 --recipe paper",
     # One fold of each other size: ten take a day.
     **{f"paper-{size}": f"paper-400 --recipe paper --points {size} --fold 1" for size in SIZES if size != 1000},
+    "paper-1000-unit-sphere": "paper-400 --recipe paper --scaling unit-sphere --fold 1",
+    "paper-1000-turned": "paper-400 --recipe paper --augmentation turned --fold 1",
     "paper-1000-all-epochs": "paper-400 --recipe paper --all-epochs --fold 1",
     "paper-1000-first-trial": "paper-400 --recipe paper --rate 1e-6 --all-epochs --fold 1",
     "subject": "paper-400 --split subject",
@@ -59,6 +61,7 @@ TRAININGS = {
 SHOWN = {
     "table-4": (*(f"lean-{size}" for size in SIZES), *(f"paper-{size}" for size in SIZES)),
     "dead-rate": ("paper-1000", "paper-1000-all-epochs", "paper-1000-first-trial"),
+    "readings": ("paper-1000", "paper-1000-unit-sphere", "paper-1000-turned"),
     **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer")},
 }
 """Evaluations, each with simple classifiers on the first of its trainings."""

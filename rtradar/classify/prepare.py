@@ -1,9 +1,10 @@
 """Clouds on their way into the network: one array of them, points drawn, varied and scaled.
 
-Time, range and velocity have units of their own. ``unit-sphere`` (the paper's normalisation and that of PointNet) centres a
-cloud and divides all three by one number, so what is a second long and what is 8 m/s wide are compared as numbers, and the size
-of a cloud is lost. ``physical`` divides each axis by a fixed scale, `PHYSICAL_SCALES`: time and range from the middle of the
-cloud, for when and where somebody moves says nothing of what they do, velocity from zero.
+Time, range and velocity have units of their own. ``unit-sphere``, PointNet's normalisation of shapes, centres a cloud and divides
+all three by one number: what is a second long and what is 8 m/s wide are compared as numbers, and the size of a cloud is lost.
+``physical`` divides each axis by a fixed scale, `PHYSICAL_SCALES`: time and range from the middle of the cloud, for when and
+where somebody moves says nothing of what they do, velocity from zero. The paper normalises; how, and in what units, it leaves
+open.
 
 Varied clouds are such as another recording would give: ``physical`` shifts and stretches them as `Variation` says. ``turned`` is
 what the paper's own program does, a turn by any angle in the plane of time and velocity, and jitter; no motion gives such clouds.

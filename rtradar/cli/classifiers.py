@@ -46,6 +46,10 @@ def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument(
         "--augmentation", help="none, physical, or turned, which is the paper's (default: lean physical, paper none)"
     )
+    train.add_argument(
+        "--scaling",
+        help="of the axes of a cloud: physical, each by its own number, or unit-sphere, all by one (default: physical)",
+    )
     train.add_argument("--precision", help="of the search for maxima: bfloat16 or float32 (default: what is faster here)")
     train.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="where to compute (default: auto)")
     train.add_argument("--seed", type=whole, default=0, metavar="N", help="of splits and trainings (default: 0)")
@@ -82,6 +86,7 @@ def _train(options: argparse.Namespace) -> int:
         rate=options.rate,
         stop_below=0.0 if options.all_epochs else None,
         augmentation=options.augmentation,
+        scaling=options.scaling,
         precision=options.precision or pick_precision(device),
     )
     study = train_study(
@@ -103,7 +108,7 @@ def _train(options: argparse.Namespace) -> int:
 def _evaluate(options: argparse.Namespace) -> int:
     check_json_folder(options.json)
     from rtradar.classify.study import load_study
-    from rtradar.pipeline.folder import all_or_nothing
+    from rtradar.output_folder import all_or_nothing
     from rtradar.report.evaluation import write_evaluation
 
     studies = [load_study(folder) for folder in options.trained]
