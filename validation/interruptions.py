@@ -1,16 +1,17 @@
 """Commands that are told to end, or killed, at several moments: what is left on the disk, how soon, and what is said.
 
 Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
-build`` and ``train``, each into a folder where an older result of the same command lies. Claimed is: every file is as it was
-before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes within 2 s, with
-status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the next one that looks
-into the folder finds old files or new ones, not both, and takes away what is neither.
+build``, ``train``, ``export`` and ``view``, some into a folder where an older result of the same command lies. Claimed is: every
+file is as it was before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes
+within 2 s, with status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the next
+one that looks into the folder of a run finds old files or new ones, not both, and takes away what is neither.
 
     python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
 import signal
@@ -43,63 +44,101 @@ RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nchirp_duration_s = 250e-6\nsamp
 
 
 @dataclass(frozen=True)
+class Stage:
+    """How far a command has come as it is disturbed.
+
+    ``sign`` tells from outside: ``hears`` the signals, ``loads`` a library of that name, ``compiles`` or ``writes`` a file of
+    that name, in the folder of what is compiled or in its own; ``delay_s`` after it comes the signal.
+    """
+
+    name: str
+    sign: str
+    delay_s: float = 0.0
+
+
+@dataclass(frozen=True)
 class Case:
-    """A command, the file or words by which its stages are told, and the seconds after each at which it is disturbed."""
+    """A command, in which {out} is where its files go, and the stages at which it is disturbed."""
 
     name: str
     words: tuple[str, ...]
-    stages: tuple[tuple[str, str, float], ...]  # name; what appears under the folder, or "" for the start; seconds after that
+    stages: tuple[Stage, ...]
     cold: bool = False  # without what was compiled before
+    single: bool = False  # its files are each whole, and belong together no further
+    anew: bool = True  # into an empty folder, not over older files
 
 
 def cases(work: Path, quick: bool) -> list[Case]:
-    walk = ("run", "synthetic:walk", "--duration", "0.5", "--save-if")
+    walk = ("run", "synthetic:walk", "--duration", "0.5", "--save-if", "--out", "{out}")
     run = Case(
         "run",
         walk,
         (
-            ("imports", "", 0.1),
-            ("warm-up", "", 2.0),
-            ("scatter", ".rtradar-*/maps.h5", 0.3),
-            ("pictures", ".rtradar-*/*.png", 0.1),
-            ("report", ".rtradar-*/report.html", 0.0),
+            Stage("imports", "hears", 0.1),
+            Stage("warm-up", "loads llvmlite", 0.1),
+            Stage("scatter", "writes .rtradar-*/maps.h5", 0.3),
+            Stage("pictures", "writes .rtradar-*/*.png", 0.1),
+            Stage("report", "writes .rtradar-*/report.html"),
         ),
+        anew=False,
     )
     compiles = Case(
-        "run, nothing compiled yet", (*walk, "--fidelity", "fresnel"), (("compiling", "", 4.0), ("compiling on", "", 8.0)), True
+        "run, nothing compiled yet",
+        (*walk, "--fidelity", "fresnel"),
+        (Stage("compiling", "compiles numba/**/*.nbc"), Stage("compiling on", "compiles numba/**/*.nbc", 5.0)),
+        cold=True,
     )
     traces = Case(
         "run in a room",
-        ("run", "synthetic:walk", "--duration", "0.5", "--scene", "living-room"),
-        (("tracing", "", 5.0), ("tracing on", "", 9.0)),
+        (*walk, "--scene", "living-room"),
+        (Stage("loading", "loads mitsuba"), Stage("tracing", "compiles drjit/*"), Stage("tracing on", "compiles drjit/*", 2.0)),
+        cold=True,
     )
     compare = Case(
         "compare",
-        ("compare", "synthetic:kick", "--duration", "0.5", "--fidelities", "analytic,specular"),
+        ("compare", "synthetic:kick", "--duration", "0.5", "--fidelities", "analytic,specular", "--out", "{out}"),
         (
-            ("first rung", ".rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
-            ("second rung", ".rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
+            Stage("first rung", "writes .rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
+            Stage("second rung", "writes .rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
         ),
+        anew=False,
     )
     build = Case(
         "dataset build",
-        ("dataset", "build", str(work / "set.toml"), "--workers", "2"),
-        (("cluster starts", "collection.json", 0.8), ("samples", "[!.]*.npz", 0.1)),
+        ("dataset", "build", str(work / "set.toml"), "--workers", "2", "--out", "{out}"),
+        (Stage("cluster starts", "writes collection.json", 0.8), Stage("samples", "writes [!.]*.npz", 0.1)),
+        single=True,
     )
     train = Case(
         "train",
-        ("train", str(work / "clouds"), "--points", "64", "--folds", "2", "--epochs", "4000"),
-        (("first epochs", "plan.json", 2.0), ("past a checkpoint", "training-01/checkpoint.pt", 0.5)),
+        ("train", str(work / "clouds"), "--points", "64", "--folds", "2", "--epochs", "4000", "--out", "{out}"),
+        (Stage("first epochs", "writes plan.json", 2.0), Stage("past a checkpoint", "writes training-01/checkpoint.pt", 0.5)),
+        single=True,
     )
-    return [run, build] if quick else [run, compiles, traces, compare, build, train]
+    export = Case(
+        "export",
+        ("export", str(work / "before-run"), "--out", "{out}/samples.nc"),
+        (Stage("samples", "writes .samples.nc.*"),),
+        single=True,
+        anew=False,
+    )
+    view = Case(
+        "view",
+        ("view", str(work / "before-run"), "--out", "{out}/view.html", "--still", "{out}/still.png"),
+        (Stage("loading", "hears", 0.5), Stage("page", "writes .view.html.*"), Stage("still", "writes view.html")),
+        single=True,
+        anew=False,
+    )
+    return [run, build] if quick else [run, compiles, traces, compare, build, train, export, view]
 
 
 def start(case: Case, out: Path, work: Path) -> subprocess.Popen[str]:
     environment = dict(os.environ)
     if case.cold:
-        cold = Path(tempfile.mkdtemp(dir=work))
-        environment |= {"NUMBA_CACHE_DIR": str(cold / "numba"), "DRJIT_CACHE_DIR": str(cold / "drjit")}
-    command = [sys.executable, "-m", "rtradar", *case.words, "--out", str(out)]
+        shutil.rmtree(work / "cold", ignore_errors=True)
+        environment |= {f"{name.upper()}_CACHE_DIR": str(work / "cold" / name) for name in ("numba", "drjit")}
+    out.mkdir(exist_ok=True)
+    command = [sys.executable, "-m", "rtradar", *(word.format(out=out) for word in case.words)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
     return subprocess.Popen(command, env=environment, start_new_session=True, **pipes)
 
@@ -109,26 +148,25 @@ def contents(folder: Path) -> dict[str, int]:
     return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in sorted(folder.rglob("*")) if path.is_file()}
 
 
-def wait_for(pattern: str, out: Path, since: float, process: subprocess.Popen[str]) -> bool:
-    """Until a file of that name that is newer than ``since`` is there; whether the process still runs."""
+def wait_for(sign: str, out: Path, work: Path, since: float, process: subprocess.Popen[str]) -> bool:
+    """Until the sign is seen; whether the process still runs."""
+    kind, _, name = sign.partition(" ")
+    running = psutil.Process(process.pid)
     while process.poll() is None:
-        # A second thread waits for signals as soon as rtradar, not Python, has the word.
-        if psutil.Process(process.pid).num_threads() > 1 and not pattern:
-            return True
-        if pattern and any(path.stat().st_mtime >= since for path in _found(out, pattern)):
-            return True
+        with contextlib.suppress(psutil.Error, OSError):  # it ended, or a file vanished, meanwhile
+            # A second thread waits for signals as soon as rtradar, not Python, has the word.
+            if kind == "hears" and running.num_threads() > 1:
+                return True
+            if kind == "loads" and any(name in part.path for part in running.memory_maps()):
+                return True
+            folder = {"compiles": work / "cold", "writes": out}.get(kind)
+            if folder is not None and any(path.stat().st_mtime >= since for path in folder.glob(name)):
+                return True
         time.sleep(0.005)
     return False
 
 
-def _found(out: Path, pattern: str) -> list[Path]:
-    try:
-        return [path for path in out.glob(pattern) if path.exists()]
-    except OSError:  # it vanished meanwhile
-        return []
-
-
-def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, before: Path, work: Path) -> tuple[str, list[Row]]:
+def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tuple[str, list[Row]]:
     """One command, disturbed once: its line of the table, and what is claimed of it."""
     out = work / "out"
     shutil.rmtree(out, ignore_errors=True)
@@ -137,12 +175,12 @@ def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, bef
     old = contents(out) if out.exists() else {}
     since = time.time()
     process = start(case, out, work)
-    alive = wait_for(pattern, out, since, process)
-    time.sleep(delay_s)
-    claim = f"{case.name}, {stage}: {name}"
+    alive = wait_for(stage.sign, out, work, since, process)
+    time.sleep(stage.delay_s)
+    claim = f"{case.name}, {stage.name}: {name}"
     if not alive or process.poll() is not None:
         process.communicate()
-        return f"{case.name:26} {stage:18} {name:8} it had ended before", []
+        return f"{case.name:26} {stage.name:18} {name:8} it had ended before", []
     children = psutil.Process(process.pid).children(recursive=True)
     began = time.monotonic()
     if name == "SIGINT":
@@ -158,20 +196,20 @@ def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, bef
     _, orphans = psutil.wait_procs(children, timeout=10)
     after = contents(out) if out.exists() else {}
     left = tally(old, after)
-    whole = case.name in ("dataset build", "train")  # their files are single ones, each whole
-    if name == "SIGKILL" and not whole:
+    if name == "SIGKILL" and not case.single:
         look = [sys.executable, "-m", "rtradar", "export", str(out), "--out", str(work / "samples.mat")]
         subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S)  # a folder without samples is refused
         after = contents(out) if out.exists() else {}
         left += f", then {tally(old, after)}"
     hidden, lost, changed, new = compared(old, after)
     lines = [line for line in said.replace("\r", "\n").splitlines() if line.startswith("rtradar: ")]
-    row = f"{case.name:26} {stage:18} {name:8} {seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
+    ended = f"{seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
+    row = f"{case.name:26} {stage.name:18} {name:8} {ended}"
     found = [
         judged(claim, "old files lost", "1", len(lost), 0, says=SAYS + "old files lost"),
         judged(claim, "processes left", "1", len(orphans), 0, says=SAYS + "processes left"),
     ]
-    if not whole:
+    if not case.single:
         mixed = len(changed) + len(new) if len(changed) < len(old) else 0
         found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed"))
     if name != "SIGKILL":
@@ -181,7 +219,7 @@ def disturb(case: Case, stage: str, pattern: str, delay_s: float, name: str, bef
             judged(claim, "lines said, but one", "1", len(lines), 0, reference=1, says=SAYS + "lines other than one"),
             judged(claim, "tracebacks", "1", said.count("Traceback"), 0, says=SAYS + "tracebacks"),
         ]
-    if not (name == "SIGKILL" and whole):
+    if not (name == "SIGKILL" and case.single):
         found.append(judged(claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"))
     return row, found
 
@@ -213,14 +251,14 @@ def measure(quick: bool) -> list[Row]:
         (work / "set.toml").write_text(SPEC.format(half=200))
         for case in cases(work, quick):
             before = work / f"before-{case.name.replace(' ', '-')}"
-            if case.name in ("run", "compare"):
+            if not case.anew:
                 process = start(case, before, work)
                 _, said = process.communicate(timeout=PATIENCE_S)
                 if process.returncode:
                     raise SystemExit(said)
-            for stage, pattern, delay_s in case.stages:
+            for stage in case.stages:
                 for name in ("SIGINT", "SIGTERM", "SIGKILL"):
-                    row, rows = disturb(case, stage, pattern, delay_s, name, before, work)
+                    row, rows = disturb(case, stage, name, before, work)
                     print(row, flush=True)
                     found += rows
     return found

@@ -17,6 +17,7 @@ from tqdm import tqdm
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.files import not_to_be_parted
 from rtradar.motion import Motion, place
 from rtradar.pipeline.indoors import Indoors, indoors
 from rtradar.pipeline.survey import Survey, survey
@@ -114,7 +115,8 @@ class Capture:
                 received = receive(samples, radar, first)
                 noise.add(received, radar, first)
             if kept is not None:
-                with stages.time("write"):
+                # Its folders are made as they are needed, which must not be after they have been removed.
+                with stages.time("write"), not_to_be_parted():
                     begin = first * len(received) // len(samples)
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
