@@ -49,7 +49,7 @@ TRAININGS = {
     "paper-1000-unit-sphere": "paper-400 --recipe paper --scaling unit-sphere --fold 1",
     "paper-1000-turned": "paper-400 --recipe paper --augmentation turned --fold 1",
     "paper-1000-all-epochs": "paper-400 --recipe paper --all-epochs --fold 1",
-    "paper-1000-first-trial": "paper-400 --recipe paper --rate 1e-6 --all-epochs --fold 1",
+    "paper-1000-first-trial": "paper-400 --recipe paper --rate 1e-6 --epochs 40 --all-epochs --fold 1",
     "subject": "paper-400 --split subject",
     "recorded": "paper-400 real --split recorded",
     "real": "real --split recording --folds 2",
