@@ -1,6 +1,7 @@
 """The whole chain: a recording in, maps and clouds out, streamed; and several rungs of the ladder side by side."""
 
-from rtradar.pipeline.chain import Result, clouds_of, run
+from rtradar.pipeline.chain import Result, run
+from rtradar.pipeline.clouds_alone import clouds_of
 from rtradar.pipeline.compare import Comparison, compare
 
 __all__ = ["Comparison", "Result", "clouds_of", "compare", "run"]

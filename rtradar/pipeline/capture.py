@@ -1,14 +1,11 @@
-"""A person set before a radar in a scene, surveyed, and streamed as range spectra to whatever makes something of them."""
+"""A person before a radar in a scene, streamed as range spectra to whatever makes something of them."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
-import time
-import warnings
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,21 +13,14 @@ from tqdm import tqdm
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError, ValidityWarning
 from rtradar.files import not_to_be_parted
-from rtradar.motion import Motion, place
-from rtradar.pipeline.indoors import Indoors, indoors
-from rtradar.pipeline.survey import Survey, survey
+from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar, range_spectrum
+from rtradar.process import range_spectrum
 from rtradar.radar import Radar
-from rtradar.scatter import Rung, build_rung
-from rtradar.scatter.antenna_gain import is_shaped
-from rtradar.scatter.multipath import Multipath
-from rtradar.scene import Scene
+from rtradar.scatter import Rung
 from rtradar.signal import Noise, receive, separate, synthesize
-
-_MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
 
 class Taker(Protocol):
@@ -126,7 +116,7 @@ class Capture:
             with stages.time("scatter"):
                 echoes = self.rung.echoes(chirps)
             for begin in range(0, len(chirps), piece):
-                taker.take(spectra(_chirps_of(echoes, begin, begin + piece), int(chirps[begin])), int(chirps[begin]))
+                taker.take(spectra(chirps_of(echoes, begin, begin + piece), int(chirps[begin])), int(chirps[begin]))
 
         # In functions, for what a loop leaves bound would still be held while the next block is made.
         silent = None if progress else True  # None: where there is no terminal
@@ -134,138 +124,7 @@ class Capture:
             take(np.arange(first, min(first + self.block, self.n_chirps)))
 
 
-def prepare(
-    motion: Motion,
-    radar: Radar,
-    scene: Scene,
-    *,
-    stages: Stages,
-    fidelity: str,
-    start_s: float,
-    duration_s: float | None,
-    heading_deg: float,
-    snr_db: float | Literal["physical"],
-    pfa: float,
-    seed: int,
-    variant: str,
-    spreading: bool,
-    noise_power_m2: float | None,
-    dials: Mapping[str, Any] | None,
-    body_material: str,
-    order: int,
-    keep_all: bool,
-) -> Capture:
-    """Place a person before a radar, build the rung, survey its echoes, and trace the room.
-
-    Parameters are those of `rtradar.run`, and so are the errors.
-    """
-    _check(snr_db, pfa, seed)
-    if isinstance(snr_db, str):
-        if not spreading:
-            raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
-        radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
-    walled = bool(scene.walls or scene.furniture)
-    with stages.time("motion"):
-        radar = scene.place(radar)
-        heading = heading_deg + scene.heading_deg
-        placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading)
-        body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
-    n_cycles = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
-    n_chirps = n_cycles * radar.n_tx
-    windows = radar.window_starts(n_chirps)
-    if len(windows) == 0:
-        raise InputError(
-            f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame of {radar.frame_duration_s} s "
-            f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
-        )
-    warm = time.perf_counter()
-    paths: Multipath | None = None
-    rung: Rung
-    if walled:
-        if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
-            raise InputError(
-                f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths over walls, whose "
-                "directions at the antennas are not followed; take free-space, or antennas with pattern = 'isotropic'"
-            )
-        if dials:
-            raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
-        paths = Multipath(
-            radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
-        )
-        rung = paths.person
-    else:
-        of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
-        rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
-    _warm_up(paths or rung, radar)
-    warmup_s = time.perf_counter() - warm
-    with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
-        warnings.simplefilter("always", ValidityWarning)
-        surveyed = survey(rung, radar, body, n_chirps, spreading=spreading)
-    for warning in caught:
-        warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    if noise_power_m2 is not None:
-        noise = Noise(noise_power_m2, seed)
-    elif isinstance(snr_db, str):
-        noise = Noise(radar.noise_power_w / radar.watts_per_m2, seed)
-    else:
-        noise = Noise.for_snr(surveyed.power, snr_db, seed)
-    inside = None
-    if paths is not None:
-        with stages.time("room"):
-            inside = indoors(
-                paths,
-                radar,
-                body,
-                scene,
-                variant=variant,
-                order=order,
-                seed=seed,
-                n_chirps=n_chirps,
-                person_power_m2=surveyed.power,
-                noise_power_m2=noise.power,
-                keep_all=keep_all,
-            )
-        rung = inside.rung
-    return Capture(
-        radar=radar,
-        body=body,
-        rung=rung,
-        inside=inside,
-        survey=surveyed,
-        warned=tuple(str(warning.message) for warning in caught),
-        noise=noise,
-        n_chirps=n_chirps,
-        windows=windows,
-        title=f"{motion.name}, {radar.name}, {fidelity}" + (f", {scene.name}" if walled else ""),
-        stages=stages,
-        warmup_s=warmup_s,
-    )
-
-
-def _chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
+def chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     """Those of some chirps of the block."""
     chirps = slice(begin, end)
     return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
-
-
-def _check(snr_db: float | Literal["physical"], pfa: float, seed: int) -> None:
-    if isinstance(snr_db, str):
-        if snr_db != "physical":
-            raise InputError(f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)")
-    elif not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
-        raise InputError(f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)")
-    if not 0 < pfa < 1:
-        raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
-    if seed < 0:
-        raise InputError(f"seed = {seed}; it must be a whole number, at least 0 (--seed)")
-
-
-def _warm_up(rung: Rung, radar: Radar) -> None:
-    """Compile, or load from disk, all that is compiled on first use, so that times are of the work."""
-    # A slice of more, as in the stream: code is compiled for how arrays lie in memory.
-    echoes = _chirps_of(rung.echoes(np.arange(2 * radar.n_tx)), 0, radar.n_tx)
-    synthesize(echoes, radar, radar.chirp_times(radar.n_tx), dtype=np.complex64)
-    os_cfar(np.ones((16, 16), dtype=np.float32), looks=radar.n_channels)
-    if measures_angle(radar):
-        cycle = np.zeros((1, radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex64)
-        angle_spectra(cell_spectra(cycle, radar, [0], [0]), radar, [0.0], [0.0])

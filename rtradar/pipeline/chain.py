@@ -5,13 +5,10 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-import os
-import platform
 import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
@@ -22,24 +19,22 @@ from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion
 from rtradar.output_folder import all_or_nothing
-from rtradar.pipeline.capture import Capture, prepare
-from rtradar.pipeline.cloud_maker import CloudMaker, Clouds
+from rtradar.pipeline.if_array import if_array
 from rtradar.pipeline.moments import moments
 from rtradar.pipeline.pictures import draw_pictures
+from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
 from rtradar.pipeline.room_pictures import draw_room_pictures
+from rtradar.pipeline.summary import cost, summary_of
 from rtradar.pipeline.survey import Survey
-from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low, peak_memory_mb
+from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
 from rtradar.process import build_detector
 from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.moments import save_moments
-from rtradar.scatter import Accountable
 from rtradar.scene import Scene
-
-_VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh")
 
 
 @dataclass(frozen=True)
@@ -182,7 +177,7 @@ def run(
             folder / "maps.h5", radar, detect=detect, seed=seed, stages=stages, title=title, removal=removal, received=received
         )
         try:
-            kept = _if_array(folder / "if.zarr", capture) if save_if else None
+            kept = if_array(folder / "if.zarr", capture) if save_if else None
             capture.stream(products, kept)
             clouds = products.finish()
         finally:
@@ -198,59 +193,30 @@ def run(
             pictures = draw_pictures(folder, radar, clouds, title)
             if inside:
                 pictures |= draw_room_pictures(folder, radar, body, scene, inside, title)
-        capture_s = n_chirps * radar.chirp_interval_s
 
-        def cost() -> dict[str, Any]:
-            wall_s = time.perf_counter() - began - warmup_s
-            return {
-                "stages": stages.rounded(),
-                "wall_s": round(wall_s, 4),
-                "warmup_s": round(warmup_s, 4),
-                "capture_s": capture_s,
-                "real_time_factor": round(wall_s / capture_s, 4),
-                "peak_memory_mb": round(peak_memory_mb(), 1),
-            }
+        def spent() -> dict[str, Any]:
+            return cost(stages, time.perf_counter() - began - warmup_s, warmup_s, n_chirps * radar.chirp_interval_s)
 
-        summary: dict[str, Any] = {
-            "parameters": {
-                "motion": motion.name,
-                "scene": scene.name,
-                "fidelity": fidelity,
-                "start_s": start_s,
-                "duration_s": body.duration_s,
-                "heading_deg": heading_deg,
-                "snr_db": "inf" if snr_db == math.inf else snr_db,
-                "pfa": pfa,
-                "variant": variant,
-                "spreading": spreading,
-                "dials": dict(dials or {}),
-                "clutter_removal": clutter_removal,
-                "body_material": body_material,
-                "order": order,
-                "keep_all": keep_all,
-                "detector": detector,
-                "radar": dataclasses.asdict(radar),
-            },
-            "seed": seed,
-            "versions": {"python": platform.python_version(), **_versions()},
+        parameters = {
+            "motion": motion.name,
+            "scene": scene.name,
             "fidelity": fidelity,
-            "variant": capture.rung.variant,
-            **cost(),
-            "windows": len(windows),
-            "chirps": n_chirps,
-            "detections": clouds.rdt.n_voxels,
-            "rdt_triangles": clouds.rdt.n_triangles,
-            "rdt_points": len(clouds.rdt.points),
-            "xyz_points": len(clouds.spatial.points),
-            "xyz_points_found": clouds.n_spatial,
-            "echo_power_m2": capture.survey.power if capture.survey.visible else 0.0,
-            "part_power_m2": capture.survey.part_power,
-            "noise_power_m2": capture.noise.power,
-            **({} if radar.transmit_power_dbm is None or not spreading else {"watts": _watts(capture)}),
-            "limits": _limits(capture),
-            **({"modelled": capture.rung.account()} if isinstance(capture.rung, Accountable) else {}),
-            **({"room": inside.account} if inside else {}),
+            "start_s": start_s,
+            "duration_s": body.duration_s,
+            "heading_deg": heading_deg,
+            "snr_db": "inf" if snr_db == math.inf else snr_db,
+            "pfa": pfa,
+            "variant": variant,
+            "spreading": spreading,
+            "dials": dict(dials or {}),
+            "clutter_removal": clutter_removal,
+            "body_material": body_material,
+            "order": order,
+            "keep_all": keep_all,
+            "detector": detector,
+            "radar": dataclasses.asdict(radar),
         }
+        summary = summary_of(capture, clouds, parameters, seed, spent())
         # After the rung has given its account, for looking at it once more is no part of the capture.
         with stages.time("view"):
             save_moments(folder / "view.npz", moments(capture.rung, radar, body, scene, windows, n_chirps))
@@ -264,103 +230,6 @@ def run(
                 rdt_points=clouds.rdt.points,
                 spatial=clouds.spatial,
             )
-        text = json.dumps(summary | cost(), indent=2, allow_nan=False)
+        text = json.dumps(summary | spent(), indent=2, allow_nan=False)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     return Result(clouds.rdt.points, json.loads(text), capture.survey, Path(out))
-
-
-def clouds_of(
-    motion: Motion,
-    radar: Radar,
-    scene: Scene | None = None,
-    *,
-    fidelity: str = "specular",
-    start_s: float = 0.0,
-    duration_s: float | None = None,
-    heading_deg: float = 0.0,
-    snr_db: float = 20.0,
-    pfa: float = 1e-6,
-    seed: int = 0,
-    clutter_removal: str = "none",
-) -> tuple[Clouds, float]:
-    """The clouds that `run` makes, and nothing else: no maps, no pictures, no files, no progress bar.
-
-    Parameters
-    ----------
-    motion, radar, scene, fidelity, start_s, duration_s, heading_deg, snr_db, pfa, seed, clutter_removal
-        As in `run`.
-
-    Returns
-    -------
-    clouds : Clouds
-        The same as those of `run` with these parameters.
-    warmup_s : float
-        Seconds that went into what a process does once, such as compiling.
-
-    Raises
-    ------
-    InputError, BackendError
-        As in `run`.
-    """
-    keep_memory_low()
-    removal = make_removal(clutter_removal, radar)
-    capture = prepare(
-        motion,
-        radar,
-        scene or Scene(),
-        stages=Stages(),
-        fidelity=fidelity,
-        start_s=start_s,
-        duration_s=duration_s,
-        heading_deg=heading_deg,
-        snr_db=snr_db,
-        pfa=pfa,
-        seed=seed,
-        variant="auto",
-        spreading=True,
-        noise_power_m2=None,
-        dials=None,
-        body_material="perfect-conductor",
-        order=1,
-        keep_all=False,
-    )
-    detect = build_detector("os-cfar", pfa=pfa, looks=radar.n_channels)
-    maker = CloudMaker(capture.radar, detect=detect, seed=seed, stages=capture.stages, removal=removal)
-    capture.stream(maker, progress=False)
-    return maker.finish(), capture.warmup_s
-
-
-def _if_array(path: Path, capture: Capture) -> Any:
-    import zarr
-
-    radar = capture.radar
-    together = radar.n_tx if radar.multiplexing == "ddm" else 1  # one receiver gets the sum of all Tx
-    shape = (capture.n_chirps // together, radar.n_rx, radar.samples_per_chirp)
-    chunks = (capture.block // together, *shape[1:])
-    array = zarr.create_array(path, shape=shape, chunks=chunks, dtype="complex64", dimension_names=("chirp", "rx", "sample"))
-    told = {name: getattr(radar, name) for name in ("multiplexing", "chirp_duration_s", "sample_rate_hz")}
-    array.attrs.update({"units": "m", **told})
-    return array
-
-
-def _watts(capture: Capture) -> dict[str, float]:
-    """Powers per IF sample in watts, as received at the antenna's port: the radar equation's."""
-    scale = capture.radar.watts_per_m2
-    return {"watts_per_m2": scale, "echo_power_w": capture.survey.power * scale, "noise_power_w": capture.noise.power * scale}
-
-
-def _limits(capture: Capture) -> list[dict[str, Any]]:
-    limits: list[dict[str, Any]] = [dataclasses.asdict(limit) for limit in capture.survey.limits]
-    if not capture.survey.visible:
-        limits += [{"name": "nobody_visible", "share": 0.0, "message": message} for message in capture.warned]
-    return limits
-
-
-def _versions() -> dict[str, str]:
-    found = {}
-    for name in _VERSIONS:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    return found | {"cores": str(os.cpu_count())}
