@@ -27,7 +27,7 @@ from scipy.special import gammaincc
 
 from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, range_spectrum
 from rtradar.process.cfar_law import order_rank
-from rtradar.process.spectra import hann
+from rtradar.process.tapers import hann
 from rtradar.radar import Radar
 
 GUARD, TRAIN, QUANTILE = 2, 4, 0.75

@@ -8,7 +8,8 @@ from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
-from rtradar.process.spectra import RangeDoppler, power_map, range_doppler, range_spectrum, range_time
+from rtradar.process.power_maps import power_map, range_time
+from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
 from rtradar.process.steering import measures_angle

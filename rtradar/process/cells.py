@@ -10,8 +10,8 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.spectra import hann
 from rtradar.process.steering import range_walk
+from rtradar.process.tapers import hann
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
 

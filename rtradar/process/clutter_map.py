@@ -34,7 +34,7 @@ from scipy.optimize import brentq
 from rtradar.errors import InputError
 from rtradar.process.cfar_law import check_looks, check_pfa
 from rtradar.process.clutter import check_time_constant
-from rtradar.process.spectra import hann
+from rtradar.process.tapers import hann
 from rtradar.radar import Radar
 
 _FORGOTTEN = 1e-4

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.spectra import hann
+from rtradar.process.tapers import hann
 from rtradar.radar import Radar
 
 
