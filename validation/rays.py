@@ -36,7 +36,8 @@ from scipy.signal.windows import chebwin
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.scatter.rays import Rays, rays_scattering
+from rtradar.scatter.rays import Rays
+from rtradar.scatter.rays_scattering import rays_scattering
 from rtradar.scatter.tubes import EllipsoidGrid
 
 Array = NDArray[np.float64]

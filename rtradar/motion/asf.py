@@ -1,30 +1,21 @@
-"""ASF skeletons and AMC motions (Acclaim): HDM05, the CMU database.
+"""ASF skeletons (Acclaim): HDM05, the CMU database.
 
-A bone's rotation in the world is that of its parent times C R C^-1, C the bone's ``axis`` and R its degrees of freedom,
-both applied about fixed axes in the order they are listed (``rx ry rz``: R = Rz Ry Rx). The bone's vector is
-length x direction, and lengths are inches divided by the ``length`` unit of the file.
+A bone's vector is length x direction, and lengths are inches divided by the ``length`` unit of the file.
 """
 
 from __future__ import annotations
 
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
-from rtradar.motion.axes import quaternions_to_world, to_world
-from rtradar.motion.motion import Motion
 from rtradar.motion.names import ASF_JOINTS
 from rtradar.motion.textfile import check_size, fail, numbers, read_lines
 
 _INCH_M = 0.0254
-_FRAME_NUMBER = re.compile("-?[0-9]{1,9}")
-_RATE_HZ = 120.0
-"""AMC files do not tell their rate; HDM05 and the CMU recordings here were made at 120 Hz."""
 
 
 @dataclass
@@ -197,100 +188,3 @@ def _parents_first(bones: dict[str, Bone], path: Path) -> tuple[Bone, ...]:
             raise fail(path, loose.line, f"bone {loose.name!r} does not hang on the root; list it in :hierarchy")
         done |= {bone.name: bone for bone in ready}
     return tuple(done.values())
-
-
-def load_amc(path: Path, skeleton: Skeleton, rate_hz: float = _RATE_HZ) -> Motion:
-    """Read an AMC file and pose its skeleton.
-
-    Returns
-    -------
-    Motion
-        One joint a bone (its end) and the root; offsets and rotations in world axes.
-
-    Raises
-    ------
-    InputError
-        Naming file, line and bone.
-    """
-    values, degrees = _read_frames(path, skeleton)
-    to_radians = np.pi / 180 if degrees else 1.0
-    frames = len(next(iter(values.values())))
-    index = {bone.name: j for j, bone in enumerate(skeleton.bones)}
-    world: list[Rotation] = []
-    root_positions = np.zeros((frames, 3))
-    for bone in skeleton.bones:
-        frame = Rotation.from_euler(bone.axis_order, bone.axis_rad)
-        data = values.get(bone.name, np.zeros((frames, 0)))
-        turns = [k for k, name in enumerate(bone.dof) if name[0] == "r"]
-        if bone.name == "root":
-            root_positions = data[:, [bone.dof.index(name) for name in ("tx", "ty", "tz")]] * skeleton.unit_m
-            columns = [bone.dof.index("r" + letter) for letter in bone.axis_order]
-            local = Rotation.from_euler(bone.axis_order, data[:, columns] * to_radians)
-        elif turns:
-            local = Rotation.from_euler("".join(bone.dof[k][1] for k in turns), data * to_radians)
-        else:
-            local = Rotation.identity(frames)
-        posed = frame * local * frame.inv()
-        world.append(posed if bone.parent is None else world[index[bone.parent]] * posed)
-    offsets = np.array([bone.direction * bone.length * skeleton.unit_m for bone in skeleton.bones])
-    rotations = np.stack([rotation.as_quat() for rotation in world], axis=1)
-    return Motion(
-        name=path.stem,
-        joints=tuple(index),
-        parents=tuple(-1 if bone.parent is None else index[bone.parent] for bone in skeleton.bones),
-        offsets=to_world(offsets),
-        root_positions=to_world(root_positions),
-        rotations=quaternions_to_world(rotations),
-        rate_hz=rate_hz,
-    )
-
-
-def _read_frames(path: Path, skeleton: Skeleton) -> tuple[dict[str, NDArray[np.float64]], bool]:
-    lines = read_lines(path, "AMC motion")
-    widths = {bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}
-    table: dict[str, list[list[float]]] = {name: [] for name in widths}
-    known = {bone.name for bone in skeleton.bones}
-    degrees = skeleton.degrees
-    frame: int | None = None
-    seen: set[str] = set()
-
-    def finish(line: int) -> None:
-        missing = [name for name in widths if name not in seen]
-        if frame is not None and missing:
-            some = ", ".join(missing[:3]) + (" ..." if len(missing) > 3 else "")
-            raise fail(path, line, f"frame {frame} lacks {len(missing)} bones ({some}); the file may be cut off")
-
-    for number, raw in enumerate(lines, start=1):
-        words = raw.split()
-        if not words or words[0].startswith("#"):
-            continue
-        if words[0].startswith(":"):
-            if words[0].upper() in (":DEGREES", ":RADIANS"):
-                degrees = words[0].upper() == ":DEGREES"
-        elif len(words) == 1 and _FRAME_NUMBER.fullmatch(words[0]):
-            finish(number - 1)
-            if frame is not None and int(words[0]) != frame + 1:
-                raise fail(path, number, f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive")
-            frame, seen = int(words[0]), set()
-        elif frame is None:
-            raise fail(path, number, f"{words[0][:40]!r} before the first frame number; this is not an AMC file")
-        else:
-            name = words[0]
-            if name not in known:
-                raise fail(
-                    path, number, f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject"
-                )
-            if name in seen:
-                raise fail(path, number, f"bone {name!r} is there twice in frame {frame}")
-            if len(words) - 1 != widths.get(name, 0):
-                raise fail(
-                    path, number, f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}"
-                )
-            seen.add(name)
-            if name in table:
-                table[name].append(numbers(words[1:], path, number))
-    if frame is None:
-        raise InputError(f"{path}: no frame in this AMC file; it may be cut off")
-    finish(len(lines))
-    check_size(path, len(skeleton.bones), len(table["root"]) if "root" in table else 1)
-    return {name: np.array(rows) for name, rows in table.items()}, degrees

@@ -6,7 +6,8 @@ import inspect
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.motion.asf import load_amc, load_skeleton
+from rtradar.motion.amc import load_amc
+from rtradar.motion.asf import load_skeleton
 from rtradar.motion.bvh import load_bvh
 from rtradar.motion.c3d import load_c3d
 from rtradar.motion.motion import Motion

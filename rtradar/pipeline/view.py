@@ -18,7 +18,9 @@ from rtradar.errors import InputError
 from rtradar.output_folder import settle
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
-from rtradar.report.linked import COLOURS, MOST_LEVEL, Levels, Linked, write_view
+from rtradar.report.levels import MOST_LEVEL, Levels
+from rtradar.report.linked import Linked
+from rtradar.report.linked_page import COLOURS, write_view
 from rtradar.report.moments import Moments, load_moments
 from rtradar.report.still import draw_still
 

@@ -11,7 +11,10 @@ from numpy.typing import NDArray
 from rtradar.body import unit_sphere
 from rtradar.files import atomic_file
 from rtradar.report.figures import new_figure
-from rtradar.report.linked import GROUPS, VELOCITY_COLOURS, Levels, Linked, group_of_parts
+from rtradar.report.levels import Levels
+from rtradar.report.linked import Linked
+from rtradar.report.linked_page import VELOCITY_COLOURS
+from rtradar.report.part_groups import GROUPS, group_of_parts
 
 _HIDDEN = "#8c8c94"
 _NOW = "#e0389a"

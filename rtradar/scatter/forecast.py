@@ -28,7 +28,8 @@ from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_nodes import array_nodes
-from rtradar.scatter.fresnel_zone import RIM, zone_shares
+from rtradar.scatter.fresnel_meridians import RIM
+from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.mirror import mirror
 from rtradar.trace.clearance import clearance
 

@@ -13,10 +13,12 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.fresnel_anchors import TracedHiders, ZoneShares, hiding_parts
-from rtradar.scatter.fresnel_zone import zone_rays, zone_shares
+from rtradar.scatter.fresnel_anchors import ZoneShares
+from rtradar.scatter.fresnel_meridians import zone_rays
+from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
+from rtradar.scatter.traced_hiders import TracedHiders, hiding_parts
 from rtradar.trace.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 

@@ -37,7 +37,7 @@ _HOMES = {
     "fresnel": _Home("fresnel", "fresnel_scattering", meshes=False),
     "physical-optics": _Home("facet_scattering", "facet_scattering", meshes=True),
     "reference": _Home("facet_scattering", "facet_scattering", meshes=True),
-    "rays": _Home("rays", "rays_scattering", meshes=True),
+    "rays": _Home("rays_scattering", "rays_scattering", meshes=True),
 }
 _COMMON = ("target", "tx", "rx", "frequency", "polarization")
 

@@ -14,7 +14,7 @@ import pytest
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.pipeline.view import load_linked, view
-from rtradar.report.linked import COLOURS
+from rtradar.report.linked_page import COLOURS
 from rtradar.scene import Scene, Wall, material
 
 RADAR = rt.Radar(

@@ -12,8 +12,11 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.linked import GROUPS, Levels, Linked, group_of_parts, linked_data
+from rtradar.report.levels import Levels
+from rtradar.report.linked import Linked
+from rtradar.report.linked_page import linked_data
 from rtradar.report.moments import Moments
+from rtradar.report.part_groups import GROUPS, group_of_parts
 from rtradar.report.viewer import semi_axis_poses
 
 RADAR = rt.Radar.preset("paper-12ghz")

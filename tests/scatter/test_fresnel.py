@@ -15,7 +15,8 @@ from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.fresnel import Fresnel, fresnel_scattering, sweep_nodes
-from rtradar.scatter.fresnel_zone import RIM, zone_rays, zone_shares
+from rtradar.scatter.fresnel_meridians import RIM, zone_rays
+from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.specular import Specular
 from rtradar.trace.backend import Backend
