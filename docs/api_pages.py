@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import is_dataclass
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -47,6 +48,8 @@ def page(package: str) -> str:
         lines.append(f".. auto{kind}:: {package}.{name}")
         if kind == "class":
             lines.append("   :members:")
+            if any(is_dataclass(base) for base in getattr(thing, "__bases__", ())):
+                lines.append("   :inherited-members:")
         if kind == "data":
             lines.append("   :no-value:")
         lines.append("")
