@@ -19,7 +19,8 @@ from hypothesis import strategies as st
 import rtradar
 from rtradar.campaign.spec_file import read_spec
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.collection import write_index, write_sample
+from rtradar.clouds.collection_index import write_index
+from rtradar.clouds.sample import write_sample
 from rtradar.errors import InputError
 from rtradar.files import read_json
 from rtradar.motion import load_motion

@@ -24,7 +24,8 @@ from pathlib import Path
 import psutil
 from rows import Row, judged, main, reported
 
-from rtradar.clouds.collection import INDEX, is_whole
+from rtradar.clouds.collection_index import INDEX
+from rtradar.clouds.sample import is_whole
 
 RADAR = """
 tx_y = 2

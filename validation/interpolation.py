@@ -29,7 +29,8 @@ from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion.load import load_motion
-from rtradar.motion.motion import Motion, rotate, sign_continuous
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import rotate, sign_continuous
 
 Array = NDArray[np.float64]
 Method = Callable[[Array, Array, Array], Array]

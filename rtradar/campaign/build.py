@@ -17,7 +17,8 @@ from rtradar.campaign.plan import counts, recipes
 from rtradar.campaign.sample import Recipe, make
 from rtradar.campaign.spec_file import read_spec
 from rtradar.campaign.work import Outcome, work
-from rtradar.clouds.collection import is_whole, sample_path, sweep, write_index
+from rtradar.clouds.collection_index import sweep, write_index
+from rtradar.clouds.sample import is_whole, sample_path
 from rtradar.errors import InputError
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,6 +15,7 @@ from tqdm import tqdm
 
 from rtradar.classify.checkpoint import load_checkpoint
 from rtradar.classify.outcome import Outcome, load_outcome, outcome_of, save_outcome
+from rtradar.classify.plan import PLAN, check_plan, read_plan, write_plan
 from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
@@ -23,11 +23,8 @@ from rtradar.classify.source import Clouds
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples, check_points, predict, train_network
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json
 
-_PLAN_KEYS = ("data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings")
-_MOST_NAMES = 10_000  # of classes, and of trainings
-_PLAN, _CHECKPOINT, _OUTCOME = "plan.json", "checkpoint.pt", "outcome.json"
+_CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
 
 
 @dataclass(frozen=True)
@@ -106,13 +103,13 @@ def train_study(
         "seed": seed,
         "trainings": [one.name for one in splits],
     }
-    _check_plan(out, plan)
+    check_plan(out, plan)
     values = values_of(clouds, split)
     missing = [number for number in numbers if not (training_folder(out, number) / _OUTCOME).exists()]
     if missing:
         examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
         check_points(examples, recipe)
-    _write_plan(out, plan)
+    write_plan(out, plan)
     with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:
         bar.update((len(numbers) - len(missing)) * recipe.epochs_run)
         for number in missing:
@@ -153,12 +150,12 @@ def load_study(folder: Path) -> Study:
     InputError
         Where it holds no plan, a damaged one, or no training that is done.
     """
-    plan = _read_plan(folder)
+    plan = read_plan(folder)
     names = plan["trainings"]
     paths = [training_folder(folder, number) / _OUTCOME for number in range(len(names))]
     outcomes = [load_outcome(path) for path in paths if path.exists()]
     if any(max(one.truth.max(), one.predicted.max()) >= len(plan["classes"]) for one in outcomes):
-        raise InputError(f"'{folder}': answers name more classes than '{_PLAN}' does; train into another folder")
+        raise InputError(f"'{folder}': answers name more classes than '{PLAN}' does; train into another folder")
     if not outcomes:
         raise InputError(f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on")
     return Study(folder, plan, outcomes)
@@ -188,14 +185,14 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
     InputError
         Where there is no such training, or its checkpoint cannot be read safely.
     """
-    plan = _read_plan(folder)
+    plan = read_plan(folder)
     recipe, classes = Recipe(**plan["recipe"]), tuple(plan["classes"])
     path = training_folder(folder, number - 1) / _CHECKPOINT
     network = PointNet(len(classes), recipe)
     try:
         network.load_state_dict(load_checkpoint(path).network)
     except (RuntimeError, TypeError, AttributeError):
-        raise InputError(f"'{path}' is of another network than '{folder / _PLAN}' says; train anew, in another folder") from None
+        raise InputError(f"'{path}' is of another network than '{folder / PLAN}' says; train anew, in another folder") from None
     return network.eval(), recipe, classes
 
 
@@ -217,53 +214,3 @@ def fingerprint(clouds: Clouds) -> str:
 def training_folder(out: Path, number: int) -> Path:
     """Where training ``number``, from 0, is kept."""
     return out / f"training-{number + 1:02d}"
-
-
-def _check_plan(out: Path, plan: dict[str, Any]) -> None:
-    """Raise where the folder holds another plan; where the data lie may change."""
-    path = out / _PLAN
-    if not path.exists():
-        return
-    try:
-        there = read_json(path)
-        other = next((name for name, value in plan.items() if name != "data" and there.get(name) != value), None)
-    except (OSError, ValueError, AttributeError):
-        raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
-    if other is not None:
-        was, now = _difference(there.get(other), plan[other])
-        raise InputError(f"'{out}' holds other trainings ({other}: {was}, not {now}); give another folder (--out)")
-
-
-def _write_plan(out: Path, plan: dict[str, Any]) -> None:
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
-    with atomic_file(out / _PLAN) as file:
-        file.write((json.dumps(plan, indent=1) + "\n").encode())
-
-
-def _read_plan(folder: Path) -> dict[str, Any]:
-    try:
-        plan = read_json(folder / _PLAN)
-        Recipe(**plan["recipe"])
-        for name in ("data", "classes", "trainings"):
-            if (
-                (name != "data" and not plan[name])
-                or len(plan[name]) > _MOST_NAMES
-                or not all(isinstance(one, str) for one in plan[name])
-            ):
-                raise ValueError
-        return {name: plan[name] for name in _PLAN_KEYS}
-    except OSError as error:
-        raise InputError(f"'{folder}' holds no trainings ({_PLAN}: {error.strerror}); make them with: rtradar train") from None
-    except (ValueError, KeyError, TypeError):
-        raise InputError(f"'{folder / _PLAN}' is damaged; train into another folder") from None
-
-
-def _difference(was: Any, now: Any) -> tuple[Any, Any]:
-    """What is not the same, of dictionaries only the first entry."""
-    if isinstance(was, dict) and isinstance(now, dict):
-        name = next(name for name in {**was, **now} if was.get(name) != now.get(name))
-        return f"{name} {was.get(name)}", f"{now.get(name)}"
-    return was, now

@@ -7,50 +7,16 @@ the archive's comment, are the SHA-256 of all before. ``collection.json`` names 
 
 from __future__ import annotations
 
-import hashlib
-import io
-import json
-import os
-import re
-import zipfile
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from rtradar.checks import shown
-from rtradar.clouds.sample_file import DIGEST, FORMAT, read_sample
+from rtradar.clouds.collection_index import read_index
+from rtradar.clouds.sample import Sample, sample_path
+from rtradar.clouds.sample_file import read_sample
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json
-
-INDEX = "collection.json"
-"""Name of the file that says which samples belong to the collection."""
-
-_IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a name, and no way to another folder
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One RDT cloud with its label and where it comes from.
-
-    Parameters
-    ----------
-    points : (n, 3) float64
-        Time [s], range [m], velocity [m/s]; in random order, so that any first part is a sample too. Empty where
-        nothing was detected.
-    label : str
-        The activity.
-    provenance : mapping
-        Plain JSON values: recording, subject, source ("synthetic" or "recorded"), start_s, duration_s, radar, scene,
-        fidelity, snr_db, heading_deg, seed, licence, version, and more.
-    """
-
-    points: NDArray[np.float64]
-    label: str
-    provenance: Mapping[str, Any]
 
 
 class Collection:
@@ -165,114 +131,3 @@ class Collection:
             Where its file is damaged.
         """
         return np.asarray(read_sample(self._paths[index], "spatial"))
-
-
-def sample_path(folder: Path, identity: str) -> Path:
-    """File of a sample."""
-    return folder / f"{identity}.npz"
-
-
-def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike) -> int:
-    """Write a sample's file: whole, on the disk, then under its name; the same sample gives the same bytes.
-
-    Parameters
-    ----------
-    folder : path
-        Must exist.
-    identity : str
-        Name of the sample.
-    sample : Sample
-    spatial : (m, 3) float
-        The spatial cloud of the same capture [m].
-
-    Returns
-    -------
-    int
-        Bytes of the file.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be written; the folder is then as it was.
-    """
-    about = json.dumps(
-        {"format": FORMAT, "label": sample.label, "provenance": sample.provenance}, sort_keys=True, allow_nan=False
-    )
-    arrays = {
-        "points": np.asarray(sample.points, dtype="<f8").reshape(-1, 3),
-        "spatial": np.asarray(spatial, dtype="<f8").reshape(-1, 3),
-        "about": np.frombuffer(about.encode(), dtype=np.uint8),
-    }
-    buffer = io.BytesIO()
-    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
-        for name, values in arrays.items():
-            entry = io.BytesIO()
-            np.lib.format.write_array(entry, values, version=(1, 0), allow_pickle=False)
-            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), entry.getvalue())  # dated 1980, always
-        archive.comment = b"0" * DIGEST
-    body = buffer.getvalue()[:-DIGEST]
-    whole = body + hashlib.sha256(body).hexdigest().encode()
-    with atomic_file(sample_path(folder, identity)) as file:
-        file.write(whole)
-        file.flush()
-        os.fsync(file.fileno())
-    return len(whole)
-
-
-def is_whole(path: Path) -> bool:
-    """Whether a sample's file is there and every byte of it is as it was written."""
-    try:
-        whole = path.read_bytes()
-    except OSError:
-        return False
-    return len(whole) > DIGEST and hashlib.sha256(whole[:-DIGEST]).hexdigest().encode() == whole[-DIGEST:]
-
-
-def sweep(folder: Path) -> int:
-    """Remove what killed writers left of samples; their number. None may be writing."""
-    leftovers = [*folder.glob(".*.npz.*.part"), *folder.glob(f".{INDEX}.*.part")]
-    for path in leftovers:
-        path.unlink(missing_ok=True)
-    return len(leftovers)
-
-
-def write_index(folder: Path, identities: Iterable[str]) -> None:
-    """Say which samples belong to the collection, whether they are there already or not.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be written.
-    """
-    content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
-    with atomic_file(folder / INDEX) as file:
-        file.write(content.encode() + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-
-
-def read_index(folder: Path) -> tuple[str, ...]:
-    """Ids of the samples that belong to the collection, ascending.
-
-    Raises
-    ------
-    InputError
-        Where the folder holds no collection, or one of another format.
-    """
-    path = folder / INDEX
-    try:
-        content = read_json(path)
-    except OSError as error:
-        why = error.strerror
-        raise InputError(f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build") from None
-    except ValueError:
-        raise InputError(f"'{path}' is damaged; mend the collection with: rtradar dataset build") from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("samples"), list):
-        raise InputError(f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build")
-    identities = content["samples"]
-    for identity in identities:
-        if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
-            raise InputError(
-                f"'{path}' names {shown(identity)}, which is no sample; mend the collection with: rtradar dataset build"
-            )
-    return tuple(sorted(identities))

@@ -16,7 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.axes import quaternions_to_world, to_world
-from rtradar.motion.motion import Motion, rotate
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import rotate
 from rtradar.motion.textfile import check_size, fail, numbers, read_lines
 
 UNITS_M = {"metre": 1.0, "CMU unit (0.45 inch)": 0.0254 / 0.45, "inch": 0.0254, "centimetre": 0.01, "millimetre": 0.001}

@@ -18,8 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.motion.motion import Motion, rotate
+from rtradar.motion.motion import Motion
 from rtradar.motion.names import CONVENTIONS, NODE_PARENT, NODES, Convention, plain
+from rtradar.motion.quaternions import rotate
 
 MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""

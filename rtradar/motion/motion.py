@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from rtradar.errors import InputError
+from rtradar.motion.quaternions import rotate, sign_continuous
 
 _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
@@ -19,37 +20,6 @@ _TIME_SLACK_S = 1e-9
 _STRETCH_FRAMES, _STRETCH_MARGIN, _STRETCHES_KEPT = 256, 32, 2
 """Frames that one spline serves, and those on either side that it is made from as well. A cubic spline forgets 73 % of what
 is farther with every frame: beyond 32 frames nothing is left in float64."""
-
-
-def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotate vectors by unit quaternions; leading axes broadcast.
-
-    Parameters
-    ----------
-    quaternions : (..., 4) float64
-        Scalar last: x, y, z, w.
-    vectors : (..., 3) float64
-
-    Returns
-    -------
-    (..., 3) float64
-    """
-    x, y, z, w = (quaternions[..., k] for k in range(4))
-    a, b, c = (vectors[..., k] for k in range(3))
-    # Rodrigues' form v + w t + u x t with t = 2 u x v; numpy.cross is several times slower on short last axes.
-    tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return np.stack([a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx], axis=-1)
-
-
-def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the sign of each quaternion (frame, ..., 4) so that it lies in the half-space of the frame before it."""
-    if len(quaternions) < 2:
-        return quaternions
-    same_side = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) >= 0
-    if same_side.all():
-        return quaternions  # not copied: a recording that was only moved shares its rotations with the one before
-    signs = np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

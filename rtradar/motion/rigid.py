@@ -8,8 +8,9 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.joints import MINIMUM_PART_M, multiply
-from rtradar.motion.motion import Motion, rotate, sign_continuous
+from rtradar.motion.motion import Motion
 from rtradar.motion.names import NODE_PARENT, NODES
+from rtradar.motion.quaternions import rotate, sign_continuous
 
 _ON_THE_PELVIS = ("l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_toe", "r_toe", "lowerback", "upperback")
 """Nodes whose bones turn with the pelvis where they do not bend; the others turn with the chest."""

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from rtradar.process.angle import refine
+from rtradar.process.parabola import refine
 
 MOST_PEAKS = 3
 """Peaks taken of one spectrum."""

@@ -18,7 +18,8 @@ from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
 from rtradar.scatter.array_ends import ArrayEnds
 from rtradar.scatter.body_material import Surface, body_material
-from rtradar.scatter.ghost_echoes import Nearby, weigh
+from rtradar.scatter.ghost_echoes import Nearby
+from rtradar.scatter.ghost_weights import weigh
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.path_account import PathAccount, account

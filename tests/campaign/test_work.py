@@ -26,7 +26,8 @@ from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.sample import Made, Recipe
 from rtradar.campaign.work import make_and_store, work
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.collection import sample_path, sweep, write_index
+from rtradar.clouds.collection_index import sweep, write_index
+from rtradar.clouds.sample import sample_path
 from rtradar.errors import CampaignError, InputError
 
 RECIPES = [

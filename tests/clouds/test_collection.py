@@ -11,7 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.collection import INDEX, is_whole, sample_path, sweep, write_index, write_sample
+from rtradar.clouds.collection_index import INDEX, sweep, write_index
+from rtradar.clouds.sample import is_whole, sample_path, write_sample
 from rtradar.errors import InputError
 
 SPATIAL = np.arange(12.0).reshape(4, 3)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.motion.motion import sign_continuous
+from rtradar.motion.quaternions import sign_continuous
 
 
 def random_motion(seed: int, frames: int = 12, joints: int = 5, wild: float = 0.5) -> Motion:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion.motion import rotate
 from rtradar.motion.names import NODE_PARENT, NODES
+from rtradar.motion.quaternions import rotate
 from rtradar.motion.rigid import rigid_motion
 
 FRAMES = 200

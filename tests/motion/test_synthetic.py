@@ -9,8 +9,8 @@ from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
 from rtradar.motion.curves import bump, hermite, keyed, smooth
 from rtradar.motion.figure import ANKLE, HEEL_X, TOE_HEIGHT, bend
-from rtradar.motion.motion import rotate
 from rtradar.motion.names import NODES
+from rtradar.motion.quaternions import rotate
 
 NODE = NODES.index
 

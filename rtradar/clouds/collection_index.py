@@ -1,0 +1,69 @@
+"""The file that says which samples of a folder belong to its collection."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterable
+from pathlib import Path
+
+from rtradar.checks import shown
+from rtradar.clouds.sample_file import FORMAT
+from rtradar.errors import InputError
+from rtradar.files import atomic_file, read_json
+
+INDEX = "collection.json"
+"""Name of the file that says which samples belong to the collection."""
+
+_IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a name, and no way to another folder
+
+
+def sweep(folder: Path) -> int:
+    """Remove what killed writers left of samples; their number. None may be writing."""
+    leftovers = [*folder.glob(".*.npz.*.part"), *folder.glob(f".{INDEX}.*.part")]
+    for path in leftovers:
+        path.unlink(missing_ok=True)
+    return len(leftovers)
+
+
+def write_index(folder: Path, identities: Iterable[str]) -> None:
+    """Say which samples belong to the collection, whether they are there already or not.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written.
+    """
+    content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
+    with atomic_file(folder / INDEX) as file:
+        file.write(content.encode() + b"\n")
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def read_index(folder: Path) -> tuple[str, ...]:
+    """Ids of the samples that belong to the collection, ascending.
+
+    Raises
+    ------
+    InputError
+        Where the folder holds no collection, or one of another format.
+    """
+    path = folder / INDEX
+    try:
+        content = read_json(path)
+    except OSError as error:
+        why = error.strerror
+        raise InputError(f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build") from None
+    except ValueError:
+        raise InputError(f"'{path}' is damaged; mend the collection with: rtradar dataset build") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("samples"), list):
+        raise InputError(f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build")
+    identities = content["samples"]
+    for identity in identities:
+        if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
+            raise InputError(
+                f"'{path}' names {shown(identity)}, which is no sample; mend the collection with: rtradar dataset build"
+            )
+    return tuple(sorted(identities))
