@@ -15,6 +15,10 @@ from typing import Any, BinaryIO
 
 from rtradar.errors import InputError
 
+_MOST_JSON_BYTES = 100_000_000
+_PATIENCE_S = 1.0
+"""Waited, at the end, for a file that is just taking its name."""
+
 _lock = threading.RLock()
 _unfinished: list[Callable[[], object]] = []
 
@@ -57,13 +61,13 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             beside.unlink(missing_ok=True)
 
 
-def write_json(path: str | os.PathLike[str], content: Mapping[str, Any], *, option: str = "--json") -> None:
+def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
     """Write plain values as indented JSON, whole or not at all.
 
     Raises
     ------
     InputError
-        Where it cannot be written; the message names the command line's ``option``.
+        Where it cannot be written; the message names the command line's ``--json``.
     """
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     try:
@@ -73,12 +77,12 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any], *, opti
         with atomic_file(path) as file:
             file.write(text.encode())
     except OSError as error:
-        raise InputError(f"cannot write '{path}': {error.strerror}; give another file ({option})") from None
+        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
     except InputError as error:
-        raise InputError(f"{error} ({option})") from None
+        raise InputError(f"{error} (--json)") from None
 
 
-def read_json(path: Path, most_bytes: int = 100_000_000) -> Any:
+def read_json(path: Path) -> Any:
     """Plain values of a JSON file that may be anybody's.
 
     Raises
@@ -86,10 +90,10 @@ def read_json(path: Path, most_bytes: int = 100_000_000) -> Any:
     OSError
         Where it cannot be read.
     ValueError
-        Where it is no JSON, is nested deeper than Python goes, or is larger than ``most_bytes``.
+        Where it is no JSON, is nested deeper than Python goes, or is larger than 100 MB.
     """
-    if path.stat().st_size > most_bytes:
-        raise ValueError(f"more than {most_bytes / 1e6:g} MB")
+    if path.stat().st_size > _MOST_JSON_BYTES:
+        raise ValueError(f"more than {_MOST_JSON_BYTES / 1e6:g} MB")
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
@@ -125,9 +129,9 @@ def not_to_be_parted() -> Iterator[None]:
         yield
 
 
-def discard_unfinished(patience_s: float = 1.0) -> None:
+def discard_unfinished() -> None:
     """Take away all that is unfinished; from now on other threads of this process neither begin nor finish a file."""
-    _lock.acquire(timeout=patience_s)  # and never given back
+    _lock.acquire(timeout=_PATIENCE_S)  # and never given back
     for remove in reversed(_unfinished):
         with suppress(Exception):
             remove()

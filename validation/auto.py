@@ -80,10 +80,6 @@ def measure(quick: bool) -> list[Row]:
     return rows
 
 
-def _row(measured: tuple[str, str, str, float], tolerance: float | None, says: str) -> Row:
-    return reported(*measured, key="auto") if tolerance is None else judged(*measured, tolerance, key="auto", says=says)
-
-
 def _cost(fidelity: str, dials: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int) -> float:
     """Seconds of every third frame [s], by a new rung, for rungs keep what they traced."""
     seconds(build_rung(fidelity, radar, body, **dials), radar, 0)

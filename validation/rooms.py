@@ -11,7 +11,6 @@ space in the same run of this script: twice is wanted, and not reached.
 
 from __future__ import annotations
 
-import json
 import sys
 import tempfile
 from pathlib import Path
@@ -28,11 +27,6 @@ from rtradar.process.detection_score import DetectionScore, cell_noise_power, sc
 
 ACTIVITY, MARGIN_DB = "walk", 13.0
 ROOMS = ("living-room", "corridor")
-
-
-def summary_of(out: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((out / "summary.json").read_text())
-    return found
 
 
 def scored(out: Path, truth: np.ndarray[Any, Any]) -> DetectionScore:

@@ -13,7 +13,7 @@ same integral taken down the valley of steepest descent from the mirror point ha
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import partial
 from typing import NamedTuple
 
@@ -41,10 +41,6 @@ class Case(NamedTuple):
     target: rt.Ellipsoids
     tx: Array
     rx: Array
-
-
-def judged_at(tolerance: float) -> Callable[[str, str, str, float], Row]:
-    return lambda claim, quantity, unit, ours: judged(claim, quantity, unit, ours, tolerance)
 
 
 def decibel(ratio: Array) -> Array:

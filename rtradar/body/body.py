@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -107,17 +106,13 @@ class Body:
         object.__setattr__(self, "semi_axes", axes)
 
     @classmethod
-    def from_motion(cls, motion: Motion, girth: float = 1.0, scale: float = 1.0) -> Body:
+    def from_motion(cls, motion: Motion) -> Body:
         """Put ellipsoids on a skeleton: c is half the bone, a = b are `PART_RADII_M`.
 
         Parameters
         ----------
         motion : Motion
-            Of any skeleton that `rtradar.motion.joints.to_nodes` understands.
-        girth : float
-            Multiplies the thickness of every part, on top of the motion's own.
-        scale : float
-            Multiplies the whole subject, its path and its thickness.
+            Of any skeleton that `rtradar.motion.joints.to_nodes` understands; its ``girth`` multiplies the radii.
 
         Returns
         -------
@@ -126,15 +121,10 @@ class Body:
         Raises
         ------
         InputError
-            Where the skeleton is not understood, or a factor is not positive.
+            Where the skeleton is not understood, or a part comes out without an extent.
         """
-        for name, value in (("girth", girth), ("scale", scale)):
-            if not (math.isfinite(value) and value > 0):
-                raise InputError(f"Body.from_motion: {name} = {value}; it must be positive")
         nodes = to_nodes(motion)
-        if scale != 1.0:
-            nodes = nodes.scaled(scale)
-        radii = np.array(PART_RADII_M) * nodes.girth * girth
+        radii = np.array(PART_RADII_M) * nodes.girth
         lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
         return cls(nodes, np.stack([radii, radii, lengths / 2], axis=1))
 

@@ -23,6 +23,8 @@ from rtradar.files import discard_unfinished
 
 _SIGNALS = {"SIGINT": "stopped by the user", "SIGTERM": "ended by SIGTERM", "SIGHUP": "its terminal was closed"}
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
+_PATIENCE_S = 0.5
+"""Waited, at the end, until children are gone."""
 _ended = threading.Event()
 
 
@@ -64,7 +66,7 @@ def _wait(reader: int, told: Callable[[], str]) -> None:
     os._exit(1)
 
 
-def _end_children(patience_s: float = 0.5) -> None:
+def _end_children() -> None:
     """Kill the processes that this one started, and theirs, and wait a little until they are gone."""
     # One of them keeps account of semaphores, and takes them away when all others are gone. The main thread, which clears up
     # after workers that are no more, must not tell it of that, too.
@@ -73,7 +75,7 @@ def _end_children(patience_s: float = 0.5) -> None:
     # No more of Python's own: one that starts as this process goes would say that it is told nothing.
     multiprocessing.util.spawnv_passfds = lambda *_: threading.Event().wait()
     spared = {getattr(tracker, "_pid", None)}
-    until = time.monotonic() + patience_s
+    until = time.monotonic() + _PATIENCE_S
     killed: set[int] = set()
     # Again, for others may be starting some by other ways.
     while (

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,10 +17,8 @@ RDT_UNITS = ("s", "m", "m/s")
 """Their units."""
 
 
-def save_cloud_npz(
-    path: str | os.PathLike[str], points: ArrayLike, axes: Sequence[str] = RDT_AXES, units: Sequence[str] = RDT_UNITS
-) -> None:
-    """Write a cloud as a NumPy archive with ``points (n, 3) float64``, ``axes (3,)`` and ``units (3,)``.
+def save_cloud_npz(path: str | os.PathLike[str], points: ArrayLike) -> None:
+    """Write an RDT cloud as a NumPy archive with ``points (n, 3) float64``, ``axes (3,)`` and ``units (3,)``.
 
     Parameters
     ----------
@@ -29,27 +26,23 @@ def save_cloud_npz(
         Replaced if it is there.
     points : (n, 3) float
         May be empty.
-    axes, units : sequence of str
-        Name and unit of the three coordinates.
 
     Raises
     ------
     InputError
         Where the shape does not fit or the file cannot be written.
     """
-    places = _checked(points, axes, units)
+    places = _checked(points)
     with atomic_file(path) as file:
-        np.savez_compressed(file, points=places, axes=np.array(list(axes)), units=np.array(list(units)))
+        np.savez_compressed(file, points=places, axes=np.array(RDT_AXES), units=np.array(RDT_UNITS))
 
 
-def save_ply(
-    path: str | os.PathLike[str], points: ArrayLike, axes: Sequence[str] = RDT_AXES, units: Sequence[str] = RDT_UNITS
-) -> None:
-    """Write a cloud as a binary little-endian PLY; a comment line says what x, y and z are.
+def save_ply(path: str | os.PathLike[str], points: ArrayLike) -> None:
+    """Write an RDT cloud as a binary little-endian PLY; a comment line says what x, y and z are.
 
     Parameters
     ----------
-    path, points, axes, units
+    path, points
         As in `save_cloud_npz`; coordinates are written as double.
 
     Raises
@@ -57,8 +50,8 @@ def save_ply(
     InputError
         As in `save_cloud_npz`.
     """
-    places = _checked(points, axes, units)
-    meaning = ", ".join(f"{letter} = {axis} [{unit}]" for letter, axis, unit in zip("xyz", axes, units, strict=True))
+    places = _checked(points)
+    meaning = ", ".join(f"{letter} = {axis} [{unit}]" for letter, axis, unit in zip("xyz", RDT_AXES, RDT_UNITS, strict=True))
     header = (
         f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {meaning}\nelement vertex {len(places)}\n"
         "property double x\nproperty double y\nproperty double z\nend_header\n"
@@ -68,12 +61,10 @@ def save_ply(
         file.write(places.astype("<f8").tobytes())
 
 
-def _checked(points: ArrayLike, axes: Sequence[str], units: Sequence[str]) -> NDArray[np.float64]:
+def _checked(points: ArrayLike) -> NDArray[np.float64]:
     places = np.asarray(points, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
         raise InputError(f"cloud: points have shape {places.shape}; they must be (n, 3)")
     if not np.isfinite(places).all():
         raise InputError("cloud: points hold NaN or infinity; every coordinate must be finite")
-    if len(axes) != 3 or len(units) != 3:
-        raise InputError(f"cloud: {len(axes)} axes and {len(units)} units are named; give three of each")
     return places

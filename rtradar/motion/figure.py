@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 SIDES: Mapping[str, float] = {"l": 1.0, "r": -1.0}
 """Sign of y on each side."""
 
-ANKLE, SHANK, THIGH, SHOULDER, CHIN = 0.039, 0.246, 0.245, 0.818, 0.870
+ANKLE, SHANK, THIGH, SHOULDER = 0.039, 0.246, 0.245, 0.818
 HIP, ROOT = ANKLE + SHANK + THIGH, ANKLE + SHANK + THIGH + 0.04
 NECK_BASE, HEAD_BASE, TOE_HEIGHT = 0.83, 0.885, 0.012
 HIP_Y, SHOULDER_Y = 0.191 / 4, 0.129

@@ -34,13 +34,11 @@ def place(
     start_s: float = 0.0,
     duration_s: float | None = None,
     heading_deg: float = 0.0,
-    *,
-    walking: bool | None = None,
 ) -> Motion:
     """Cut an interval out of a recording and put it before the radar.
 
     The interval's mean horizontal root position goes to the origin; heights stay as recorded. One yaw turns the whole:
-    a walk moves along -x, toward the radar; everything else faces -x by the median heading of its hips.
+    a walk, as of `walk_direction`, moves along -x, toward the radar; everything else faces -x by the median heading of its hips.
 
     Parameters
     ----------
@@ -50,8 +48,6 @@ def place(
         The interval; to the end where no duration is given. ``start_s`` becomes time zero.
     heading_deg : float
         Added to the yaw, anticlockwise seen from above.
-    walking : bool, optional
-        Whether it walks, decided by `walk_direction` where not given.
 
     Returns
     -------
@@ -73,9 +69,7 @@ def place(
     roots = nodes.root_positions[inside]
     headings = hip_headings(nodes)[inside]
     facing = median_heading(headings)
-    direction = walk_direction(roots, headings) if walking is not False else None
-    if walking and direction is None:
-        direction = _farthest(roots)
+    direction = walk_direction(roots, headings)
     along = facing if direction is None else direction
     yaw = math.pi - math.atan2(along[1], along[0]) + math.radians(heading_deg)
     middle = roots.mean(axis=0)

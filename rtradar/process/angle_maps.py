@@ -60,8 +60,6 @@ def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
 def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     """Power over range and elevation, summed over cells; the z-line tells w = sin(elevation).
 
-    Parameters and result as in `range_azimuth`: (range, elevation) float64.
-
     Parameters
     ----------
     spectra : AngleSpectra

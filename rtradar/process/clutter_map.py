@@ -29,10 +29,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig_banded
-from scipy.optimize import brentq
 
 from rtradar.errors import InputError
-from rtradar.process.cfar_law import check_looks, check_pfa
+from rtradar.process.cfar_law import check_looks, check_pfa, multiplier
 from rtradar.process.clutter import check_time_constant
 from rtradar.process.tapers import hann
 from rtradar.radar import Radar
@@ -178,12 +177,7 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     def excess(log_alpha: float) -> float:
         return _log_rate(math.exp(log_alpha), parts, looks) - goal
 
-    low, high = -1.0, 1.0
-    while excess(low) < 0:
-        low -= 2.0
-    while excess(high) > 0:
-        high += 1.0
-    return math.exp(brentq(excess, low, high, xtol=1e-11, rtol=1e-13)) / total
+    return multiplier(excess, xtol=1e-11, rtol=1e-13) / total
 
 
 def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:

@@ -23,12 +23,12 @@ from rtradar.scatter.clutter_furniture import furniture_returns
 from rtradar.scatter.clutter_returns import RoomEchoes, sweep_nodes
 from rtradar.scatter.clutter_rough import rough_returns
 from rtradar.scatter.clutter_walls import mirror_returns
+from rtradar.scatter.path_account import MARGIN_DB
 from rtradar.scene import Scene
 from rtradar.trace.backend import select, use
 from rtradar.trace.room_tracer import RoomTracer
 
 MOST_ORDER = 3
-MARGIN_DB = 10.0
 
 
 @dataclass(frozen=True)

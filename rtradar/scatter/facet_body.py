@@ -42,7 +42,6 @@ class FacetBody:
     ----------
     variant : str
         Kind of the backend in use.
-    facets_per_part : int
     frequency : (node,) float64
         [Hz].
     """
@@ -51,7 +50,6 @@ class FacetBody:
         self._radar, self._semi_axes, self._spreading = radar, body.semi_axes, spreading
         count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
         self._facets = ellipsoid_facets(body.semi_axes, subdivisions_for(count))
-        self.facets_per_part = len(self._facets.faces)
         self.frequency = frequency_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
@@ -22,8 +23,8 @@ from rtradar.scatter.ghost_echoes import Nearby
 from rtradar.scatter.ghost_weights import weigh
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
-from rtradar.scatter.path_account import PathAccount, account
-from rtradar.scatter.path_anchors import PathAnchors, Poses, Surroundings, path_anchors
+from rtradar.scatter.path_account import MARGIN_DB, PathAccount, account
+from rtradar.scatter.path_anchors import PathAnchors, Surroundings, path_anchors
 from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
 from rtradar.scatter.wall_echoes import WallEchoes
 from rtradar.scatter.wall_nodes import frequency_nodes
@@ -87,7 +88,7 @@ class Multipath:
             raise InputError(f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3")
         if fidelity not in ("specular", "analytic"):
             raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: specular, analytic")
-        self._radar, self._body, self._spreading, self._fidelity = radar, body, spreading, fidelity
+        self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
         self._visibility: MirrorVisibility | None = None
         tracers = None
@@ -204,7 +205,7 @@ class Multipath:
 
     # -- what is worth its cost ------------------------------------------------------------------------------------
 
-    def prune(self, n_chirps: int, noise_power_m2: float, *, margin_db: float = 10.0) -> tuple[PathAccount, ...]:
+    def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathAccount, ...]:
         """Leave out echoes over walls that stay below the noise.
 
         Parameters
@@ -212,11 +213,9 @@ class Multipath:
         n_chirps : int
             Of the capture; one every 20 ms is looked at.
         noise_power_m2 : float
-            Per IF sample; 0 leaves out only what is never seen.
-        margin_db : float
-            An echo is left out where its mean power over the capture, after the gain of adding up the samples, cycles and
-            channels of a frame, is below the noise by more. Windows, which lose 1.8 dB each as Hann's, are not counted: what is
-            left out is weaker than that.
+            Per IF sample; 0 leaves out only what is never seen. Left out is an echo whose mean power over the capture, after
+            the gain of adding up the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the noise. Windows,
+            which lose 1.8 dB each as Hann's, are not counted: what is left out is weaker than that.
 
         Returns
         -------
@@ -231,11 +230,11 @@ class Multipath:
             power += (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2)).sum(axis=0)
         power /= len(chosen)
         gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
-        keep = (power > 0) & (power * gain >= noise_power_m2 * 10 ** (-margin_db / 10))
+        keep = (power > 0) & (power * gain >= noise_power_m2 * 10 ** (-MARGIN_DB / 10))
         keep |= np.array([self.paths[number].order == 0 for number in self._path])
         names = np.array(self._body.part_names, dtype=object)[self._part]
         accounts = tuple(
-            account(path, self._path == number, keep, power, names, noise_power_m2 / gain, margin_db)
+            account(path, self._path == number, keep, power, names, noise_power_m2 / gain)
             for number, path in enumerate(self.paths)
         )
         self._leave_out(keep)

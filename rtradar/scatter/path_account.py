@@ -11,6 +11,9 @@ from numpy.typing import NDArray
 
 from rtradar.scatter.wall_paths import WallPath
 
+MARGIN_DB = 10.0
+"""What a room returns is left out where it is further below the noise."""
+
 
 @dataclass(frozen=True)
 class PathAccount:
@@ -52,7 +55,6 @@ def account(
     power: NDArray[np.float64],
     names: NDArray[Any],
     noise: float,
-    margin_db: float,
 ) -> PathAccount:
     """Account of one path.
 
@@ -63,8 +65,6 @@ def account(
         Which echoes are of this path, which of all are kept, their power [m^2] and the names of their parts.
     noise : float
         Over the gain of processing [m^2].
-    margin_db : float
-        By which an echo must be below the noise to be left out.
     """
     total = float(power[own].sum())
     lost = own & ~keep
@@ -72,6 +72,6 @@ def account(
     if (power[lost] == 0).any():
         why.append("never seen: no mirror point in the wall, or in the shadow of furniture or body")
     if (power[lost] > 0).any():
-        why.append(f"more than {margin_db:g} dB below the noise after processing")
+        why.append(f"more than {MARGIN_DB:g} dB below the noise after processing")
     over = 10 * math.log10(total / noise) if total > 0 and noise > 0 else None
     return PathAccount(path.name, path.order, total, over, tuple(names[own & keep]), tuple(names[lost]), "; ".join(why))

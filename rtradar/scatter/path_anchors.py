@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body.body import Poses
 from rtradar.scatter.array_ends import ArrayEnds
 from rtradar.scatter.body_material import antenna_field, bisector, body_reflection
 from rtradar.scatter.mirror import mirror
@@ -29,17 +30,6 @@ Field = NDArray[np.complex128]
 
 _FLAT = 0.02
 """A factor that changes by less over the sweep, 0.2 dB, is made the same at all nodes: `synthesize` does such an echo faster."""
-
-
-class Poses(NamedTuple):
-    """Of the body at some anchors.
-
-    ``centres (anchor, part, 3)``, ``frames (anchor, part, 3, 3)``, ``semi_axes (part, 3)``, world [m].
-    """
-
-    centres: Array
-    frames: Array
-    semi_axes: Array
 
 
 class PathAnchors(NamedTuple):

@@ -18,6 +18,28 @@ def _part_key(part: int) -> str:
     return f"part{part:04d}"
 
 
+def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> Any:
+    """Tell Mitsuba of a mesh, for hits alone.
+
+    Parameters
+    ----------
+    mi : module
+        Mitsuba with its variant set.
+    vertices, faces : (vertex, 3) float64, (face, 3) int
+        Vertices near the origin, for they are rounded to float32.
+
+    Returns
+    -------
+    mitsuba.Mesh
+    """
+    mesh = mi.Mesh("triangles", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+    parameters = mi.traverse(mesh)
+    parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
+    parameters["faces"] = np.ravel(faces).astype(np.uint32)
+    parameters.update()
+    return mesh
+
+
 def build_body_scene(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer], n_parts: int) -> Any:
     """Build a Mitsuba scene of ``n_parts`` instances of one closed triangle mesh.
 
@@ -34,11 +56,7 @@ def build_body_scene(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.i
     -------
     mitsuba.Scene
     """
-    mesh = mi.Mesh("unit_sphere", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
-    parameters["faces"] = np.ravel(faces).astype(np.uint32)
-    parameters.update()
+    mesh = triangle_mesh(mi, vertices, faces)
     description: dict[str, Any] = {"type": "scene", "shapes": {"type": "shapegroup", "unit_sphere": mesh}}
     for part in range(n_parts):
         description[_part_key(part)] = {"type": "instance", "group": {"type": "ref", "id": "shapes"}}

@@ -93,11 +93,6 @@ class Wall:
         """Of one face [m^2]."""
         return float(np.linalg.norm(self.edge_u_m) * np.linalg.norm(self.edge_v_m))
 
-    @property
-    def stands_on_floor(self) -> bool:
-        """Whether it is upright and its lower edge lies in the floor, z = 0."""
-        return bool(abs(self.normal[2]) < _SQUARE and abs(self.corners[:, 2].min()) < 1e-6)
-
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points (..., 3) [m] lie inside the slab; shape (...).
 

@@ -11,6 +11,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.rays import rays_of
 
@@ -167,12 +168,7 @@ class MeshSurfaces:
         size = np.linalg.norm(across, axis=1, keepdims=True)
         self._normals = np.where(size > 0, across / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
         self._places = corners[:, 0]
-        mesh = mi.Mesh("target", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
-        parameters["faces"] = np.ravel(faces).astype(np.uint32)
-        parameters.update()
-        self._scene = mi.load_dict({"type": "scene", "target": mesh})
+        self._scene = mi.load_dict({"type": "scene", "target": triangle_mesh(mi, vertices - self._centre, faces)})
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """As `Surfaces.sees`."""

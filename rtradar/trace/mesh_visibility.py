@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import rays_of
 
 _NEAR = 1e-4
@@ -28,12 +29,7 @@ class MeshTracer:
         self._mi = mi
         self._centre = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
         self._ball = float(np.linalg.norm(vertices - self._centre, axis=1).max()) * 1.01
-        mesh = mi.Mesh("target", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
-        parameters["faces"] = np.ravel(faces).astype(np.uint32)
-        parameters.update()
-        self._scene = mi.load_dict({"type": "scene", "target": mesh})
+        self._scene = mi.load_dict({"type": "scene", "target": triangle_mesh(mi, vertices - self._centre, faces)})
 
     def sees(self, antenna: NDArray[np.float64], points: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.bool_]:
         """Whether an antenna (3,) sees points (n, 3) on these faces (n,) of the mesh; world [m]."""

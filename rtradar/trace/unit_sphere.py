@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
+from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import rays_of
 
 SUBDIVISIONS = 4
@@ -29,12 +30,7 @@ class UnitSphere:
     def __init__(self, mi: Any) -> None:
         self._mi = mi
         vertices, faces = unit_sphere(SUBDIVISIONS)
-        mesh = mi.Mesh("unit_sphere", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
-        parameters = mi.traverse(mesh)
-        parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
-        parameters["faces"] = np.ravel(faces).astype(np.uint32)
-        parameters.update()
-        self._scene = mi.load_dict({"type": "scene", "unit_sphere": mesh})
+        self._scene = mi.load_dict({"type": "scene", "unit_sphere": triangle_mesh(mi, vertices, faces)})
 
     def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which rays (7, ray) meet it: start and direction in its axes, and how far they go."""

@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -68,15 +70,15 @@ def test_frames_belong_to_the_bone(body: Body) -> None:
 
 def test_scaling() -> None:
     motion = synthetic_motion("walk", height_m=1.6, build=1.1)
-    plain, thick = Body.from_motion(motion), Body.from_motion(motion, girth=1.5)
+    plain, thick = Body.from_motion(motion), Body.from_motion(replace(motion, girth=1.5 * motion.girth))
     np.testing.assert_allclose(thick.semi_axes, plain.semi_axes * [1.5, 1.5, 1.0])
     assert plain.semi_axes[PART_NAMES.index("head"), 0] == pytest.approx(0.06 * 1.1 * 1.6 / 1.75)
-    big = Body.from_motion(motion, scale=1.2)
+    big = Body.from_motion(motion.scaled(1.2))
     np.testing.assert_allclose(big.semi_axes, plain.semi_axes * 1.2)
     np.testing.assert_allclose(big.at([1.0]).centres, plain.at([1.0]).centres * 1.2, atol=1e-12)
-    for arguments in ({"girth": 0.0}, {"scale": -1.0}, {"girth": float("nan")}):
+    for girth in (0.0, -1.0, float("nan")):
         with pytest.raises(InputError, match="positive"):
-            Body.from_motion(motion, **arguments)
+            Body.from_motion(replace(motion, girth=girth))
 
 
 def test_one_pose(body: Body) -> None:

@@ -24,7 +24,6 @@ from rtradar.trace.backend import Backend
 Array = NDArray[np.float64]
 C = 299_792_458.0
 ANTENNA = np.array([-4.0, 0.0, 0.0])
-NOBODY = np.array([False, False])
 seeds = st.integers(0, 2**32 - 1)
 
 

@@ -354,7 +354,7 @@ def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> No
     floor, left = (power[by_name(rung, f"{name} > body")] for name in ("floor", "left"))
     assert 0 < floor < left
     # A noise that the floor's echo is below by 11 dB, and the left wall's is not.
-    accounts = rung.prune(100, floor * gain * 10**1.1, margin_db=10.0)
+    accounts = rung.prune(100, floor * gain * 10**1.1)
     kept = rung.echoes(np.arange(20))
     names = {account.path: account for account in accounts}
     assert names["floor > body"].dropped == ("part 0",)

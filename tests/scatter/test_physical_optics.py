@@ -46,21 +46,6 @@ class Passing:
         return Poses(centres, frames, self.semi_axes)
 
 
-@dataclass(frozen=True)
-class Alone(Passing):
-    """The limb without the sphere."""
-
-    part_names: tuple[str, ...] = ("limb",)
-
-    @property
-    def semi_axes(self) -> Array:
-        return super().semi_axes[:1]
-
-    def at(self, times: Array) -> Poses:
-        both = super().at(times)
-        return Poses(both.centres[:, :1], both.frames[:, :1], self.semi_axes)
-
-
 def small_radar(**changes: object) -> rt.Radar:
     """Two Tx and two Rx a line, the ends of the paper's lines, in 1.5 ms cycles."""
     changes = {"tx_y": 2, "tx_z": 1, "rx_y": 2, "rx_z": 2, "chirp_duration_s": 0.5e-3} | changes

@@ -35,8 +35,6 @@ def test_a_wall() -> None:
     np.testing.assert_array_equal(made.normal, [1, 0, 0])
     np.testing.assert_array_equal(made.corners, [[1, 2, 0], [1, 5, 0], [1, 5, 2.5], [1, 2, 2.5]])
     assert made.area_m2 == 7.5
-    assert made.stands_on_floor
-    assert not wall(corner_m=(1, 2, 0.5)).stands_on_floor
     assert wall() == made
     assert hash(wall()) == hash(made)
 
@@ -107,7 +105,6 @@ def test_sides_of_a_room_are_where_their_names_say() -> None:
     expected = {"near": (0, -1), "far": (0, 3), "right": (1, -2), "left": (1, 1), "floor": (2, 0), "ceiling": (2, 2.5)}
     for name, (axis, place) in expected.items():
         assert np.all(walls[name].corners[:, axis] == place)
-    assert [name for name, made in walls.items() if made.stands_on_floor] == ["near", "far", "right", "left"]
     assert walls["floor"].thickness_m == pytest.approx(0.14)
 
 
