@@ -65,6 +65,21 @@ def test_table() -> None:
         assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(level)
 
 
+@pytest.mark.parametrize("cut", ["azimuth", "elevation"])
+def test_a_cut_that_is_left_out_is_flat(cut: str) -> None:
+    antenna = Antenna.of({"pattern": "table", "gain_dbi": 3, f"{cut}_deg": [0, 40], f"{cut}_db": [0, -8]})
+    for angle, level in ((0, 0), (20, -4), (40, -8)):
+        for other in (-30, 0, 60):
+            azimuth, elevation = (angle, other) if cut == "azimuth" else (other, angle)
+            assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(level, abs=1e-9)
+
+
+def test_an_isotropic_antenna_is_the_same_all_round() -> None:
+    everywhere = np.stack([towards(azimuth, elevation) for azimuth in (-120, 0, 77) for elevation in (-90, 0, 45)])
+    assert Antenna().relative(everywhere, "h").tolist() == [1.0] * 9
+    assert Antenna().peak_gain == 1
+
+
 @pytest.mark.parametrize(
     ("fields", "said"),
     [

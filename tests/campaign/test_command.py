@@ -94,6 +94,22 @@ def test_large_figures_are_said_in_large_units() -> None:
 
 
 @pytest.mark.parametrize(
+    ("seconds", "size", "said"),
+    [
+        (119.4, 999_400.0, "about 119 s on 1 worker, and 1.0 MB"),
+        (120.0, 999.9e6, "about 2 min on 1 worker, and 999.9 MB"),
+        (7199.0, 1e9, "about 120 min on 1 worker, and 1.0 GB"),
+        (7200.0, 15e6, "about 2.0 h on 1 worker, and 15.0 MB"),
+    ],
+)
+def test_units_change_where_two_of_the_next_are_full(seconds: float, size: float, said: str) -> None:
+    plan = {"samples": 3, "by": {}, "whole": 1, "damaged": 0, "made": 0, "missing": 2, "workers": 1}
+    told = in_words({**plan, "estimated_s": seconds, "estimated_bytes": size})
+    assert told == f"3 samples\n1 were there\n2 are missing: {said}"
+    assert in_words({**plan, "missing": 0, "estimated_s": 0.0, "estimated_bytes": 0.0}).endswith("\nnone is missing")
+
+
+@pytest.mark.parametrize(
     ("text", "options", "named"),
     [
         ("colour = 1", [], "colour"),

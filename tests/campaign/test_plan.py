@@ -109,6 +109,34 @@ def test_an_id_is_the_same_tomorrow() -> None:
     assert recipe.identity == "d0a8e28dc6775d9616b6"
 
 
+def test_what_is_drawn_is_the_same_tomorrow(tmp_path: Path) -> None:
+    (recipe,) = planned(tmp_path, HEAD + actors(1, "walk"))
+    # The first eight digits that sha256sum gives for (0, 'walk', 0), and for ('subject', 0).
+    assert recipe.parameters["seed"] == recipe.parameters["take"] == 0x94DE7F0B
+    take, subject = (np.random.default_rng([seed, 0]).random(8) for seed in (0x94DE7F0B, 0xC9D761C3))
+    told = {key: recipe.parameters[key] for key in ("heading_deg", "snr_db", "tempo", "amplitude", "build", "height_m")}
+    assert told == {
+        "heading_deg": round(-30 + 60 * take[0], 4),
+        "snr_db": round(10 + 20 * take[1], 4),
+        "tempo": round(0.8 + 0.45 * take[4], 4),
+        "amplitude": round(0.8 + 0.3 * take[5], 4),
+        "build": round(0.8 + 0.45 * subject[6], 4),
+        "height_m": round(1.55 + 0.4 * subject[7], 4),
+    }
+
+
+def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(tmp_path: Path) -> None:
+    drawn = "[drawn]\nheading_deg = [7, 7]\noffset_x_m = [0.25, 0.25]\noffset_y_m = [-0.5, -0.5]\n"
+    each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\nradar_position_m = [[-3, 0, 1.5]]\n"
+    (recipe,) = planned(tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk"))
+    told = recipe.parameters
+    assert (told["heading_deg"], told["snr_db"]) == (7, 3)
+    assert told["person_position_m"] == list(recipe.scene.person_position_m) == [1.25, 1.5]
+    assert told["radar_position_m"] == list(recipe.scene.radar_position_m or ()) == [-3, 0, 1.5]
+    (other,) = planned(tmp_path, HEAD + actors(1, "walk"))
+    assert other.parameters["radar_position_m"] == [-4, 1, 1]  # the radar's own
+
+
 def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
     found = planned(tmp_path, HEAD + actors(60, "walk", "kick"))
     for key, (low, high) in {

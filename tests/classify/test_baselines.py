@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+import math
+import statistics
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -53,11 +55,43 @@ def test_empty_clouds_and_single_points_have_features(made_up: Callable[..., Any
         assert np.isfinite(features).all()
 
 
-def test_metadata_of_every_kind_are_numbers(made_up: Callable[..., Any]) -> None:
-    clouds = made_up(per_class=2, views=2)
-    for row, snr in zip(clouds.rows, [float("inf"), None] * 6, strict=True):
-        row["snr_db"] = snr
-    features = metadata_features(clouds)
-    assert features.shape[0] == 12
-    assert np.isfinite(features).all()
-    assert len(np.unique(features, axis=1).T) > 3
+def shape_of(points: np.ndarray) -> list[float]:
+    """Spread, ends, percentiles and correlations by Python's own statistics."""
+    columns = [column.tolist() for column in points.T]
+    twentieths = [statistics.quantiles(column, n=20, method="inclusive") for column in columns]  # 5, 10, ... 95 %
+    percentiles = [[cuts[number] for cuts in twentieths] for number in (0, 4, 9, 14, 18)]
+    pairs = [statistics.correlation(columns[one], columns[other]) for one, other in ((0, 1), (0, 2), (1, 2))]
+    spread, least, most = ([of(column) for column in columns] for of in (statistics.pstdev, min, max))
+    return [*spread, *least, *most, *np.ravel(percentiles), *pairs]
+
+
+def test_features_by_the_book(made_up: Callable[..., Any]) -> None:
+    points = np.random.default_rng(5).normal([7.0, 4.0, 0.3], [0.3, 0.2, 1.5], (120, 3))
+    clouds = made_up(per_class=1)
+    clouds.points = clouds.spatial = lambda index: points
+    centred = points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]
+    slow = sum(abs(velocity) < 0.5 for velocity in points[:, 2]) / 120
+    first, last = points[:, 0].min(), points[:, 0].max()
+    eighths: list[list[float]] = [[] for _ in range(8)]
+    for time, _, velocity in points:
+        eighths[min(int((time - first) / (last - first) * 8), 7)].append(velocity)
+    moments = [value for some in eighths for value in (statistics.fmean(some), statistics.pstdev(some))]
+    # Sums of 120 numbers in another order.
+    np.testing.assert_allclose(rdt_features(clouds)[2], [*shape_of(centred), slow, *moments], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(spatial_features(clouds)[2], [*shape_of(centred), math.log(121)], rtol=1e-9, atol=1e-12)
+
+
+def test_metadata_are_numbers_as_they_are_and_names_a_column_each(made_up: Callable[..., Any]) -> None:
+    clouds = made_up(per_class=1)
+    told = [(math.inf, [1.0, 2.0], "rays"), (None, [3.0, 4.0], "auto"), (12.5, [5.0, 6.0], "rays")]
+    for row, (snr, place, fidelity) in zip(clouds.rows, told, strict=True):
+        row |= {"heading_deg": -9.0, "snr_db": snr, "person_position_m": place, "fidelity": fidelity}
+    # Duration, heading, SNR, both of the place, radar, scene, two fidelities; what is infinite or unknown stands far outside.
+    np.testing.assert_array_equal(
+        metadata_features(clouds),
+        [
+            [1.0, -9.0, 1e6, 1.0, 2.0, 1.0, 1.0, 0.0, 1.0],
+            [1.0, -9.0, -1e6, 3.0, 4.0, 1.0, 1.0, 1.0, 0.0],
+            [1.0, -9.0, 12.5, 5.0, 6.0, 1.0, 1.0, 0.0, 1.0],
+        ],
+    )

@@ -17,6 +17,10 @@ def test_one_cycle_rises_to_the_rate_and_ends_at_nothing() -> None:
     rates = [LEAN.rate_at(epoch, part / 10) for epoch in range(LEAN.epochs) for part in range(10)]
     top = rates.index(max(rates))
     assert rates[top] == pytest.approx(LEAN.rate)
+    assert top == len(rates) // 10
+    # Half of it half-way up, along a line, and half-way down, along a cosine, which is at 3/4 after a third.
+    halves = [LEAN.rate_at(epoch, part) for epoch, part in ((1, 0.5), (16, 0.5), (12, 0.0))]
+    assert halves == pytest.approx([LEAN.rate / 2, LEAN.rate / 2, LEAN.rate * 3 / 4])
     assert rates[: top + 1] == sorted(rates[: top + 1])
     assert rates[top:] == sorted(rates[top:], reverse=True)
     assert 0 < rates[0] < LEAN.rate / 50

@@ -38,11 +38,15 @@ def test_filled_repeats_rows_where_there_are_too_few(n: int) -> None:
 
 
 def test_every_row_is_as_likely() -> None:
-    counts = np.zeros(20)
+    counts, first = np.zeros(20), np.zeros(20)
     for seed in range(2000):
-        counts[stream(20, [7], 5, seed).rows()[:, 0].astype(int)] += 1
+        chosen = stream(20, [7], 5, seed).rows()[:, 0].astype(int)
+        counts[chosen] += 1
+        first[chosen[0]] += 1
     # 500 each, standard deviation sqrt(2000 x 1/4 x 3/4) = 19.4: five of them.
     assert np.abs(counts - 500).max() < 97
+    # And 100 each come first, standard deviation 9.7: the first part of a sample is a sample.
+    assert np.abs(first - 100).max() < 49
 
 
 @pytest.mark.parametrize(("n_rows", "seed"), [(0, 0), (1.5, 0), (True, 0), (3, -1)])
