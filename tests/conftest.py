@@ -11,6 +11,7 @@ from pathlib import Path
 import hypothesis
 import pytest
 
+import rtradar as rt
 from rtradar.trace.backend import Backend, available, select, use
 
 # The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
@@ -40,6 +41,25 @@ def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
     gc.collect()
     dr.sync_thread()
     dr.flush_malloc_cache()
+
+
+@pytest.fixture(scope="session")
+def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
+    """A small radar, and a scene of one metal wall on its left: few echoes, direct and over the wall."""
+    from rtradar.scene import Wall, material
+
+    radar = rt.Radar(
+        name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+    )
+    left = Wall(
+        name="left",
+        corner_m=(-4.4, 2.7, 0.0),
+        edge_u_m=(6.8, 0.0, 0.0),
+        edge_v_m=(0.0, 0.0, 2.5),
+        material=material("metal"),
+        thickness_m=0.01,
+    )
+    return radar, rt.Scene(name="one wall", walls=(left,))
 
 
 @pytest.fixture(scope="session")

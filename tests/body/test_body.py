@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -38,10 +39,15 @@ def test_21_parts_of_the_given_thickness(body: Body) -> None:
         assert a == b == expected[name]
 
 
+@cache
+def body_of(activity: str) -> Body:
+    return Body.from_motion(synthetic_motion(activity))
+
+
 @settings(max_examples=15)
 @given(st.sampled_from(list(ACTIVITIES)), st.floats(0.0, 1.0))
 def test_ellipsoids_sit_on_their_bones(activity: str, share: float) -> None:
-    body = Body.from_motion(synthetic_motion(activity))
+    body = body_of(activity)
     time = share * body.duration_s
     centres, frames, axes = body.at([time])
     joints, _ = body.motion.at([time])

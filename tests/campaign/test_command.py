@@ -5,13 +5,10 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
-from distributed import Client, LocalCluster
 
 from rtradar.campaign import in_words
 from rtradar.campaign.sample import Made, Recipe
@@ -32,34 +29,13 @@ def fake(recipe: Recipe) -> Made:
     return Made(Sample(np.zeros((3, 3)), recipe.label, recipe.parameters), np.zeros((0, 3)), 2.0)
 
 
-@pytest.fixture
-def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Clouds that cost nothing, made inside this process."""
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-
-        @contextmanager
-        def same(workers: object, scheduler: object) -> Iterator[Client]:
-            yield client
-
-        monkeypatch.setattr("rtradar.campaign.build.dask_client", same)
-        monkeypatch.setattr("rtradar.campaign.build.make", fake)
-        yield
-
-
-def test_a_plan_then_the_whole(here: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_plan_then_the_whole(
+    here: None, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rtradar.campaign.build.make", fake)
     (tmp_path / "set.toml").write_text(SPEC)
-    words = [
-        "dataset",
-        "build",
-        str(tmp_path / "set.toml"),
-        "--out",
-        str(tmp_path / "out"),
-        "--json",
-        str(tmp_path / "told.json"),
-    ]
+    words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
+    words += ["--json", str(tmp_path / "told.json")]
     assert main([*words, "--plan"]) == 0
     said = capsys.readouterr().out
     assert "12 samples\n  by label: walk 12\n" in said

@@ -7,15 +7,12 @@ import signal
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import cloudpickle
 import numpy as np
 import pytest
-from distributed import Client, LocalCluster
+from distributed import Client
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -72,27 +69,6 @@ def deadly(recipe: Recipe) -> Made:
 
 def contents(folder: Path) -> dict[str, bytes]:
     return {path.name: path.read_bytes() for path in folder.iterdir()}
-
-
-@pytest.fixture(scope="module")
-def client() -> Iterator[Client]:
-    """A cluster inside this process."""
-    with (
-        LocalCluster(n_workers=1, threads_per_worker=2, processes=False, dashboard_address="127.0.0.1:0") as cluster,
-        Client(cluster, set_as_default=False) as client,
-    ):
-        yield client
-
-
-@pytest.fixture
-def here(client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
-    """`build_dataset` works inside this process."""
-
-    @contextmanager
-    def same(workers: Any, scheduler: Any) -> Iterator[Client]:
-        yield client
-
-    monkeypatch.setattr(building, "dask_client", same)
 
 
 def test_what_is_missing_is_made_once(client: Client, tmp_path: Path) -> None:

@@ -15,31 +15,13 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.pipeline.view import load_linked, view
 from rtradar.report.linked_page import COLOURS
-from rtradar.scene import Scene, Wall, material
-
-RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
-)
-ROOM = Scene(
-    name="one wall",
-    walls=(
-        Wall(
-            name="left",
-            corner_m=(-4.4, 2.7, 0.0),
-            edge_u_m=(6.8, 0.0, 0.0),
-            edge_v_m=(0.0, 0.0, 2.5),
-            material=material("metal"),
-            thickness_m=0.01,
-        ),
-    ),
-)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("made")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
-    rt.run(motion, RADAR, ROOM, out=out, fidelity="analytic", clutter_removal="mean")
+    rt.run(motion, *beside_a_wall, out=out, fidelity="analytic", clutter_removal="mean")
     return out
 
 
@@ -159,10 +141,11 @@ def test_bad_options_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_moments_of_another_run_are_refused(made: Path, tmp_path: Path) -> None:
+def test_moments_of_another_run_are_refused(made: Path, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path) -> None:
+    radar, _ = beside_a_wall
     folder = tmp_path / "run"
     shutil.copytree(made, folder)
-    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.1), RADAR, out=tmp_path / "short", fidelity="analytic")
+    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.1), radar, out=tmp_path / "short", fidelity="analytic")
     shutil.copy(tmp_path / "short" / "maps.h5", folder / "maps.h5")
     with pytest.raises(rt.InputError, match="not of one run"):
         view(folder, page=tmp_path / "v.html")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import Any
 
@@ -12,36 +13,21 @@ import pytest
 import rtradar as rt
 from rtradar.pipeline.view import load_linked, view
 from rtradar.report.linked import Linked
-from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.scene import Furniture, material
 
 pytestmark = pytest.mark.slow
 
-RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
-)
-ROOM = Scene(
-    name="one wall & <b>",
-    walls=(
-        Wall(
-            name="left",
-            corner_m=(-4.4, 2.7, 0.0),
-            edge_u_m=(6.8, 0.0, 0.0),
-            edge_v_m=(0.0, 0.0, 2.5),
-            material=material("metal"),
-            thickness_m=0.01,
-        ),
-    ),
-    furniture=(Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, -1.0, 0.0)),),
-)
 FIGURE = "document.getElementById('scene-figure')"
 
 
 @pytest.fixture(scope="module")
-def seen(browser: Any, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Linked]:
+def seen(browser: Any, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Linked]:
     """Address of the page, and what it was made of."""
-    folder = tmp_path_factory.mktemp("seen")
+    folder, (radar, room) = tmp_path_factory.mktemp("seen"), beside_a_wall
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, -1.0, 0.0))
+    room = dataclasses.replace(room, name="one wall & <b>", furniture=(chair,))
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
-    rt.run(motion, RADAR, ROOM, out=folder, fidelity="analytic", clutter_removal="mean")
+    rt.run(motion, radar, room, out=folder, fidelity="analytic", clutter_removal="mean")
     view(folder, page=folder / "view.html")
     return (folder / "view.html").as_uri(), load_linked(folder)
 
@@ -78,8 +64,8 @@ def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, Link
         assert (picture.min(axis=2) < 0.8).sum() > 1000, name
 
 
-def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked]) -> None:
-    address, linked = seen
+def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked], beside_a_wall: tuple[rt.Radar, rt.Scene]) -> None:
+    (address, linked), (radar, _) = seen, beside_a_wall
     moments = linked.moments
     browser.open(f"{address}#t=0.1")
     pictures = []
@@ -92,7 +78,7 @@ def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked]) -> 
         # Direct paths: antenna, mirror point, gap, for each echo above the floor.
         own = np.flatnonzero(linked.seen[step] & moments.direct)
         lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(len(own), 3, 3)
-        np.testing.assert_allclose(lines[:, 0], np.broadcast_to(RADAR.position_m, (len(own), 3)), atol=1e-6)
+        np.testing.assert_allclose(lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6)
         np.testing.assert_allclose(lines[:, 1], moments.corners[step, own, 0], atol=1e-6)
         # Over the wall: antenna, wall and body or body and wall, antenna, gap.
         ghosts = np.flatnonzero(linked.seen[step] & ~moments.direct)
@@ -107,7 +93,7 @@ def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked]) -> 
         # The cursor on the spectrogram, and the points of this window in the cloud.
         cursor = browser.evaluate("document.getElementById('scene-spectrogram').layout.shapes[0].x0")
         assert cursor == pytest.approx(time, abs=1e-4)
-        near = np.abs(linked.rdt_points[:, 0] - time) <= RADAR.frame_duration_s / 2
+        near = np.abs(linked.rdt_points[:, 0] - time) <= radar.frame_duration_s / 2
         assert len(values(browser, "rdt", 1, "x")) == pytest.approx(near.sum(), abs=2)  # float32 at the ends of the window
         assert near.sum() > 10
         pictures.append([browser.picture(f"scene-{name}") for name in ("figure", "map", "rdt", "spectrogram")])
