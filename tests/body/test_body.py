@@ -95,6 +95,32 @@ def test_one_pose(body: Body) -> None:
         body.ellipsoids(99.0)
 
 
+MIRROR, STRETCH = np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 1.0 + 1e-5])
+
+
+@pytest.mark.parametrize(
+    ("changed", "said"),
+    [
+        ({"centres": np.zeros((2, 2))}, r"centres has shape \(2, 2\); it must be \('part', 3\)"),
+        ({"centres": np.zeros((3, 3))}, r"frames has shape \(2, 3, 3\)"),
+        ({"centres": np.zeros((0, 3)), "frames": np.zeros((0, 3, 3)), "semi_axes": np.zeros((0, 3))}, "at least 1 in part"),
+        ({"centres": 0.0}, r"centres has shape \(\)"),
+        ({"semi_axes": np.ones(3)}, r"semi_axes has shape \(3,\)"),
+        ({"centres": np.full((2, 3), np.inf)}, "centres holds NaN or infinity"),
+        ({"semi_axes": [[1.0, 1.0, np.nan]] * 2}, "semi_axes holds NaN or infinity"),
+        ({"semi_axes": [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]}, "the least is 0.0 m; every semi-axis must be positive"),
+        ({"frames": [np.eye(3), MIRROR]}, "orthonormal and right-handed"),
+        ({"frames": [STRETCH, np.eye(3)]}, "orthonormal and right-handed"),
+        ({"frames": [np.eye(3), -np.eye(3)]}, "orthonormal and right-handed"),
+    ],
+)
+def test_what_is_no_pose_is_refused(changed: dict[str, object], said: str) -> None:
+    good = {"centres": np.zeros((2, 3)), "frames": [np.eye(3)] * 2, "semi_axes": np.ones((2, 3))}
+    with pytest.raises(InputError, match=said):
+        Ellipsoids(**(good | changed))  # type: ignore[arg-type]
+    Ellipsoids(**good | {"frames": [np.eye(3) + 1e-7] * 2})  # type: ignore[arg-type]  # rounding is none
+
+
 def test_left_is_left(body: Body) -> None:
     centres = body.at([0.0]).centres[0]
     # Facing -x, toward the radar, the left side is -y.

@@ -17,7 +17,7 @@ from rtradar.process.angle import angle, angle_spectra
 from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
 from rtradar.process.cells import cell_spectra
 from rtradar.process.peaks import find_peaks
-from rtradar.process.steering import range_walk, sine_grid, taper_weights, virtual_lines
+from rtradar.process.steering import measures_angle, range_walk, sine_grid, taper_weights, virtual_lines
 from rtradar.radar import Radar
 
 Array = NDArray[np.float64]
@@ -164,6 +164,16 @@ def test_one_line_alone(channels: str) -> None:
     azimuth, elevation = angle(echo(upright, place_of(4.0, 0.0, -15.0)), upright, 4.0, 0.0)
     assert azimuth == 0
     assert math.degrees(elevation) == pytest.approx(-15, abs=0.05)
+
+
+@pytest.mark.parametrize("array", [{"tx_y": 1, "rx_y": 2}, {"tx_y": 2, "rx_y": 1}], ids=str)
+def test_two_channels_are_a_line(array: dict[str, int]) -> None:
+    radar = dataclasses.replace(SHORT, tx_z=0, rx_z=0, tx_spacing_wavelengths=0.5, **array)
+    assert measures_angle(radar)
+    line = virtual_lines(radar)[0]
+    assert line is not None
+    np.testing.assert_allclose(np.diff(line.tx_m + line.rx_m), [C / 12e9 / 2], rtol=1e-9)
+    assert not measures_angle(dataclasses.replace(radar, tx_y=1, rx_y=1))
 
 
 def test_all_channels_give_the_angles_of_the_pairs() -> None:

@@ -84,6 +84,12 @@ def test_channels_are_tx_times_rx() -> None:
     assert lit.tolist() == [2 * SMALL.n_rx + 1]
 
 
+@pytest.mark.parametrize(("given", "kind"), [("f4", "c8"), ("c8", "c8"), ("f8", "c16"), ("c16", "c16")])
+def test_single_stays_single_and_double_double(given: str, kind: str) -> None:
+    ones = np.ones((3, SMALL.n_rx, SMALL.samples_per_chirp), given)
+    assert range_doppler(ones, SMALL).values.dtype == np.dtype(kind)
+
+
 def test_linear() -> None:
     a, b = noise(SMALL, 30, 1), noise(SMALL, 30, 2)
     together = range_doppler((2 - 1j) * a + b, SMALL).values
@@ -166,7 +172,9 @@ def test_one_cycle_is_enough() -> None:
         (lambda: range_doppler(noise(SMALL, 30), SMALL, range_window=np.zeros(32)), "weight"),
         (lambda: range_spectrum(noise(SMALL, 30), Radar.preset("paper-12ghz")), "needs"),
         (lambda: power_map(np.zeros((10, 2, 3, 32), complex), SMALL), "needs"),
+        (lambda: power_map(np.zeros((0, 3, 2, 32), complex), SMALL), ">= 1, 3, 2"),
         (lambda: power_map(np.zeros((10, 3, 2, 32), complex), SMALL, channel=6), "0 to 5"),
+        (lambda: power_map(np.zeros((10, 3, 2, 32), complex), SMALL, channel=-1), "0 to 5"),
     ],
 )
 def test_bad_input_is_refused(call, message: str) -> None:
