@@ -22,7 +22,6 @@ from rtradar.clouds import Collection, Sample
 from rtradar.clouds.collection_index import write_index
 from rtradar.clouds.sample import write_sample
 from rtradar.errors import InputError
-from rtradar.files import read_json
 from rtradar.motion import load_motion
 from rtradar.radar import Radar
 from rtradar.scene import Scene
@@ -178,8 +177,6 @@ def test_files_that_are_too_large_are_refused_with_the_limit(tmp_path: Path) -> 
     for read in (Radar.load, Scene.load, read_spec):
         with pytest.raises(InputError, match="larger than 1 MB"):
             read(sparse(tmp_path / "x.toml", 10**10))
-    with pytest.raises(ValueError, match="more than 100 MB"):
-        read_json(sparse(tmp_path / "x.json", 10**10))
 
 
 BVH_HEAD = "HIERARCHY\nROOT hip\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
