@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -11,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.checks import check_number, shown
 from rtradar.errors import InputError
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
@@ -53,23 +53,23 @@ class Antenna:
 
     def __post_init__(self) -> None:
         if self.pattern not in _PATTERNS:
-            raise InputError(f"antenna: pattern = {self.pattern!r}; allowed: {', '.join(_PATTERNS)}")
+            raise InputError(f"antenna: pattern = {shown(self.pattern)}; allowed: {', '.join(_PATTERNS)}")
         if (self.exponent is not None) != (self.pattern == "cosine"):
             raise InputError(
-                f"antenna: pattern = '{self.pattern}' with exponent = {self.exponent}; only 'cosine' has one, and needs it"
+                f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only 'cosine' has one, and needs it"
             )
         if self.exponent is not None:
-            object.__setattr__(self, "exponent", _number("exponent", self.exponent, 0, _MOST_EXPONENT))
+            object.__setattr__(self, "exponent", check_number("antenna", "exponent", self.exponent, 0, _MOST_EXPONENT))
         if self.gain_dbi is not None:
-            object.__setattr__(self, "gain_dbi", _number("gain_dbi", self.gain_dbi, -100, 100))
+            object.__setattr__(self, "gain_dbi", check_number("antenna", "gain_dbi", self.gain_dbi, -100, 100))
         elif self.pattern == "table":
             raise InputError("antenna: pattern = 'table' needs gain_dbi, the gain at its peak")
         for cut in _CUTS:
             values = getattr(self, cut)
             if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
-                raise InputError(f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {str(values)[:60]!r}")
+                raise InputError(f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {shown(values)}")
             limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
-            object.__setattr__(self, cut, tuple(_number(cut, value, *limits) for value in values))
+            object.__setattr__(self, cut, tuple(check_number("antenna", cut, value, *limits) for value in values))
         for name in ("azimuth", "elevation"):
             angles, levels = getattr(self, f"{name}_deg"), getattr(self, f"{name}_db")
             if len(angles) != len(levels) or (np.diff(angles) <= 0).any():
@@ -98,7 +98,7 @@ class Antenna:
         known = [field.name for field in dataclasses.fields(cls)]
         for key in table:
             if key not in known:
-                raise InputError(f"antenna: unknown key '{key}'; allowed: {', '.join(known)}")
+                raise InputError(f"antenna: unknown key {shown(key)}; allowed: {', '.join(known)}")
         return cls(**table)
 
     @property
@@ -139,12 +139,3 @@ class Antenna:
         if self.elevation_deg:
             level += np.interp(np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1))), self.elevation_deg, self.elevation_db)
         return np.asarray(10 ** (level / 10))
-
-
-def _number(name: str, value: object, least: float, most: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
-        raise InputError(f"antenna: {name} = {str(value)[:60]!r}; it must be a number")
-    number = float(value)
-    if not (math.isfinite(number) and least <= number <= most):
-        raise InputError(f"antenna: {name} = {number:g}; it must lie between {least:g} and {most:g}")
-    return number
