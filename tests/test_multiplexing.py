@@ -249,6 +249,8 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
     [
         ({"multiplexing": "cdm"}, "allowed: tdm, fdm, ddm"),
         ({"multiplexing": "fdm", "carrier_step_hz": 4e6}, "bands of the IF are 4.096e"),
+        ({"multiplexing": "fdm", "carrier_step_hz": 12e9 / 5.5}, "at no positive frequency"),
+        ({"multiplexing": "fdm", "start_frequency_hz": 20e6}, "12 carriers 4.096e.06 Hz apart begin 2.25"),
         ({"carrier_step_hz": 4e6}, "belongs to multiplexing = 'fdm'"),
         ({"multiplexing": "fdm", "doppler_bands": 16}, "belongs to multiplexing = 'ddm'"),
         ({"multiplexing": "ddm", "channels": "all", "doppler_bands": 12}, "above 12, the number of Tx"),

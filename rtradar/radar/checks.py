@@ -117,6 +117,7 @@ def check_multiplexing(
     multiplexing: str,
     *,
     carrier_step_hz: Any,
+    start_frequency_hz: float,
     sample_rate_hz: float,
     doppler_bands: Any,
     n_tx: int,
@@ -131,6 +132,8 @@ def check_multiplexing(
     multiplexing : {"tdm", "fdm", "ddm"}
     carrier_step_hz, doppler_bands : number or None
         As given.
+    start_frequency_hz : float
+        Where the sweep begins, in the middle of all carriers [Hz].
     sample_rate_hz : float
         Width of an IF band [Hz].
     n_tx : int
@@ -149,6 +152,14 @@ def check_multiplexing(
             f"radar '{name}': carrier_step_hz = {shown(carrier_step_hz)}; bands of the IF are {sample_rate_hz:g} Hz wide "
             "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
         )
+    if multiplexing == "fdm":
+        step = sample_rate_hz if carrier_step_hz is None else carrier_step_hz
+        below = (n_tx - 1) / 2 * step
+        if below >= start_frequency_hz:
+            raise InputError(
+                f"radar '{name}': {n_tx} carriers {step:g} Hz apart begin {below:g} Hz below start_frequency_hz = "
+                f"{start_frequency_hz:g}, at no positive frequency; raise that, or set them nearer (carrier_step_hz)"
+            )
     if doppler_bands is not None and not (_is_count(doppler_bands) and n_tx < doppler_bands <= _MOST):
         raise InputError(
             f"radar '{name}': doppler_bands = {shown(doppler_bands)}; it must be a whole number above {n_tx}, the number of Tx"

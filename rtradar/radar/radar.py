@@ -94,6 +94,7 @@ class Radar(Schedule):
             self.name,
             self.multiplexing,
             carrier_step_hz=self.carrier_step_hz,
+            start_frequency_hz=self.start_frequency_hz,
             sample_rate_hz=self.sample_rate_hz,
             doppler_bands=self.doppler_bands,
             n_tx=self.n_tx,
