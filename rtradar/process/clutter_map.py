@@ -74,7 +74,7 @@ class ClutterMap:
         if scale is not None and not 0 < scale < math.inf:
             raise InputError(f"clutter map: scale = {scale!r}; a multiplier must be positive and finite")
         self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
-        hops = check_time_constant(time_constant_s) / (_hop(radar) * radar.cycle_duration_s)
+        hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
         self._share = -math.expm1(-1 / hops)
         self._memory = math.ceil(min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS))  # windows that the law looks at
         self._apart = _windows_apart(radar)
@@ -206,7 +206,7 @@ def _scale_after(count: int, share: float, radar: Radar, pfa: float, looks: int)
     band[0] = root**2
     if len(band) > 1:
         n = radar.cycles_per_frame
-        starts = radar.window_starts((math.ceil(count * _hop(radar)) + n) * radar.n_tx)[:count]
+        starts = radar.window_starts((math.ceil(count * radar.hop_cycles) + n) * radar.n_tx)[:count]
         shared = np.append(np.correlate(hann(n), hann(n), "full")[n - 1 :], 0.0) / (hann(n) ** 2).sum()
         for lag in range(1, len(band)):
             apart = np.minimum(starts[lag:] - starts[:-lag], n)
@@ -215,11 +215,6 @@ def _scale_after(count: int, share: float, radar: Radar, pfa: float, looks: int)
     return clutter_map_scale(np.maximum(spread, 0.0), pfa, looks)  # zeros come out as rounding
 
 
-def _hop(radar: Radar) -> float:
-    """Cycles from one window to the next, not rounded; every cycle starts a window where the hop is shorter."""
-    return max(1.0, radar.frame_hop_s / radar.cycle_duration_s)
-
-
 def _windows_apart(radar: Radar) -> int:
     """How many windows on one shares no chirp with this one; the windows of the schedule are rounded to whole cycles."""
-    return math.ceil(radar.cycles_per_frame / _hop(radar) * (1 - 1e-12))
+    return math.ceil(radar.cycles_per_frame / radar.hop_cycles * (1 - 1e-12))

@@ -115,13 +115,13 @@ class SlidingWindows:
         return count
 
     def _start_of(self, candidate: int) -> int:
-        return round(candidate * (self._radar.frame_hop_s / self._radar.cycle_duration_s))
+        return round(candidate * self._radar.hop_cycles)
 
     def _next_start(self) -> int | None:
         """First cycle of the next window if its last chirp is there; the rule of `Radar.window_starts`, step by step."""
-        hop = self._radar.frame_hop_s / self._radar.cycle_duration_s
         last = self.n_chirps // self._radar.n_tx - self._radar.cycles_per_frame
-        while self._candidate <= math.floor((last + 0.5) / hop) and (start := self._start_of(self._candidate)) <= last:
+        newest = math.floor((last + 0.5) / self._radar.hop_cycles)
+        while self._candidate <= newest and (start := self._start_of(self._candidate)) <= last:
             self._candidate += 1
             if start > self._last_start:
                 self._last_start = start

@@ -75,6 +75,11 @@ class Schedule(CrossArray):
         return cycles - cycles % self.n_doppler_bands
 
     @property
+    def hop_cycles(self) -> float:
+        """Cycles from one window to the next, not rounded; a hop below one cycle reaches every cycle, as one of a cycle does."""
+        return max(1.0, self.frame_hop_s / self.cycle_duration_s)
+
+    @property
     def chirps_per_frame(self) -> int:
         """Chirps in the whole cycles of one frame."""
         return self.cycles_per_frame * self.n_tx
@@ -153,9 +158,8 @@ class Schedule(CrossArray):
         last = n_chirps // self.n_tx - self.cycles_per_frame
         if last < 0:
             return np.zeros(0, dtype=np.int64)
-        # A hop below one cycle reaches every cycle, as one of a cycle does.
-        hop = max(1.0, self.frame_hop_s / self.cycle_duration_s)
-        starts = np.rint(np.arange(math.floor((last + 0.5) / hop) + 1) * hop).astype(np.int64)
+        candidates = np.arange(math.floor((last + 0.5) / self.hop_cycles) + 1)
+        starts = np.rint(candidates * self.hop_cycles).astype(np.int64)
         return np.unique(starts[starts <= last])
 
     def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:

@@ -54,6 +54,13 @@ def test_any_cut_gives_the_windows_of_the_schedule(data: st.DataObject) -> None:
     assert stream.n_chirps == n_chirps
 
 
+def test_a_hop_far_below_a_cycle_costs_no_more_than_one_of_a_cycle() -> None:
+    radar = tiny_radar(2, 3, 1e-5)
+    stream = SlidingWindows(radar)
+    assert [start for _, start, _ in stream.push(numbered(40, radar))] == list(range(18)) == radar.window_starts(40).tolist()
+    assert stream._candidate <= 18
+
+
 @pytest.mark.parametrize("preset", ["paper-12ghz", "paper-77ghz"])
 def test_presets(preset: str) -> None:
     radar = Radar.preset(preset)
