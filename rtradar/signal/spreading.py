@@ -31,6 +31,9 @@ MOST_NODES = 6
 _TAPS = 16
 """Cells that an echo is spread over: with twice as many cells as samples, what is left out is 1e-8 of the echo."""
 
+LEAST_SAMPLES = _TAPS
+"""In a chirp: of half as many an echo would go round the grid, and of a quarter more than once."""
+
 _BEFORE = _TAPS // 2 - 1
 """Cells before that of the echo."""
 
@@ -63,6 +66,7 @@ def spread_sum(
     start_frequency, slope, sample_rate : float
         [Hz], [Hz/s], [Hz].
     out : (chirp, rx, sample) complex64
+        Of `LEAST_SAMPLES` or more.
     """
     chirps, receivers, samples = out.shape
     cells, half = fft.next_fast_len(2 * samples), samples // 2

@@ -12,7 +12,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
-from rtradar.signal.spreading import MOST_NODES, spread_sum
+from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
 from rtradar.signal.tones import LANES, POWERS, add_tones
 from rtradar.threads import in_threads
 
@@ -64,8 +64,8 @@ def synthesize(
         Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
         Of the samples. Phases are float64 in both. For complex64, samples are added up in float32, to 1e-6 of the sum of the
-        magnitudes: by `spread_sum` from `MANY_ECHOES` on, with at most 6 frequencies, else where amplitudes are given at 3
-        frequencies at most.
+        magnitudes: by `spread_sum` from `MANY_ECHOES` and 16 samples on, with at most 6 frequencies, else where amplitudes are
+        given at 3 frequencies at most.
 
     Returns
     -------
@@ -95,7 +95,8 @@ def synthesize(
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
     out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
-    many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES and out.dtype == np.complex64
+    many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES
+    many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES
     length, powers = np.ascontiguousarray(echoes.length), _powers_of_sample_number(echoes.frequency, radar)
     waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
     if many:

@@ -15,6 +15,7 @@ from rtradar.signal import synthesize
 from rtradar.signal.synthesis import MANY_ECHOES
 
 LOW = Radar.preset("paper-12ghz")
+FEW, TWO, ONE = (Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=n, bandwidth_hz=1e8) for n in (16, 2, 1))
 ODD = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=45, frame_duration_s=3.75e-3)
 
 
@@ -51,7 +52,7 @@ def plain(echoes: Echoes, radar: Radar) -> NDArray[np.complex128]:
 
 # One grid up to three nodes, two up to six; beyond, no grid. Ten times the rounding of complex64.
 @pytest.mark.parametrize("nodes", [1, 2, 3, 4, 6, 7])
-@pytest.mark.parametrize("radar", [LOW, ODD], ids=["12ghz", "45 samples"])
+@pytest.mark.parametrize("radar", [LOW, ODD, FEW, TWO, ONE], ids=["12ghz", "45 samples", "16 samples", "2", "1"])
 def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int) -> None:
     echoes = crowd(radar, nodes, seed=nodes)
     expected = plain(echoes, radar)
