@@ -26,6 +26,7 @@ SIDE_LOBE_DB = 25.0
 """Side lobes of the Taylor taper below the main lobe, in the far field."""
 
 _OVERSAMPLING = 4  # sines for each resolution cell of the longest line
+_MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.5 million
 _TAYLOR_EQUAL_LOBES = 4
 
 
@@ -115,10 +116,22 @@ def _line(radar: Radar, axis: int) -> Line | None:
 
 @lru_cache(maxsize=16)
 def sine_grid(radar: Radar) -> NDArray[np.float64]:
-    """Uniform grid of sines (sine,) within the unambiguous angle, fine enough for a parabola through three of them."""
+    """Uniform grid of sines (sine,) within the unambiguous angle, fine enough for a parabola through three of them.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no line at all, or one so long that there would be no end of sines.
+    """
     largest = np.sin(np.radians(radar.max_angle_deg))
     apertures = [np.ptp(line.tx_m + line.rx_m) / radar.wavelength_m for line in virtual_lines(radar) if line is not None]
     half = int(np.ceil(_OVERSAMPLING * largest * max(apertures))) + 1
+    elements = max(len(line.channels) for line in virtual_lines(radar) if line is not None)
+    if (2 * half + 1) * elements * radar.samples_per_chirp > _MOST_WEIGHTS:
+        raise InputError(
+            f"angle: radar '{radar.name}' has a line {max(apertures):.3g} wavelengths long, whose beams are too many to keep; "
+            "lessen tx_spacing_wavelengths or rx_spacing_wavelengths"
+        )
     grid = np.linspace(-largest, largest, 2 * half + 1)
     grid.flags.writeable = False
     return grid

@@ -290,6 +290,12 @@ def test_maps_sum_over_cells_and_name_the_line_that_is_missing() -> None:
     assert flat.max() > 0
 
 
+def test_a_line_too_long_for_its_beams_to_be_kept_is_refused() -> None:
+    wide = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=1e9)
+    with pytest.raises(InputError, match=r"a line 1.17e\+09 wavelengths long.* lessen tx_spacing_wavelengths"):
+        sine_grid(wide)
+
+
 def test_the_grid_of_sines_ends_at_the_unambiguous_angle() -> None:
     grid = sine_grid(LOW)
     assert grid[-1] == pytest.approx(0.857, abs=1e-3)  # 12 / 14: half a wavelength of the start is 0.583 of the centre's
