@@ -76,11 +76,11 @@ class Capture:
 
     @property
     def block(self) -> int:
-        """Chirps whose echoes are made at once: a hop of the windows."""
-        return math.ceil(self.radar.frame_hop_s / self.radar.cycle_duration_s) * self.radar.n_tx
+        """Chirps whose echoes are made at once: a hop of the windows, but no more than one of them holds."""
+        return min(math.ceil(self.radar.hop_cycles), self.radar.cycles_per_frame) * self.radar.n_tx
 
     def stream(self, taker: Taker, kept: Any = None, *, progress: bool = True) -> None:
-        """Echoes a hop of the windows at a time, and from them IF samples, noise and range spectra by smaller pieces.
+        """Echoes `block` chirps at a time, and from them IF samples, noise and range spectra by smaller pieces.
 
         Parameters
         ----------

@@ -53,7 +53,7 @@ def prepare(
 
     Parameters are those of `rtradar.run`, and so are the errors.
     """
-    _check(snr_db, pfa, seed)
+    _check(snr_db, pfa, seed, noise_power_m2)
     if isinstance(snr_db, str):
         if not spreading:
             raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
@@ -100,7 +100,7 @@ def prepare(
     if noise_power_m2 is not None:
         noise = Noise(noise_power_m2, seed)
     elif isinstance(snr_db, str):
-        noise = Noise(radar.noise_power_w / radar.watts_per_m2, seed)
+        noise = _physical_noise(radar, surveyed.power, seed)
     else:
         noise = Noise.for_snr(surveyed.power, snr_db, seed)
     inside = None
@@ -136,12 +136,24 @@ def prepare(
     )
 
 
-def _check(snr_db: float | Literal["physical"], pfa: float, seed: int) -> None:
+def _physical_noise(radar: Radar, echo_power_m2: float, seed: int) -> Noise:
+    power = radar.noise_power_w / radar.watts_per_m2
+    if power > echo_power_m2 * 10 ** (_MAX_SNR_DB / 10):
+        raise InputError(
+            f"snr_db = physical: noise of radar '{radar.name}' is more than {_MAX_SNR_DB:g} dB above the echo; look at "
+            "transmit_power_dbm, noise_figure_db, noise_temperature_k and gain_dbi"
+        )
+    return Noise(power, seed)
+
+
+def _check(snr_db: float | Literal["physical"], pfa: float, seed: int, noise_power_m2: float | None) -> None:
     if isinstance(snr_db, str):
         if snr_db != "physical":
             raise InputError(f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)")
     elif not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
         raise InputError(f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)")
+    if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
+        raise InputError(f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0")
     if not 0 < pfa < 1:
         raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
     if seed < 0:

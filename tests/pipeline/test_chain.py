@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import math
 from pathlib import Path
@@ -13,6 +14,7 @@ import pytest
 import zarr
 
 import rtradar as rt
+from rtradar.antenna import Antenna
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline import clouds_of
 
@@ -113,6 +115,8 @@ def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
     [
         ({"snr_db": math.nan}, "snr_db = nan"),
         ({"snr_db": 1e4}, "snr_db"),
+        ({"noise_power_m2": -1.0}, "noise_power_m2 = -1"),
+        ({"noise_power_m2": math.nan}, "noise_power_m2 = nan"),
         ({"pfa": 1.0}, "pfa = 1"),
         ({"seed": -1}, "seed = -1"),
         ({"fidelity": "perfect"}, "allowed: analytic-paper, analytic, specular"),
@@ -125,6 +129,22 @@ def test_bad_values_are_refused_and_leave_nothing(tmp_path: Path, options: dict[
     with pytest.raises(InputError, match=says):
         run(tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
+
+
+def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(tmp_path: Path) -> None:
+    faint = dataclasses.replace(RADAR, transmit_power_dbm=-200.0, noise_figure_db=100.0, tx_antenna=Antenna(gain_dbi=-100))
+    with pytest.raises(InputError, match="more than 200 dB above the echo; look at transmit_power_dbm"):
+        rt.run(MOTION, faint, out=tmp_path / "out", fidelity="analytic", duration_s=0.1, snr_db="physical")
+    assert not (tmp_path / "out").exists()
+
+
+def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(tmp_path: Path) -> None:
+    rare = dataclasses.replace(RADAR, frame_hop_s=1e6)
+    result = rt.run(MOTION, rare, out=tmp_path / "out", fidelity="analytic", duration_s=0.13, save_if=True)
+    assert result.summary["windows"] == 1
+    array = zarr.open_array(tmp_path / "out" / "if.zarr", mode="r")
+    assert array.chunks == (200, 4, 128)
+    assert (np.abs(array[:]) > 0).all()
 
 
 @pytest.mark.parametrize(("lines", "there"), [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})])
