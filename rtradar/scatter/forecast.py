@@ -10,7 +10,7 @@ is taken to be G V; then
     all of optics    G V / (2 k rho)          the next term of its expansion, rho the mean radius of curvature
     physical-optics  1.5 % of G V: about what its interpolation leaves (``validation/ladder.py``)
 
-and that of `reference` is 0, for it is what errors are held against.
+and that of `reference` is 0, for it is what errors are held against. All of it through the patterns of the radar's antennas.
 """
 
 from __future__ import annotations
@@ -27,10 +27,12 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.array_nodes import array_nodes
 from rtradar.scatter.fresnel_meridians import RIM
 from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.mirror import mirror
+from rtradar.scatter.poses import ChirpPoses
 from rtradar.trace.clearance import clearance
 
 WAYS = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
@@ -85,8 +87,10 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     at = (tx, rx[:, None], np.repeat(poses.centres, pairs, axis=0), np.repeat(poses.frames, pairs, axis=0), poses.semi_axes)
     far_length, far = far_field_echo(*at, spreading=spreading)
     length, near, _ = mirror(*at, polarization=radar.polarization, spreading=spreading)
-    turned = (far * np.exp(1j * wavenumber * (far_length - length))).reshape(times, pairs, parts)
-    near = near.reshape(times, pairs, parts)
+    # What a tolerance is held against is what the antennas let through.
+    gain = leg_gain(radar, ChirpPoses(np.zeros(len(tx), dtype=np.int64), *at))
+    turned = (gain * far * np.exp(1j * wavenumber * (far_length - length))).reshape(times, pairs, parts)
+    near = (gain * near).reshape(times, pairs, parts)
 
     share, seen, radius, hiders = _views(radar, poses, wavenumber)
     free = (near**2).mean(axis=1)

@@ -1,5 +1,6 @@
 """The rung that chooses: what it tells beforehand, what it chooses, and what it hands on."""
 
+import dataclasses
 import itertools
 from dataclasses import dataclass
 
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import rtradar as rt
+from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
@@ -51,6 +53,18 @@ def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
     assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
     assert told.true[0, 0] == pytest.approx(np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02)
     assert told.wrong[0, SPECULAR, 0] == 0
+
+
+def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
+    poses = two_spheres(1.0)
+    beam = dataclasses.replace(RADAR, tx_antenna=Antenna(pattern="cosine", exponent=9.0))
+    told, plain = (forecast(radar, poses) for radar in (beam, RADAR))
+    way = poses.centres[0] - np.asarray(RADAR.position_m)
+    # By the directions of the centres; those of the mirror points lie up to a degree beside them.
+    expected = (way[:, 0] / np.linalg.norm(way, axis=1)) ** 9
+    for name in ("true", "wrong", "optics", "power"):
+        before, after = getattr(plain, name)[0], getattr(told, name)[0]
+        np.testing.assert_allclose(after, before * expected, rtol=0.05, err_msg=name)
 
 
 def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_mirror_point_errs_by_half() -> None:
