@@ -115,7 +115,7 @@ def spectrogram(
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
     values = values.astype(np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False)
     starts = np.arange(0, len(values) - window + 1, hop)
-    return Spectrogram(_columns(values, starts, window, radar), _times(starts, radar, tx, window), radar.velocity_mps(window))
+    return Spectrogram(_columns(values, starts, window, radar, tx), _times(starts, radar, tx, window), radar.velocity_mps(window))
 
 
 class SlidingSpectrogram:
@@ -179,7 +179,7 @@ class SlidingSpectrogram:
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
-        power = _columns(cycles, starts, self._window, radar)
+        power = _columns(cycles, starts, self._window, radar, self._tx)
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop
@@ -206,7 +206,9 @@ def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDA
     return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
 
 
-def _columns(signals: NDArray[np.complexfloating], starts: NDArray[np.int64], window: int, radar: Radar) -> NDArray[np.floating]:
+def _columns(
+    signals: NDArray[np.complexfloating], starts: NDArray[np.int64], window: int, radar: Radar, tx: int
+) -> NDArray[np.floating]:
     """Power (time, velocity) of the windows that begin at these rows of the signals (cycle, range)."""
     real = np.float32 if signals.dtype == np.complex64 else np.float64
     weights = (hann(window) / hann(window).sum()).astype(real)[:, None]
@@ -217,7 +219,9 @@ def _columns(signals: NDArray[np.complexfloating], starts: NDArray[np.int64], wi
         parts = spectra.view(real)
         squares = np.square(parts, out=parts)
         if radar.multiplexing == "ddm":
-            own = without_copies(squares[:, ::2] + squares[:, 1::2], radar, 1) / radar.n_tx
+            # Rows of a Tx hold all of them, turned back by its code: by so many bands.
+            received = np.roll(squares[:, ::2] + squares[:, 1::2], tx * window // radar.n_doppler_bands, axis=0)
+            own = without_copies(received, radar, 1) / radar.n_tx
             power[row] = own.sum(axis=1)
         else:
             power[row] = squares.sum(axis=1)
