@@ -15,8 +15,10 @@ from scipy.integrate import quad
 import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.scatter import build_rung, chirp_poses
-from rtradar.scatter.antenna_gain import mirror_points
+from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.antenna_gain import leg_gain, mirror_points
 from rtradar.scatter.mirror import mirror
+from rtradar.scatter.poses import ChirpPoses
 
 BODY = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
 
@@ -152,6 +154,14 @@ def test_directions_are_those_of_the_mirror_points() -> None:
     assert (ways - exact).min() > -1e-9
     assert (ways - exact).max() < 5e-3
     assert np.median(ways - exact) < 1e-4
+
+
+def test_a_part_straight_between_tx_and_rx_has_no_echo_and_no_nan() -> None:
+    ahead, across = np.array([[2.0, 1.0, 0.0]]), np.array([0.0, 1.0, 0.0])
+    pose = (ahead[:, None], np.eye(3)[None, None], np.full((1, 3), 0.1))
+    at = ChirpPoses(np.zeros(1, dtype=np.int64), ahead + across, (ahead - across)[None], *pose)
+    shaped = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, rx_antenna=Antenna(pattern="dipole"))
+    np.testing.assert_array_equal(leg_gain(shaped, at) * far_field_echo(*at[1:])[1], 0)
 
 
 def test_patterns_are_refused_where_paths_lead_over_walls(tmp_path: Path) -> None:
