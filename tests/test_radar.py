@@ -435,6 +435,9 @@ def test_numpy_scalars_do_as_well() -> None:
     assert (type(radar.bandwidth_hz), type(radar.tx_y)) == (float, int)
     assert radar.position_m == (-4.0, 1.0, 1.0)
     assert all(type(value) is float for value in radar.position_m)
+    fdm = Radar(multiplexing="fdm", carrier_step_hz=np.float32(5e6))  # type: ignore[arg-type]
+    ddm = Radar(multiplexing="ddm", channels="all", doppler_bands=np.int64(16))  # type: ignore[arg-type]
+    assert (type(fdm.carrier_step_hz), type(ddm.doppler_bands)) == (float, int)
 
 
 def test_a_hop_far_below_a_cycle_takes_every_cycle() -> None:

@@ -74,6 +74,11 @@ def checked_values(values: Mapping[str, Any]) -> dict[str, Any]:
         if not (_is_number(value) and least <= value <= most):
             raise InputError(f"{radar}: {field} = {shown(value)}; it must lie between {least} and {most:g}")
         found[field] = float(value)
+    # What they may be hangs on other fields; `check_multiplexing` says.
+    if _is_number(values["carrier_step_hz"]):
+        found["carrier_step_hz"] = float(values["carrier_step_hz"])
+    if _is_count(values["doppler_bands"]):
+        found["doppler_bands"] = int(values["doppler_bands"])
     return found | {field: _antenna(radar, field, values[field]) for field in ("tx_antenna", "rx_antenna")}
 
 

@@ -48,7 +48,7 @@ class Schedule(CrossArray):
         """How far the sweep of each Tx lies above that of `start_frequency_hz`, (tx,) [Hz]; their mean is 0."""
         if self.multiplexing != "fdm":
             return np.zeros(self.n_tx)
-        step = self.sample_rate_hz if self.carrier_step_hz is None else float(self.carrier_step_hz)
+        step = self.sample_rate_hz if self.carrier_step_hz is None else self.carrier_step_hz
         return np.asarray((np.arange(self.n_tx) - (self.n_tx - 1) / 2) * step)
 
     @property
@@ -66,7 +66,7 @@ class Schedule(CrossArray):
         """Bands of the Doppler axis under DDM, else 1."""
         if self.multiplexing != "ddm":
             return 1
-        return self.n_tx + math.ceil(self.n_tx / 3) if self.doppler_bands is None else int(self.doppler_bands)
+        return self.n_tx + math.ceil(self.n_tx / 3) if self.doppler_bands is None else self.doppler_bands
 
     @property
     def cycles_per_frame(self) -> int:
