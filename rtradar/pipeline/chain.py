@@ -26,7 +26,7 @@ from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
 from rtradar.pipeline.room_pictures import draw_room_pictures
-from rtradar.pipeline.summary import cost, summary_of
+from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
 from rtradar.process import build_detector
@@ -230,6 +230,6 @@ def run(
                 rdt_points=clouds.rdt.points,
                 spatial=clouds.spatial,
             )
-        text = json.dumps(summary | spent(), indent=2, allow_nan=False)
+        text = json.dumps(summary | spent(), indent=2, allow_nan=False, default=plain)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     return Result(clouds.rdt.points, json.loads(text), capture.survey, Path(out))

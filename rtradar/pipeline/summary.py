@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any
 
+import numpy as np
+
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.cloud_maker import Clouds
 from rtradar.pipeline.timing import Stages, peak_memory_mb
@@ -56,6 +58,13 @@ def summary_of(
         **({"modelled": capture.rung.account()} if isinstance(capture.rung, Accountable) else {}),
         **({"room": capture.inside.account} if capture.inside else {}),
     }
+
+
+def plain(value: object) -> Any:
+    """For JSON, which knows no scalars of NumPy: seeds from ``np.arange``, a rung's account."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a {type(value).__name__} has no place in summary.json")
 
 
 def _watts(capture: Capture) -> dict[str, float]:

@@ -110,6 +110,13 @@ def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
     assert sum(result.summary["stages"].values()) < result.summary["wall_s"]
 
 
+def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
+    result, _ = run(tmp_path / "out", seed=np.int64(3), snr_db=np.int32(15), duration_s=np.float32(0.25), keep_all=np.True_)
+    assert result.summary["seed"] == 3
+    assert {name: result.summary["parameters"][name] for name in ("snr_db", "keep_all")} == {"snr_db": 15, "keep_all": True}
+    assert "np." not in (tmp_path / "out" / "report.html").read_text().partition('id="report-data"')[0]
+
+
 @pytest.mark.parametrize(
     ("options", "says"),
     [
