@@ -58,8 +58,9 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
     # Out and back over the same walls is as far as the other way round: one mark, with their names.
     by_walls = {_walls(ghost.path): ghost for ghost in found}
     marked = [(walls, ghost.range_m, ghost.velocity_mps) for walls, ghost in by_walls.items()]
-    drawn["Range-Doppler before and after, and ghosts"] = folder / "clutter_removal.png"
-    draw_before_after(drawn["Range-Doppler before and after, and ghosts"], panels, marked, radar, moment)
+    shown = f"Range-Doppler{' before and after' if len(panels) > 1 else ''}, and ghosts"
+    drawn[shown] = folder / "clutter_removal.png"
+    draw_before_after(drawn[shown], panels, marked, radar, moment)
     if azimuth_map is not None and azimuth is not None:
         drawn["Range-azimuth with walls and ghosts"] = folder / "range_azimuth_walls.png"
         places = [(ghost.path, ghost.range_m, ghost.azimuth_rad) for ghost in found]

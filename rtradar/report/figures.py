@@ -61,7 +61,7 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
         extent=(*bin_edges(slow_time), *bin_edges(radar.range_m)),
     )
     axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
-    figure.colorbar(image, label="Power [dB re 1 m²]")
+    figure.colorbar(image, label="Power, mean of channels [dB re 1 m²]")
     figure.savefig(path)
 
 
@@ -89,10 +89,10 @@ def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np
     rows, columns = np.nonzero(mask)
     right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections")
     right.legend(loc="upper right")
-    for axes, name in ((left, "Power, all channels"), (right, "OS-CFAR")):
+    for axes, name in ((left, "Power"), (right, "Detections, over the map in grey")):
         axes.set(xlabel="Velocity [m/s], positive receding", title=name)
     left.set_ylabel("Range [m]")
-    figure.colorbar(image, ax=[left, right], label="Power [dB re 1 m²]")
+    figure.colorbar(image, ax=[left, right], label="Power, all channels [dB re 1 m²]")
     figure.suptitle(title)
     figure.savefig(path)
 

@@ -102,21 +102,24 @@ def draw_before_after(
         extent = (*bin_edges(velocity), *bin_edges(radar.range_m))
         image = axes.imshow(levels[name][0], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
         rows, columns = np.nonzero(mask)
-        axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5)
+        axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected")
         _mark(axes, ghosts, radar)
         axes.set(xlabel="Velocity [m/s], positive receding", title=f"{name}: {len(rows)} detections")
         axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
     panels[0].set_ylabel("Range [m]")
-    figure.colorbar(image, ax=list(panels), label="Power [dB re 1 m²]")
+    panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white", markerscale=2)
+    figure.colorbar(image, ax=list(panels), label="Power, all channels [dB re 1 m²]")
     figure.suptitle(title)
     figure.savefig(path)
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
-    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range."""
+    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range; one for a legend."""
+    label = "ghost over a wall, predicted"
     for name, distance, across in ghosts:
         if distance < radar.max_range_m:
-            axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9)
+            axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9, label=label)
+            label = ""
             axes.annotate(name, (across, distance), xytext=(6, 3), textcoords="offset points", fontsize=6, color="red")
 
 
