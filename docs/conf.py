@@ -34,6 +34,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "gallery",
     "gallery_dirs": "auto_gallery",
     "filename_pattern": r"[0-9]_\w+\.py",
+    "within_subsection_order": "FileNameSortKey",  # else by length, and the training before its data set
     "abort_on_example_error": True,
     "download_all_examples": False,
     "write_computation_times": False,

@@ -39,6 +39,11 @@ def test_there_is_one_for_each_step() -> None:
     assert [name[0] for name in SCRIPTS] == list("123456789")
 
 
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_it_runs_where_its_page_is_made(name: str) -> None:
+    assert "__file__" not in (GALLERY / f"{name}.py").read_text()  # sphinx-gallery runs a script's text, and defines no such name
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SCRIPTS)
 def test_it_runs_and_draws(name: str, out: Path, tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ command line: ``rtradar train out/gallery/small --out out/trained --split subjec
 import os
 import runpy
 import shutil
+import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
@@ -19,7 +20,7 @@ from rtradar.clouds import Collection
 
 OUT = Path(os.environ.get("RTRADAR_GALLERY_OUT", "out/gallery"))
 if not (OUT / "small").exists():
-    runpy.run_path(str(Path(__file__).with_name("7_build_a_data_set.py")))
+    runpy.run_path(str(Path(sys.argv[0]).with_name("7_build_a_data_set.py")))
 
 # %%
 # A recipe is all that decides what comes of a training; fewer points and epochs than its own are enough here.
