@@ -63,7 +63,7 @@ motion = rt.load_motion(amc, skeleton=asf)
 # A body at any time: 21 ellipsoids. `place` puts the interval before the radar, as `rt.run` does.
 length = min(SECONDS, motion.duration_s)
 body = rt.Body.from_motion(place(motion, 0.0, length))
-figure = plt.figure(figsize=(8, 4), layout="constrained")
+figure = plt.figure(figsize=(8, 3.4), layout="constrained")
 for column, time in enumerate((0.0, length / 4, length / 2), start=1):
     axes = figure.add_subplot(1, 3, column, projection="3d")
     vertices, faces = ellipsoid_meshes(body.ellipsoids(time), subdivisions=2)
@@ -72,5 +72,5 @@ for column, time in enumerate((0.0, length / 4, length / 2), start=1):
     axes.set(title=f"{time:.2f} s", xlim=(-1, 1), ylim=(-1, 1), zlim=(0, 2), xticks=[], yticks=[], zticks=[])
     axes.set_box_aspect((1, 1, 1), zoom=1.4)
     axes.view_init(elev=8, azim=190)
-figure.suptitle(amc.name)
+figure.suptitle(f"{amc.name}: 21 ellipsoids, in boxes of 2 m")
 figure.savefig(OUT / "2_own_recording.png")

@@ -26,7 +26,7 @@ _GROWING = ("time", "slow_time", "spectrogram_time")
 
 _MAPS = {
     "range_doppler": (("time", "range", "velocity"), np.float32, "m2", "power summed over all channels"),
-    "detections": (("time", "range", "velocity"), np.uint8, "1", "1 where the detector finds something"),
+    "detections": (("time", "range", "velocity"), np.uint8, "1", "1 where a target is detected"),
     "range_time": (("slow_time", "range"), np.float32, "m2", "power averaged over channels and a few cycles"),
     "spectrogram": (("spectrogram_time", "spectrogram_velocity"), np.float32, "m2", "power of one channel summed over range"),
     "range_azimuth": (("time", "range", "azimuth"), np.float32, "m2", "power summed over detected cells"),
@@ -35,7 +35,7 @@ _MAPS = {
 
 _SINGLE = {
     "range_doppler_received": (("range", "velocity"), np.float32, "m2", "range_doppler of one window before clutter was removed"),
-    "detections_received": (("range", "velocity"), np.uint8, "1", "1 where the detector finds something in range_doppler_received"),
+    "detections_received": (("range", "velocity"), np.uint8, "1", "1 where a target is detected in range_doppler_received"),
     "range_azimuth_received": (("range", "azimuth"), np.float32, "m2", "range_azimuth of that window before clutter was removed"),
 }
 

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
+from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
@@ -45,11 +46,13 @@ def draw_plan(
     axes = figure.subplots()
     for first, last, name in walls_in_plan(scene):
         axes.plot(*zip(first, last, strict=True), color="black", linewidth=2.5)
-        axes.annotate(name, ((first[0] + last[0]) / 2, (first[1] + last[1]) / 2), fontsize=7, color="dimgrey")
+        box = {"facecolor": "white", "edgecolor": "none", "pad": 1}
+        axes.annotate(name, tuple((first + last) / 2), fontsize=7, color="dimgrey", ha="center", va="center", bbox=box)
     for piece in scene.furniture:
         corners = piece.triangles().corners[..., :2]
         axes.add_collection(PolyCollection(list(corners), color="tan", alpha=0.5, linewidth=0))
         axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
+    axes.set_prop_cycle(color=colormaps["tab20"].colors)  # more than ten paths
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
     axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
@@ -107,7 +110,7 @@ def draw_before_after(
         axes.set(xlabel="Velocity [m/s], positive receding", title=f"{name}: {len(rows)} detections")
         axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
     panels[0].set_ylabel("Range [m]")
-    panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white", markerscale=2)
+    panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, ax=list(panels), label="Power, all channels [dB re 1 m²]")
     figure.suptitle(title)
     figure.savefig(path)
@@ -165,5 +168,7 @@ def draw_range_azimuth_with_walls(
             axes.annotate(name, (angle[middle], distance[middle]), fontsize=8, color="white")
     _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
     axes.set(xlabel="Azimuth [°]", ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")
     figure.savefig(path)
