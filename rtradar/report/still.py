@@ -47,6 +47,10 @@ def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "pa
     _draw_cloud(views[2], linked, step, paint)
     _draw_spectrogram(figure, views[3], linked, step)
     paint.legend(figure, views)
+    for artist in (one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)):
+        # A long box in 3D is wider than its axes, at whose edge the body would be cut; the layout knows the box already.
+        artist.set_clip_on(False)
+        artist.set_in_layout(False)
     with atomic_file(path) as file:
         figure.savefig(file, format="png")
 

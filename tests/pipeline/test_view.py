@@ -10,6 +10,8 @@ import h5py
 import matplotlib.image
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import rtradar as rt
 from rtradar.cli import main
@@ -74,6 +76,17 @@ def test_a_still_shows_the_moment_in_those_colours(made: Path, tmp_path: Path, c
     assert first.shape == second.shape
     assert (first != second).any(axis=2).sum() > 1000
     assert (np.ptp(first[..., :3], axis=2) > 0.25).sum() > 5000
+
+
+def test_a_still_cuts_no_body_at_the_edge_of_its_axes(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[Figure] = []
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *given, **more: (drawn.append(figure), save(figure, *given, **more)))
+    view(made, still=tmp_path / "a.png", time_s=0.1)
+    views = [axes for axes in drawn[0].axes if axes.name == "3d"]
+    parts = sum(isinstance(artist, Poly3DCollection) for artist in views[0].collections)
+    assert parts >= 21
+    assert not any(artist.get_clip_on() for axes in views for artist in (*axes.collections, *axes.lines))
 
 
 def test_the_command_writes_what_it_is_asked_for(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
