@@ -52,7 +52,7 @@ def draw_plan(
         corners = piece.triangles().corners[..., :2]
         axes.add_collection(PolyCollection(list(corners), color="tan", alpha=0.5, linewidth=0))
         axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
-    axes.set_prop_cycle(color=colormaps["tab20"].colors)  # more than ten paths
+    axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])  # more than ten paths
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
     axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
