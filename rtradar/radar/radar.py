@@ -98,7 +98,7 @@ class Radar(Schedule):
             sample_rate_hz=self.sample_rate_hz,
             doppler_bands=self.doppler_bands,
             n_tx=self.n_tx,
-            all_heard=not (self.rx_of_tx != self.rx_of_tx[0]).any(),
+            all_heard=self.channels == "all" or not (self.tx_y and self.tx_z),
         )
         if self.cycles_per_frame < 1:
             raise InputError(
