@@ -6,6 +6,8 @@ whose POINT:Y_SCREEN says that y is up is turned.
 
 from __future__ import annotations
 
+import io
+import os
 import re
 import warnings
 from dataclasses import dataclass
@@ -15,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from rtradar.checks import shown
 from rtradar.errors import InputError
 from rtradar.motion.axes import to_world
 from rtradar.motion.markers import NEEDED, joint_centres
@@ -101,7 +104,7 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
     if path.is_dir():
         raise InputError(f"{path}: a directory; give one C3D file")
     try:
-        with path.open("rb") as handle, warnings.catch_warnings(record=True) as caught:
+        with _Bounded(io.FileIO(path)) as handle, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             labels, points, rate_hz, first, unit, upward = _read(handle)
     except OSError as error:
@@ -160,6 +163,13 @@ def bridged(seen: Markers) -> NDArray[np.float64]:
     return positions
 
 
+class _Bounded(io.BufferedReader):
+    """A file that gives no more than it has: for what a damaged one promises, Python would first take the memory."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        return super().read(size if size is None or size < 0 else min(size, os.fstat(self.fileno()).st_size))
+
+
 def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, str, str]:
     """Labels, points (frame, point, 5), rate, first frame, unit, and which axis is up, as the file says."""
     import c3d  # not before a file asks for it
@@ -181,9 +191,9 @@ def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, s
 def _column(path: Path, labels: list[str], name: str) -> int:
     found = [k for k, label in enumerate(labels) if re.sub(r"^.*:", "", label.strip(" \0")).upper() == name]
     if not found:
-        some = ", ".join(label.strip(" \0") for label in labels[:4])
+        some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
         raise InputError(
-            f"{path}: marker {name} is missing ({len(labels)} there: {some[:60]}, ...); the 41 markers of CMU and HDM05 are "
+            f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers of CMU and HDM05 are "
             "understood, rename or add it"
         )
     if len(found) > 1:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.motion import load_motion
-from rtradar.motion.c3d import LONGEST_GAP_S, read_markers
+from rtradar.motion.c3d import LONGEST_GAP_S, _Bounded, read_markers
 from rtradar.motion.joints import to_nodes
 from rtradar.motion.markers import CENTRES, NEEDED, SHANK_M
 from rtradar.motion.names import NODES
@@ -198,6 +199,24 @@ def test_what_is_no_person_is_refused(tmp_path: Path, walk: np.ndarray) -> None:
     (tmp_path / "cut.c3d").write_bytes(data[: len(data) // 2])
     with pytest.raises(InputError, match=r"ends after \d+ frames where its header promises more"):
         load_motion(tmp_path / "cut.c3d", unit_m=1.0)
+
+
+def test_names_of_two_lines_are_told_in_one(tmp_path: Path, walk: np.ndarray) -> None:
+    names = ["two\x1clines" if name == "LKNE" else name for name in ["LKNE", *(name for name in HDM05 if name != "LKNE")]]
+    with pytest.raises(InputError, match="marker LKNE is missing") as caught:
+        load_motion(write(tmp_path / "walk.c3d", walk, names))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+def test_a_file_gives_no_more_than_it_has(tmp_path: Path) -> None:
+    """Damaged rates make the reader ask for terabytes, for which Python takes the memory before it looks."""
+    (tmp_path / "x.c3d").write_bytes(b"12345")
+    with _Bounded(io.FileIO(tmp_path / "x.c3d")) as file:
+        assert file.read(2) == b"12"
+        assert file.read(10**15) == b"345"
+        assert file.read(10**15) == b""
+        file.seek(1)
+        assert file.read() == b"2345"
 
 
 @pytest.fixture(scope="module")
