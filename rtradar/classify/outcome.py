@@ -19,6 +19,8 @@ from rtradar.files import atomic_file, read_json
 HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "seconds")
 """What was measured in every epoch."""
 
+_MOST_CHARACTERS = 100_000_000
+
 
 @dataclass(frozen=True)
 class Outcome:
@@ -91,13 +93,28 @@ def load_outcome(path: Path) -> Outcome:
         content = read_json(path)
         kinds = {"indices": np.int64, "truth": np.int64, "predicted": np.int64, "tested_on": np.str_, "recordings": np.str_}
         for name, kind in kinds.items():
-            content[name] = np.array(content[name], dtype=kind)
+            content[name] = _column(content[name], kind)
         outcome = Outcome(**content)
         if not _is_whole(outcome):
             raise ValueError
         return outcome
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
         raise InputError(f"'{path}' is damaged; remove it and train again: what is done is kept in its checkpoint") from None
+
+
+def _column(values: Any, kind: Any) -> NDArray[Any]:
+    """One value a cloud; TypeError or ValueError where they are of another kind, or a name so long that it is none."""
+    if not isinstance(values, list) or not all(type(one) is (str if kind is np.str_ else int) for one in values):
+        raise TypeError
+    # NumPy takes as much memory for each name as for the longest.
+    if kind is np.str_ and len(values) * max(map(len, values), default=0) > _MOST_CHARACTERS:
+        raise ValueError
+    return np.array(values, dtype=kind)
+
+
+def _is_number(value: Any) -> bool:
+    """NaN and infinity are: a training may go wrong."""
+    return isinstance(value, float) or (isinstance(value, int) and abs(value) < 2**53)
 
 
 def _is_whole(outcome: Outcome) -> bool:
@@ -108,8 +125,8 @@ def _is_whole(outcome: Outcome) -> bool:
         and isinstance(outcome.trained_on, str)
         and all(column.shape == (len(outcome.truth),) for column in columns)
         and len(outcome.truth) > 0
-        and min(outcome.truth.min(), outcome.predicted.min()) >= 0
+        and min(outcome.indices.min(), outcome.truth.min(), outcome.predicted.min()) >= 0
         and isinstance(outcome.history, list)
         and all(isinstance(row, dict) and set(row) == set(HISTORY) for row in outcome.history)
-        and all(isinstance(value, int | float) for row in outcome.history for value in row.values())
+        and all(_is_number(value) for row in outcome.history for value in row.values())
     )
