@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import secrets
 import shutil
+import sys
 import tempfile
 import threading
+import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 
@@ -98,6 +104,84 @@ def read_json(path: Path) -> Any:
         return json.loads(path.read_text(encoding="utf-8"))
     except RecursionError:
         raise ValueError("nested too deep") from None
+
+
+def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArray[Any]]:
+    """All arrays of a NumPy archive that may be anybody's, by their names; none of Python objects.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    ValueError
+        Where it is no such archive, is damaged, claims more than it holds, or is larger than ``most_bytes`` once unpacked.
+    """
+    found = {}
+    with path.open("rb") as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
+                    raise ValueError(f"it claims more than {most_bytes / 1e6:g} MB")
+                for entry in archive.infolist():
+                    if entry.filename.endswith(".npy"):
+                        with archive.open(entry) as member:
+                            _check_claim(member, entry.file_size)
+                            member.seek(0)
+                            array = np.lib.format.read_array(member, allow_pickle=False)
+                            _check_text(array)
+                            found[entry.filename.removesuffix(".npy")] = array
+        except OSError:
+            raise
+        except Exception as error:  # what readers of archives and of headers raise at damaged ones is of any type
+            raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
+    return found
+
+
+def _check_claim(member: Any, size: int) -> None:
+    """Raise where an array would take more memory than its file has: NumPy takes it before it looks."""
+    version = np.lib.format.read_magic(member)
+    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read_header(member)
+    if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
+        raise ValueError("it claims more than it holds")
+
+
+def _check_text(array: NDArray[Any]) -> None:
+    """Raise where a text holds a number that is no character: Python cannot even show it."""
+    if array.dtype.kind == "U" and array.dtype.itemsize:
+        letters = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("="))).reshape(-1, 1).view(np.uint32)
+        if ((letters > sys.maxunicode) | ((letters >= 0xD800) & (letters < 0xE000))).any():
+            raise ValueError("a text holds what is no character")
+
+
+def stored(file: Any, name: str) -> Any:
+    """A dataset of an open HDF5 file that may be anybody's, if all that it claims is in that file.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Of those that rtradar writes, whose arrays are not packed.
+    name : str
+
+    Returns
+    -------
+    h5py.Dataset
+
+    Raises
+    ------
+    KeyError
+        Where there is none.
+    ValueError
+        Where it is no dataset, lies in another file, or is larger than its file.
+    """
+    import h5py
+
+    data = file[name]
+    if not isinstance(data, h5py.Dataset) or data.file.filename != file.filename or data.external or data.is_virtual:
+        raise ValueError(f"{name} is not in this file")
+    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > os.stat(file.filename).st_size:
+        raise ValueError(f"{name} claims more than there is")
+    return data
 
 
 @contextmanager

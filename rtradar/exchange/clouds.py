@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds import RDT_AXES, RDT_UNITS
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, read_arrays
 
 _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
 """What a spatial cloud tells of its points beside their places."""
@@ -20,7 +20,8 @@ _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
 _PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4", "double": "<f8",
 }  # fmt: skip
-_MEANING = re.compile(r"(\w+) = (\w+) \[([^\]]*)\]")
+_MEANING = re.compile(r"\b(\w{1,64}) = (\w{1,64}) \[([ -\\^-~]{0,64})\]", re.ASCII)
+"""Of one column; bounded, for to look for longer words in a hostile comment takes the square of its length."""
 _MOST_HEADER_BYTES = 65536
 
 
@@ -89,15 +90,16 @@ def write_pcd(path: Path, cloud: CloudTable) -> dict[str, Any]:
 
 def read_npz(path: Path) -> CloudTable:
     """A cloud of a run or a collection; errors of many kinds where it is none."""
-    # Opened here: NumPy leaves a file that is no archive open.
-    with path.open("rb") as file, np.load(file, allow_pickle=False) as archive:
-        points = np.asarray(archive["points"], dtype=np.float64)
-        known = [name for name in _EXTRA_UNITS if name in archive and archive[name].shape == points.shape[:1]]
-        axes = tuple(map(str, archive["axes"])) if "axes" in archive else RDT_AXES
-        units = tuple(map(str, archive["units"])) if "units" in archive else RDT_UNITS
-        columns = [np.asarray(archive[name], dtype=np.float64) for name in known]
+    arrays = read_arrays(path)
+    points = np.asarray(arrays["points"], dtype=np.float64)
+    known = [name for name in _EXTRA_UNITS if name in arrays and arrays[name].shape == points.shape[:1]]
+    axes = tuple(map(str, arrays["axes"])) if "axes" in arrays else RDT_AXES
+    units = tuple(map(str, arrays["units"])) if "units" in arrays else RDT_UNITS
+    columns = [np.asarray(arrays[name], dtype=np.float64) for name in known]
     if points.ndim != 2 or points.shape[1] != 3 or len(axes) != 3 or len(units) != 3:
         raise ValueError(f"points have shape {points.shape}")
+    if not all(_MEANING.fullmatch(f"x = {axis} [{unit}]") for axis, unit in zip(axes, units, strict=True)):
+        raise ValueError("axes or units are no short words")
     extra_units = tuple(_EXTRA_UNITS[name] for name in known)
     return CloudTable((*axes, *known), (*units, *extra_units), np.column_stack([points, *columns]))
 

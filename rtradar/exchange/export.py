@@ -40,6 +40,7 @@ _DAMAGE = (
     IndexError,
     TypeError,
     EOFError,
+    OverflowError,
     RuntimeError,
     zipfile.BadZipFile,
     zlib.error,
@@ -110,7 +111,7 @@ def read_if(path: str | Path) -> IfCube:
     if place.is_dir():
         recording = open_recording(place)
         tx, (chirps, *rest) = recording.radar.n_tx, recording.shape
-        return IfCube(recording.stored[: chirps * tx].reshape(chirps, *rest), recording.radar)
+        return IfCube(recording.read(0, chirps * tx).reshape(chirps, *rest), recording.radar)
     return _read(place, {suffix: reader for suffix, (_, reader) in IF_FORMATS.items()}, "IF samples")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -73,9 +74,12 @@ def read_int16(path: Path) -> IfCube:
     about = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
     shape = tuple(map(int, about["shape"]))
     whole = np.fromfile(path, dtype="<i2")
-    if len(shape) != 5 or whole.size != np.prod(shape):
+    if len(shape) != 5 or min(shape) < 0 or shape[4] != 2 or whole.size != math.prod(shape):
         raise ValueError(f"{whole.size} numbers where the JSON file tells of {shape}")
-    parts = (whole.astype(np.float64) * float(about["scale"])).astype(np.float32)
+    scale = float(about["scale"])
+    if not 0 < scale * (_LARGEST + 1) <= np.finfo(np.float32).max:
+        raise ValueError(f"scale is {scale:g}")
+    parts = (whole.astype(np.float64) * scale).astype(np.float32)
     return IfCube(parts.view(np.complex64).reshape(shape[:4]), radar_of(json.dumps(about["radar"])))
 
 

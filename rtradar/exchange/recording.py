@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,6 +23,9 @@ IF_AXES = ("chirp", "tx", "rx", "sample")
 
 IF_UNIT = "m"
 """Of the samples: the square of one is a cross-section, spread out by distance."""
+
+_MOST_BYTES, _MOST_CHUNK_BYTES = 2**42, 2**34
+"""Of an array, hours at the paper's rate, and of what is unpacked at once; nothing need lie behind what a file claims."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +77,27 @@ class IfRecording:
         chirps, tx, rx, samples = self.shape
         for first in tqdm(range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None):
             last = min(first + self.step, chirps)
-            part = np.asarray(self.stored[first * tx : last * tx], dtype=np.complex64)
-            yield first, part.reshape(last - first, tx, rx, samples)
+            yield first, self.read(first * tx, last * tx).reshape(last - first, tx, rx, samples)
+
+    def read(self, first: int, last: int) -> NDArray[np.complex64]:
+        """Chirps of all Tx in turn from one to before another, (chirp, rx, sample).
+
+        Raises
+        ------
+        InputError
+            Where they are damaged, or more than there is memory.
+        """
+        try:
+            return np.asarray(self.stored[first:last], dtype=np.complex64)
+        except MemoryError:
+            size = f"{(last - first) * math.prod(self.stored.shape[1:]) * 8 / 1e9:.3g} GB"
+            raise InputError(
+                f"{self.name}: {size} of IF samples at once, more than there is memory; take a shorter run"
+            ) from None
+        except Exception as error:  # zarr and its codecs fail in many ways on damaged chunks
+            raise InputError(
+                f"{self.name}: IF samples {first} to {last} cannot be read ({_short(error)}); run it again"
+            ) from None
 
 
 def open_recording(folder: Path) -> IfRecording:
@@ -93,7 +116,7 @@ def open_recording(folder: Path) -> IfRecording:
     try:
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
         radar = Radar(**summary["parameters"]["radar"])
-    except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
+    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:  # an InputError is a ValueError
         raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
     if radar.multiplexing == "ddm":
         raise InputError(
@@ -110,6 +133,10 @@ def open_recording(folder: Path) -> IfRecording:
         raise InputError(
             f"'{folder / 'if.zarr'}' holds {kind} {shape}; the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
             f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
+        )
+    if stored.nbytes > _MOST_BYTES or math.prod(stored.chunks) * kind.itemsize > _MOST_CHUNK_BYTES:
+        raise InputError(
+            f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, as no run writes; run it again"
         )
     return IfRecording(radar, stored, folder.resolve().name)
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
+from rtradar.files import read_arrays, stored
 from rtradar.output_folder import settle
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
@@ -27,11 +26,23 @@ from rtradar.report.still import draw_still
 _MOST_ROWS, _MOST_COLUMNS = 256, 200
 """Of a range-Doppler map; of larger ones neighbours are put together, the strongest for all."""
 
+_MAPS = {
+    "range_doppler": ("time", "range", "velocity"),
+    "spectrogram": ("spectrogram_time", "spectrogram_velocity"),
+}
+"""What is read of ``maps.h5``, with its axes."""
+
+_LARGEST = 1e9
+"""Of coordinates and rates, in whatever unit; what is larger is damage."""
+
+_MOST_LETTERS = 200
+"""Of a name from the summary."""
+
 _DYNAMIC_RANGE_DB = 60.0
 _SAMPLED = 16
 """Maps whose median tells the noise."""
 
-_DAMAGE = (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile, zlib.error, NotImplementedError)
+_DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
 _MEND = "make it anew with: rtradar run"
 
 
@@ -108,30 +119,35 @@ def load_linked(folder: Path) -> Linked:
     spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"))
     path = folder / "maps.h5"
     try:
-        with h5py.File(path) as maps:
+        with h5py.File(path) as file:
+            maps = _maps(file)
             if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
             range_doppler = _range_doppler(maps, moments, radar)
             spectrogram = _spectrogram(maps)
-            points = np.asarray(rdt["points"], dtype=np.float64).reshape(-1, 3)
+            points = rdt["points"].reshape(-1, 3)
             rdt_power_db = _at_points(maps, points, radar)
     except InputError:
         raise
     except _DAMAGE as error:
         why = error.strerror if isinstance(error, FileNotFoundError) else "is damaged, or of another kind"
         raise InputError(f"'{path}': {why}; {_MEND}") from None
+    try:
+        cloud = SpatialCloud(**spatial)
+    except (InputError, TypeError) as error:
+        raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
     parameters = summary["parameters"]
-    scene = str(parameters.get("scene", "free-space"))
+    fidelity, scene = _line(summary.get("fidelity", "")), _line(parameters.get("scene", "free-space"))
     return Linked(
-        heading=str(parameters.get("motion", "Recording")),
-        subtitle=", ".join([f"radar {radar.name}", f"fidelity {summary.get('fidelity', '')}", scene]),
+        heading=_line(parameters.get("motion", "Recording")),
+        subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]),
         moments=moments,
         radar=radar,
         range_doppler=range_doppler,
         spectrogram=spectrogram,
         rdt_points=points,
         rdt_power_db=rdt_power_db,
-        spatial=SpatialCloud(**spatial),
+        spatial=cloud,
     )
 
 
@@ -141,23 +157,49 @@ def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
         return summary, Radar(**summary["parameters"]["radar"])
     except InputError as error:
         raise InputError(f"'{path}': {error}; {_MEND}") from None
-    except (*_DAMAGE, RecursionError):
+    except _DAMAGE:
         raise InputError(f"'{path}' is damaged; {_MEND}") from None
+
+
+def _line(value: Any) -> str:
+    """As a page shows it: JSON may hold half of a character, which no file can."""
+    return "".join(letter if letter.isprintable() else "?" for letter in str(value)[:_MOST_LETTERS])
 
 
 def _archive(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
     try:
-        with np.load(path, allow_pickle=False) as arrays:
-            return {name: arrays[name] for name in names}
+        arrays = read_arrays(path)
+        return {name: _finite(arrays[name]).astype(np.float64) for name in names}
     except _DAMAGE as error:
         why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
         raise InputError(f"'{path}' {why}; {_MEND}") from None
 
 
+def _finite(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype not in (np.float32, np.float64) or not (np.abs(values) <= _LARGEST).all():
+        raise ValueError("a value is no number, or too large")
+    return values
+
+
 # -- maps ----------------------------------------------------------------------------------------------------------------
 
 
+def _maps(file: h5py.File) -> dict[str, Any]:
+    """Datasets of `_MAPS` and their axes, checked but for the maps' values."""
+    maps = {name: stored(file, name) for names in _MAPS.items() for name in (names[0], *names[1])}
+    for name, axes in _MAPS.items():
+        if maps[name].dtype not in (np.float32, np.float64) or maps[name].shape != tuple(
+            len(_finite(maps[axis][:])) for axis in axes
+        ):
+            raise ValueError(f"{name} does not fit its axes")
+    if not all(len(maps[axis]) for axis in _MAPS["range_doppler"]):
+        raise ValueError("it is empty")
+    return maps
+
+
 def _decibels(power: NDArray[np.floating]) -> NDArray[np.float64]:
+    if not np.isfinite(power).all():
+        raise ValueError("a power is not finite")
     return np.asarray(10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny)))
 
 
@@ -216,10 +258,10 @@ def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar) -> NDArray[
     """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB re 1 m^2]."""
     if not len(points):
         return np.zeros(0)
-    nearest = [
-        np.abs(column[:, None] - maps[axis][:]).argmin(axis=1)
-        for axis, column in zip(("time", "range", "velocity"), points.T, strict=True)
-    ]
+    nearest = []
+    for axis, column in zip(_MAPS["range_doppler"], points.T, strict=True):
+        values = maps[axis][:]
+        nearest.append(np.searchsorted((values[1:] + values[:-1]) / 2, column))  # which is in the middle goes to the lower
     found = np.zeros(len(points))
     for window in np.unique(nearest[0]).tolist():
         own = nearest[0] == window

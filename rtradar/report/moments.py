@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
-import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, read_arrays
 
 _FORMAT = 1
 _MOST_BYTES = 200_000_000
 """Far above what a run writes, some 2 MB; a file that claims more is none of ours."""
+
+_LARGEST = 1e9
 
 _FIELDS: Mapping[str, tuple[str, tuple[str | int, ...]]] = {
     "times": ("f8", ("step",)),
@@ -114,7 +114,7 @@ class Moments:
             array = np.asarray(getattr(self, name))
             if kind == "U" and array.size == 0:
                 array = array.astype("U")  # an empty list has no kind
-            if array.dtype.kind != np.dtype(kind).kind:
+            if array.dtype.kind != np.dtype(kind).kind or array.dtype in (np.float16, np.longdouble):
                 raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
             if array.ndim != len(axes):
                 raise InputError(f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})")
@@ -124,6 +124,10 @@ class Moments:
                     raise InputError(f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}")
             if kind != "U" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
                 raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
+            if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
+                raise InputError(f"view: {name} holds a value above {_LARGEST:g}; none is so large")
+            if kind == "U" and not all(word.isprintable() for word in array.ravel().tolist()):
+                raise InputError(f"view: {name} holds what is no line of text")
             object.__setattr__(self, name, array if kind == "U" else array.astype(kind))
         if not sizes["step"] or not sizes["part"]:
             raise InputError("view: there is no moment or no body part; at least one of each is needed")
@@ -167,17 +171,12 @@ def load_moments(path: str | Path) -> Moments:
     """
     mend = "make it anew with: rtradar run"
     try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(entry.file_size for entry in archive.infolist()) > _MOST_BYTES:
-                raise InputError(f"'{path}' claims more than {_MOST_BYTES / 1e6:.0f} MB, which no run writes; {mend}")
-        with np.load(path, allow_pickle=False) as arrays:
-            found: dict[str, Any] = {name: arrays[name] for name in ("format", *_FIELDS)}
+        arrays = read_arrays(Path(path), _MOST_BYTES)
+        found: dict[str, Any] = {name: arrays[name] for name in ("format", *_FIELDS)}
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; {mend}") from None
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError, zlib.error) as error:
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"'{path}' is damaged or no file of moments; {mend}") from None
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"'{path}' is damaged or no file of moments ({' '.join(str(error).split())}); {mend}") from None
     if found.pop("format").tolist() != _FORMAT:
         raise InputError(f"'{path}' is of another version of rtradar; {mend}")
     try:
