@@ -36,21 +36,24 @@ chirp_duration_s = 250e-6
 samples_per_chirp = 128
 frame_duration_s = 0.05
 """
-SPEC = """
-[windows]
-duration_s = {seconds}
-[each]
-radar = ["{radar}"]
-fidelity = ["{fidelity}"]
-[drawn]
-snr_db = [15, 25]
-heading_deg = [-30, 30]
+HALVES = """
 [[synthetic]]
 label = "walk"
 count = {half}
 [[synthetic]]
 label = "kick"
 count = {half}
+"""
+SPEC = f"""
+[windows]
+duration_s = {{seconds}}
+[each]
+radar = ["{{radar}}"]
+fidelity = ["{{fidelity}}"]
+[drawn]
+snr_db = [15, 25]
+heading_deg = [-30, 30]
+{HALVES}
 """
 RTRADAR = [sys.executable, "-m", "rtradar", "dataset", "build"]
 PATIENCE_S = 600.0

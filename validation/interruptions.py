@@ -23,24 +23,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+from campaign_kills import HALVES, RADAR
 from rows import Row, judged, main
 
 SAYS = "a command that is told to end: "
 PATIENCE_S = 300.0
-SPEC = """
+SPEC = f"""
 [windows]
 duration_s = 0.5
 [each]
 radar = ["small.toml"]
 fidelity = ["analytic"]
-[[synthetic]]
-label = "walk"
-count = {half}
-[[synthetic]]
-label = "kick"
-count = {half}
+{HALVES}
 """
-RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nchirp_duration_s = 250e-6\nsamples_per_chirp = 128\nframe_duration_s = 0.05\n"
 
 
 @dataclass(frozen=True)
