@@ -11,6 +11,7 @@ with the file that does it. Every reader has a process of its own; what it learn
 from __future__ import annotations
 
 import argparse
+import importlib
 import json
 import os
 import resource
@@ -26,6 +27,7 @@ from typing import Any, NoReturn
 
 LIMIT_S = 4.0
 LIMIT_BYTES = 2 << 30
+PARTS = ("fuzz_exchange", "fuzz_markers", "fuzz_runs", "fuzz_targets")  # where targets are; each is imported only for its own
 EVERY = 200  # inputs between two reports of a process, which ends without a word
 
 
@@ -37,17 +39,27 @@ def _stop(*_: object) -> NoReturn:
     raise TooSlowError
 
 
-def fuzz(name: str, seconds: int, corpus: Path, report: Path) -> NoReturn:
+def homes(names: list[str]) -> dict[str, str]:
+    """Which part each reader's target is in, by its name; all of them where none is named."""
+    found: dict[str, str] = {}
+    for part in PARTS:
+        if not names or not set(names) <= set(found):
+            found |= dict.fromkeys(importlib.import_module(part).TARGETS, part)
+    unknown = [name for name in names if name not in found]
+    if unknown:
+        sys.exit(f"no reader is called {', '.join(unknown)}; there are {', '.join(found)}")
+    return {name: found[name] for name in names or found}
+
+
+def fuzz(name: str, part: str, seconds: int, corpus: Path, report: Path) -> NoReturn:
     """Fuzz one reader, in this process, to its end."""
     os.environ["NUMBA_DISABLE_JIT"] = "1"  # what watches the branches cannot be compiled
     import atheris
 
     with atheris.instrument_imports(include=["rtradar", "tomllib"]):
-        from fuzz_targets import TARGETS
-
         from rtradar.errors import InputError, ValidityWarning
 
-    target = TARGETS[name]
+        target = importlib.import_module(part).TARGETS[name]
     folder = corpus / name.replace(" ", "-").replace("+", "-")
     folder.mkdir(parents=True, exist_ok=True)
     for number, seed in enumerate(target.seeds()):
@@ -115,22 +127,22 @@ def main() -> int:
     parser.add_argument("--corpus", type=Path, metavar="DIR", help="what was learned, and what was found (default: a new folder)")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the findings there")
     parser.add_argument("--reader", help=argparse.SUPPRESS)
+    parser.add_argument("--part", help=argparse.SUPPRESS)
     parser.add_argument("--seconds", type=int, help=argparse.SUPPRESS)
     options = parser.parse_args()
     corpus = (options.corpus or Path(tempfile.mkdtemp(prefix="rtradar-corpus-"))).resolve()
     if options.reader:
-        fuzz(options.reader, options.seconds, corpus, options.json)
-    from fuzz_targets import TARGETS
-
-    names = options.only.split(",") if options.only else list(TARGETS)
-    each = max(1, round(options.minutes * 60 / len(names)))
+        fuzz(options.reader, options.part, options.seconds, corpus, options.json)
+    readers = homes(options.only.split(",") if options.only else [])
+    each = max(1, round(options.minutes * 60 / len(readers)))
     results: dict[str, Any] = {}
     print(f"{'reader':18} {'inputs':>9} {'taken':>8} {'minutes':>8} {'slowest':>8}  found")
-    for name in names:
+    for name, part in readers.items():
         report = corpus / "report.json"
         report.unlink(missing_ok=True)
         corpus.mkdir(parents=True, exist_ok=True)
-        own = [sys.executable, __file__, "--reader", name, "--seconds", str(each), "--corpus", str(corpus), "--json", str(report)]
+        own = [sys.executable, __file__, "--reader", name, "--part", part, "--seconds", str(each)]
+        own += ["--corpus", str(corpus), "--json", str(report)]
         done = subprocess.run(own, capture_output=True, text=True, errors="replace", check=False)
         if not report.exists():
             sys.exit(f"{name}: {done.stderr.strip() or done.stdout.strip()}")

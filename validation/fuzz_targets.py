@@ -10,12 +10,12 @@ import tempfile
 import zipfile
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 import trimesh
+from fuzz_kit import Target, npy, written
 
 from rtradar.body import Body
 from rtradar.campaign.spec_file import read_spec
@@ -91,6 +91,32 @@ position_m = [-4.0, 1, 1.0]
 channels = "all"
 polarization = "h"
 """
+ANTENNAS = """tx_z = 0
+rx_z = 0
+transmit_power_dbm = 12.0
+noise_figure_db = 14
+noise_temperature_k = 290.0
+multiplexing = "fdm"
+carrier_step_hz = 5e6
+frame_hop_s = 0.01
+[tx_antenna]
+pattern = "table"
+gain_dbi = 9.5
+azimuth_deg = [-90, 0.0, 90]
+azimuth_db = [-20, 0, -20]
+elevation_deg = [-90.0, 0.0, 90]
+elevation_db = [-30, 0.0, -30]
+[rx_antenna]
+pattern = "cosine"
+exponent = 1.5
+"""
+DIVISION = """tx_y = 3
+tx_z = 0
+multiplexing = "ddm"
+doppler_bands = 5
+tx_antenna = {pattern = "dipole", gain_dbi = 2}
+rx_antenna.pattern = "isotropic"
+"""
 SCENE = """name = "mine"
 description = "a room"
 radar.position_m = [-3.0, 0.0, 1.0]
@@ -163,7 +189,8 @@ WORDS = {
     "bvh": "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION Frames: Frame Time: Xposition Yposition Zposition Zrotation "
     "Xrotation Yrotation { } 1e308 1e-320 1e-300 1e20 1e-9 \xb2",
     "toml": 'true false inf nan -inf = [ ] [[ ]] { } """ 1e308 0xffffffffffffffffffff 1979-05-27T07:32:00Z '
-    + " ".join(line.split(" = ")[0].strip("[]{ ") for line in (RADAR + SCENE + SPEC).splitlines()),
+    + " ".join(line.split(" = ")[0].strip("[]{ ") for line in (RADAR + ANTENNAS + DIVISION + SCENE + SPEC).splitlines())
+    + " tdm cosine dipole isotropic pairs v",
     "json": 'null true false NaN Infinity 1e999 -1 {} [] "" 99999999999999999999 "../x" [[[[ : ,',
     "ply": "ply format ascii 1.0 binary_little_endian binary_big_endian element vertex face edge property list uchar int float "
     "double x y z vertex_indices end_header comment",
@@ -175,16 +202,6 @@ WORDS = {
 """What each format is made of: a fuzzer that knows words gets farther."""
 
 
-@dataclass(frozen=True)
-class Target:
-    """A reader: ``read`` takes a folder that it has to itself and the bytes of a file; ``seeds`` are files that it takes."""
-
-    read: Callable[[Path, bytes], object]
-    seeds: Callable[[], list[bytes]]
-    words: str = ""
-    most_bytes: int = 4096
-
-
 def _pose(motion: Motion) -> None:
     motion.at([0.0, motion.duration_s / 2, motion.duration_s])
     with suppress(InputError):  # which joints a person needs is no matter of the reader's
@@ -193,38 +210,45 @@ def _pose(motion: Motion) -> None:
 
 def _asf(folder: Path, data: bytes) -> None:
     (folder / "x.amc").write_text(AMC)
-    _pose(load_motion(folder / "x.amc", _written(folder / "x.asf", data)))
+    _pose(load_motion(folder / "x.amc", written(folder / "x.asf", data)))
 
 
 def _amc(folder: Path, data: bytes) -> None:
     (folder / "x.asf").write_text(ASF)
-    _pose(load_motion(_written(folder / "x.amc", data), folder / "x.asf"))
+    _pose(load_motion(written(folder / "x.amc", data), folder / "x.asf"))
 
 
 def _person(folder: Path, data: bytes) -> None:
     """Skeleton and motion in one, apart at the first null byte: what neither alone reaches."""
     asf, _, amc = data.partition(b"\0")
     (folder / "x.asf").write_bytes(asf)
-    _pose(load_motion(_written(folder / "x.amc", amc), folder / "x.asf"))
+    _pose(load_motion(written(folder / "x.amc", amc), folder / "x.asf"))
 
 
 def _bvh(folder: Path, data: bytes) -> None:
-    _pose(load_motion(_written(folder / "x.bvh", data)))
+    _pose(load_motion(written(folder / "x.bvh", data)))
 
 
 def _radar(folder: Path, data: bytes) -> None:
-    Radar.load(_written(folder / "x.toml", data))
+    radar = Radar.load(written(folder / "x.toml", data))
+    assert np.isfinite(radar.tx_offset_hz).all()
+    assert np.isfinite([radar.receiver_rate_hz, radar.occupied_bandwidth_hz, radar.max_velocity_mps, radar.max_angle_deg]).all()
+    with suppress(InputError):  # not stated
+        assert radar.watts_per_m2 + radar.noise_power_w > 0
+    for antenna in filter(None, (radar.tx_antenna, radar.rx_antenna)):
+        share = antenna.relative(np.concatenate([np.eye(3), -np.eye(3)]), radar.polarization)
+        assert ((share >= 0) & (share <= 1 + 1e-12)).all()
 
 
 def _scene(folder: Path, data: bytes) -> None:
     trimesh.creation.box((300, 300, 300)).export(folder / "box.ply")
-    Scene.load(_written(folder / "x.toml", data))
+    Scene.load(written(folder / "x.toml", data))
 
 
 def _spec(folder: Path, data: bytes) -> None:
     for name, text in (("walk.bvh", BVH), ("radar.toml", RADAR), ("scene.toml", 'name = "x"')):
         (folder / name).write_text(text)
-    read_spec(_written(folder / "x.toml", data))
+    read_spec(written(folder / "x.toml", data))
 
 
 def _collection(folder: Path) -> None:
@@ -238,13 +262,13 @@ def _collection(folder: Path) -> None:
 
 def _index(folder: Path, data: bytes) -> None:
     write_sample(folder, "a", *_sample())
-    _written(folder / "collection.json", data)
+    written(folder / "collection.json", data)
     _collection(folder)
 
 
 def _cloud(folder: Path, data: bytes) -> None:
     write_index(folder, ["a"])
-    _written(folder / "a.npz", data)
+    written(folder / "a.npz", data)
     _collection(folder)
 
 
@@ -254,14 +278,14 @@ def _array(folder: Path, data: bytes) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in zip(("points.npy", "spatial.npy", "about.npy"), parts, strict=False):
-            archive.writestr(name, content if name != "about.npy" else _npy(np.frombuffer(content, dtype=np.uint8)))
+            archive.writestr(name, content if name != "about.npy" else npy(np.frombuffer(content, dtype=np.uint8)))
         archive.comment = b"0" * 64
     body = buffer.getvalue()[:-64]
     _cloud(folder, body + hashlib.sha256(body).hexdigest().encode())
 
 
 def _checkpoint(folder: Path, data: bytes) -> None:
-    load_checkpoint(_written(folder / "x.pt", data))
+    load_checkpoint(written(folder / "x.pt", data))
 
 
 def _pickled(folder: Path, data: bytes) -> None:
@@ -275,7 +299,7 @@ def _pickled(folder: Path, data: bytes) -> None:
 
 
 def _outcome(folder: Path, data: bytes) -> None:
-    found = load_outcome(_written(folder / "x.json", data))
+    found = load_outcome(written(folder / "x.json", data))
     assert 0 <= found.accuracy <= 1
     assert found.seconds >= 0
     found.as_dict()
@@ -284,7 +308,7 @@ def _outcome(folder: Path, data: bytes) -> None:
 def _plan(folder: Path, data: bytes) -> None:
     (folder / "training-01").mkdir(exist_ok=True)
     (folder / "training-01" / "outcome.json").write_bytes(_outcomes()[0])
-    _written(folder / "plan.json", data)
+    written(folder / "plan.json", data)
     assert load_study(folder).title
     with suppress(InputError):  # it was not trained
         load_network(folder)
@@ -294,20 +318,9 @@ def _mesh(ending: str) -> Callable[[Path, bytes], None]:
     def read(folder: Path, data: bytes) -> None:
         from rtradar.scene.mesh_files import read_mesh
 
-        read_mesh(_written(folder / f"x{ending}", data))
+        read_mesh(written(folder / f"x{ending}", data))
 
     return read
-
-
-def _written(path: Path, data: bytes) -> Path:
-    path.write_bytes(data)
-    return path
-
-
-def _npy(array: np.ndarray) -> bytes:
-    buffer = io.BytesIO()
-    np.lib.format.write_array(buffer, array, allow_pickle=False)
-    return buffer.getvalue()
 
 
 def _sample() -> tuple[Sample, np.ndarray]:
@@ -322,7 +335,7 @@ def _samples() -> list[bytes]:
 
 def _arrays() -> list[bytes]:
     about = json.dumps({"format": 1, "label": "walk", "provenance": {"subject": "she", "seed": 3}}).encode()
-    return [b"CUT".join((_npy(np.arange(6.0).reshape(2, 3)), _npy(np.zeros((0, 3))), about))]
+    return [b"CUT".join((npy(np.arange(6.0).reshape(2, 3)), npy(np.zeros((0, 3))), about))]
 
 
 def _checkpoints(only_pickle: bool = False) -> list[bytes]:
@@ -387,7 +400,7 @@ TARGETS = {
     "amc": Target(_amc, lambda: [AMC.encode()], WORDS["amc"]),
     "asf+amc": Target(_person, _people, WORDS["asf"] + " " + WORDS["amc"], 40_000),
     "bvh": Target(_bvh, _short_bvh, WORDS["bvh"], 20_000),
-    "radar": Target(_radar, lambda: [RADAR.encode()], WORDS["toml"]),
+    "radar": Target(_radar, lambda: [RADAR.encode(), ANTENNAS.encode(), DIVISION.encode()], WORDS["toml"]),
     "scene": Target(_scene, lambda: [SCENE.encode()], WORDS["toml"]),
     "spec": Target(_spec, lambda: [SPEC.encode()], WORDS["toml"]),
     "collection.json": Target(_index, lambda: [b'{"format": 1, "samples": ["a"]}'], WORDS["json"]),
