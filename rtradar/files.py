@@ -1,4 +1,4 @@
-"""Files that are whole or not there, also where the process is told to end while it writes them."""
+"""Files that are whole or not there, also where the process is told to end meanwhile, and files that may be anybody's, read."""
 
 from __future__ import annotations
 
