@@ -12,7 +12,7 @@ from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
 from rtradar.pipeline.view import load_linked
-from rtradar.report.linked import linked_data
+from rtradar.report.linked_page import linked_data
 
 MAPS = {
     "time": np.array([0.002, 0.004]),
