@@ -44,8 +44,8 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
     InputError
         Where ``out`` cannot be made or written.
     """
-    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     try:
+        made = [folder for folder in (out, *out.parents) if not folder.exists()]
         out.mkdir(parents=True, exist_ok=True)
         settle(out)
         work, lock = _own_folder(out)
@@ -87,10 +87,12 @@ def _own_folder(out: Path) -> tuple[Path, int | None]:
     """A new folder in ``out``, and the lock that says that its run still lives."""
     while True:
         work = Path(tempfile.mkdtemp(prefix=_PREFIX, dir=out))
-        lock = _lock(work)
-        if work.exists():  # another run may have swept it before it was locked
-            return work, lock
-        _let_go(lock)
+        # Another run may sweep it before it is locked.
+        with suppress(BlockingIOError, FileNotFoundError):
+            lock = _lock(work)
+            if work.exists():
+                return work, lock
+            _let_go(lock)
 
 
 def settle(out: Path) -> None:
@@ -138,17 +140,23 @@ def _parted(folder: Path, error: OSError) -> InputError:
 
 def _move(work: Path, out: Path) -> None:
     """Everything in ``work`` to its place; may be begun again at any point."""
-    for item in sorted(work.iterdir()):
-        if item.name.startswith(_ASIDE):
-            continue
-        place = out / item.name
-        if place.is_dir() and not place.is_symlink():
-            # A folder cannot be replaced in one step: the old one steps aside first.
-            os.replace(place, work / f"{_ASIDE}{item.name}")
-        os.replace(item, place)
+    # Of two runs that end at once in one folder, one waits: what lies there is of one run.
+    alone = _lock(out, wait=True)
+    try:
+        for item in sorted(work.iterdir()):
+            if item.name.startswith(_ASIDE):
+                continue
+            place = out / item.name
+            if item.is_dir() or (place.is_dir() and not place.is_symlink()):
+                # A folder is not replaced, and replaces nothing, in one step: the old one steps aside first.
+                with suppress(FileNotFoundError):
+                    os.replace(place, work / f"{_ASIDE}{item.name}")
+            os.replace(item, place)
+    finally:
+        _let_go(alone)
 
 
-def _lock(folder: Path) -> int | None:
+def _lock(folder: Path, *, wait: bool = False) -> int | None:
     """Lock a folder until `_let_go`, or the end of the process; BlockingIOError where another has it. Not on Windows."""
     if sys.platform == "win32":
         return None
@@ -156,7 +164,7 @@ def _lock(folder: Path) -> int | None:
 
     place = os.open(folder, os.O_RDONLY)
     try:
-        fcntl.flock(place, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(place, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
     except OSError:
         os.close(place)
         raise

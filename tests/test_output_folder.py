@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
+from rtradar import output_folder
 from rtradar.errors import InputError
 from rtradar.output_folder import all_or_nothing, settle
 
@@ -63,6 +65,80 @@ def test_a_file_in_the_way_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"cannot write to .*file.*--out"), all_or_nothing(tmp_path / "file" / "out"):
         pass
     assert contents(tmp_path) == {"file"}
+
+
+def test_a_name_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"cannot write to .*too long.*--out"), all_or_nothing(tmp_path / ("x" * 300)):
+        pass
+
+
+@pytest.mark.parametrize("kind", ["file", "link"])
+def test_a_folder_takes_the_place_of_whatever_has_its_name(tmp_path: Path, kind: str) -> None:
+    out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
+    for folder in (out, elsewhere):
+        folder.mkdir()
+    if kind == "file":
+        (out / "store").write_text("mine")
+    else:
+        (out / "store").symlink_to(elsewhere)
+        (elsewhere / "mine").write_text("mine")
+    with all_or_nothing(out) as folder:
+        fill(folder, "second")
+    assert contents(out) == {"maps", "store", "store/second"}
+    assert contents(elsewhere) == (set() if kind == "file" else {"mine"})  # what a link names is not ours to take away
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
+@pytest.mark.parametrize("swept", ["before", "while"])
+def test_a_folder_that_another_command_sweeps_as_it_is_made_is_made_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, swept: str
+) -> None:
+    real = tempfile.mkdtemp
+    others: list[int | None] = []
+
+    def made(**named: str) -> str:
+        name = real(**named)
+        if not others:
+            others.append(output_folder._lock(Path(name)))
+            if swept == "before":
+                os.rmdir(name)
+        return name
+
+    monkeypatch.setattr(tempfile, "mkdtemp", made)
+    with all_or_nothing(tmp_path) as folder:
+        (folder / "maps").write_text("new")
+    output_folder._let_go(others[0])
+    settle(tmp_path)
+    assert contents(tmp_path) == {"maps"}
+
+
+SLOW = """
+import os, pathlib, sys, time
+from rtradar.output_folder import all_or_nothing
+out = pathlib.Path(sys.argv[1])
+real = os.replace
+def slowly(*places):
+    real(*places)
+    print("moved", flush=True)
+    time.sleep(0.5)
+os.replace = slowly
+with all_or_nothing(out) as folder:
+    for name in ("clouds", "maps"):
+        (folder / name).write_text("first")
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
+def test_two_processes_that_end_at_once_leave_what_is_of_one(tmp_path: Path) -> None:
+    with subprocess.Popen([sys.executable, "-c", SLOW, str(tmp_path)], stdout=subprocess.PIPE, text=True) as other:
+        assert other.stdout is not None
+        with all_or_nothing(tmp_path) as folder:
+            for name in ("clouds", "maps"):
+                (folder / name).write_text("second")
+            assert other.stdout.readline() == "moved\n"
+    assert other.returncode == 0
+    assert [(tmp_path / name).read_text() for name in ("clouds", "maps")] == ["second", "second"]
+    assert contents(tmp_path) == {"clouds", "maps"}
 
 
 KILLED = """
