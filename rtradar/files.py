@@ -7,6 +7,7 @@ import math
 import os
 import secrets
 import shutil
+import stat
 import sys
 import tempfile
 import threading
@@ -14,7 +15,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,9 +47,12 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     Raises
     ------
     InputError
-        Where the folder is missing or cannot be written.
+        Where the folder is missing or cannot be written, or something other than a file has the name.
     """
     target = Path(path)
+    with suppress(OSError):
+        if not stat.S_ISREG(target.stat().st_mode):
+            raise InputError(f"cannot write '{target}': what has that name is no file; give another path")
     # Not by the process alone: on a shared disk another machine may write the same file.
     beside = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
     with unfinished(lambda: beside.unlink(missing_ok=True)):
@@ -67,6 +71,26 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             beside.unlink(missing_ok=True)
 
 
+def check_place(path: Path | None, option: str = "--json") -> None:
+    """Find out before the work, not after it, that a file cannot be written there.
+
+    Raises
+    ------
+    InputError
+        Where it has no folder, is one, or no file can have its name; the message names the command line's ``option``.
+    """
+    if path is None:
+        return
+    folder = Path(os.path.realpath(path)).parent  # links that lead in a circle stay as they are, and are replaced
+    try:
+        if not folder.is_dir():
+            raise InputError(f"{option} {path}: there is no folder '{folder}'; make it first")
+        if path.is_dir():
+            raise InputError(f"{option} {path}: that is a folder; name a file")
+    except OSError as error:
+        raise InputError(f"{option} {path}: {error.strerror}; give another file") from None
+
+
 def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
     """Write plain values as indented JSON, whole or not at all.
 
@@ -77,7 +101,11 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
     """
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     try:
-        if Path(path).exists() and not Path(path).is_file():  # a pipe, /dev/stdout
+        if (stream := _standard_stream(path)) is not None:
+            stream.write(text)
+            stream.flush()
+            return
+        if Path(path).exists() and not Path(path).is_file():  # a pipe
             Path(path).write_text(text, encoding="utf-8")
             return
         with atomic_file(path) as file:
@@ -86,6 +114,15 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
         raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
     except InputError as error:
         raise InputError(f"{error} (--json)") from None
+
+
+def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
+    """The one that this is a name of, such as /dev/stdout; it may well be a file, which has to stay."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):  # no such path; closed; none, or no file at all
+            if os.path.samestat(os.stat(path), os.fstat(stream.fileno())):
+                return stream
+    return None
 
 
 def read_json(path: Path) -> Any:

@@ -18,8 +18,7 @@ from rtradar.bench.rates import measure_rates
 from rtradar.bench.rows import chirp_rows, rung_row
 from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
 from rtradar.bench.tables import tables
-from rtradar.errors import InputError
-from rtradar.files import atomic_file, temporary_folder, write_json
+from rtradar.files import atomic_file, check_place, temporary_folder, write_json
 from rtradar.radar import Radar
 
 __all__ = ["Plan", "bench", "plan_of"]
@@ -49,8 +48,7 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
         Where a file cannot be written; nothing has run then.
     """
     for option, path in (("--json", json_path), ("--figure", figure)):
-        if path is not None and not path.resolve().parent.is_dir():
-            raise InputError(f"{option} {path}: there is no folder '{path.resolve().parent}'; make it first")
+        check_place(path, option)
     try:
         found = measure(plan)
     except RunError as error:

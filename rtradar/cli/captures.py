@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import check_json_folder, decibels, number, seconds, whole
+from rtradar.cli.values import decibels, number, seconds, whole
 from rtradar.errors import InputError
-from rtradar.files import write_json
+from rtradar.files import check_place, write_json
 from rtradar.radar import PRESETS
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 def _capture(options: argparse.Namespace) -> dict[str, Any]:
     """What `run` and `compare` take alike."""
-    check_json_folder(options.json)
+    check_place(options.json)
     from rtradar.motion import load_motion, synthetic_motion
     from rtradar.radar import Radar
     from rtradar.scene import Scene

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rtradar.cli.values import seconds, whole
+from rtradar.files import check_place
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -43,6 +44,7 @@ def add(commands: Subcommands) -> None:
 
 
 def _doctor(options: argparse.Namespace) -> int:
+    check_place(options.json)
     from rtradar.doctor import report
 
     return report(options.json)

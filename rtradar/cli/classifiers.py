@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder, number, numbers, whole
+from rtradar.cli.values import number, numbers, whole
 from rtradar.errors import InputError
-from rtradar.files import write_json
+from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -106,7 +106,7 @@ def _train(options: argparse.Namespace) -> int:
 
 
 def _evaluate(options: argparse.Namespace) -> int:
-    check_json_folder(options.json)
+    check_place(options.json)
     from rtradar.classify.study import load_study
     from rtradar.output_folder import all_or_nothing
     from rtradar.report.evaluation import write_evaluation

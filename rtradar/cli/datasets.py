@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import OneLineParser, check_json_folder, count
-from rtradar.files import write_json
+from rtradar.cli.values import OneLineParser, count
+from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -30,7 +30,7 @@ def add(commands: Subcommands) -> None:
 
 
 def _dataset_build(options: argparse.Namespace) -> int:
-    check_json_folder(options.json)
+    check_place(options.json)
     from rtradar.campaign import build_dataset, in_words
 
     report = build_dataset(

@@ -6,8 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder
-from rtradar.files import write_json
+from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -31,7 +30,7 @@ def add(commands: Subcommands) -> None:
 
 
 def _export(options: argparse.Namespace) -> int:
-    check_json_folder(options.json)
+    check_place(options.json)
     from rtradar.exchange import export
 
     said = export(options.source, options.out)

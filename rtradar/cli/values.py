@@ -5,10 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
-
-from rtradar.errors import InputError
 
 if TYPE_CHECKING:
     Subcommands = argparse._SubParsersAction[argparse.ArgumentParser]  # argparse gives it no public name
@@ -26,12 +23,6 @@ def fail(status: int, why: object) -> int:
     """Say in one line on stderr what went wrong; the exit status is returned."""
     print("rtradar: " + " ".join(str(why).split()), file=sys.stderr)
     return status
-
-
-def check_json_folder(path: Path | None) -> None:
-    """A JSON file that cannot be written is found out before the work, not after it."""
-    if path is not None and not path.resolve().parent.is_dir():
-        raise InputError(f"--json {path}: there is no folder '{path.resolve().parent}'; make it first")
 
 
 def number(text: str) -> float:

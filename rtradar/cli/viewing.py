@@ -6,9 +6,9 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import check_json_folder, seconds
+from rtradar.cli.values import seconds
 from rtradar.errors import InputError
-from rtradar.files import write_json
+from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -35,7 +35,7 @@ def add(commands: Subcommands) -> None:
 
 
 def _view(options: argparse.Namespace) -> int:
-    check_json_folder(options.json)
+    check_place(options.json)
     if options.time is not None and options.still is None:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
     from rtradar.pipeline.view import view

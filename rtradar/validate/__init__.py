@@ -13,7 +13,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.files import write_json
+from rtradar.files import check_place, write_json
 from rtradar.validate.claims import Claim, choose, claims, validation_folder
 from rtradar.validate.outcome import Outcome, Row, by_key, run_claim, used_up, worst
 from rtradar.validate.readme import BEGIN, END, KEYS, around_table, markdown, write_readme
@@ -73,8 +73,7 @@ def validate(
     InputError
         Where ``only`` names nothing, or a file cannot be written; nothing has run then.
     """
-    if json_path is not None and not json_path.resolve().parent.is_dir():
-        raise InputError(f"--json {json_path}: there is no folder '{json_path.resolve().parent}'; make it first")
+    check_place(json_path)
     if readme is not None:
         if quick or only is not None:
             raise InputError("--readme: the table is of all claims and cases; leave out --quick and --only")
