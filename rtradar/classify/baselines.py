@@ -18,7 +18,7 @@ from rtradar.classify.features import metadata_features, rdt_features, spatial_f
 from rtradar.classify.outcome import Outcome, outcome_of
 from rtradar.classify.source import Clouds
 from rtradar.classify.splits import make_splits, values_of
-from rtradar.classify.study import Study, classes_of, fingerprint
+from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.errors import InputError
 
 
@@ -60,7 +60,7 @@ def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
         Where the clouds are not those of the study.
     """
     plan = study.plan
-    if fingerprint(clouds) != plan["fingerprint"]:
+    if not learnt_from(plan, clouds):
         raise InputError(f"the clouds are not those that '{study.folder}' learnt from; name their folder (--data)")
     trained = {outcome.name for outcome in study.outcomes}
     splits = make_splits(clouds, plan["split"], folds=plan["folds"], seed=plan["seed"])

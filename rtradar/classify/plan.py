@@ -22,7 +22,8 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
         return
     try:
         there = read_json(path)
-        other = next((name for name, value in plan.items() if name != "data" and there.get(name) != value), None)
+        free = {"data"} | ({"made"} - there.keys())
+        other = next((name for name, value in plan.items() if name not in free and there.get(name) != value), None)
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
     if other is not None:
@@ -52,7 +53,7 @@ def read_plan(folder: Path) -> dict[str, Any]:
                 or not all(isinstance(one, str) for one in plan[name])
             ):
                 raise ValueError
-        return {name: plan[name] for name in _PLAN_KEYS}
+        return {name: plan[name] for name in _PLAN_KEYS} | {"made": plan.get("made")}
     except OSError as error:
         raise InputError(f"'{folder}' holds no trainings ({PLAN}: {error.strerror}); make them with: rtradar train") from None
     except (ValueError, KeyError, TypeError):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,22 @@ from rtradar.classify.training import Examples, check_points, predict, train_net
 from rtradar.errors import InputError
 
 _CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
+_MADE = (
+    "recording_digest",
+    "radar",
+    "radar_parameters",
+    "scene",
+    "scene_digest",
+    "fidelity",
+    "snr_db",
+    "heading_deg",
+    "person_position_m",
+    "radar_position_m",
+    "pfa",
+    "clutter_removal",
+    "version",
+)
+"""Entries of the provenance that say how clouds of the same intervals may differ; those that a data set lacks are left out."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +52,9 @@ class Study:
     ----------
     folder : path
     plan : dict
-        ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and provenance), ``classes``,
-        ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names).
+        ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and intervals), ``made`` (the same
+        of how they were made; None where an older folder does not tell), ``classes``, ``recipe``, ``split``, ``folds``, ``seed``,
+        ``trainings`` (names).
     outcomes : list of Outcome
         Of the trainings that are done, in their order.
     """
@@ -96,6 +114,7 @@ def train_study(
         "data": list(data),
         "clouds": len(clouds),
         "fingerprint": fingerprint(clouds),
+        "made": made(clouds),
         "classes": list(names),
         "recipe": recipe.as_dict(),
         "split": split,
@@ -206,7 +225,24 @@ def classes_of(clouds: Clouds) -> tuple[tuple[str, ...], NDArray[np.int64]]:
 
 def fingerprint(clouds: Clouds) -> str:
     """Changes when the clouds, their order, their labels or their intervals do."""
-    columns = [clouds.labels, *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed"))]
+    return _digest([clouds.labels, *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed"))])
+
+
+def made(clouds: Clouds) -> str:
+    """Changes when the radar, the rung or anything else changes that clouds of the same intervals are made by."""
+    columns = []
+    for name in _MADE:
+        with suppress(KeyError, InputError):
+            columns += [np.full(len(clouds), name), clouds.column(name)]
+    return _digest(columns)
+
+
+def learnt_from(plan: dict[str, Any], clouds: Clouds) -> bool:
+    """Whether these are the clouds of the plan."""
+    return bool(plan["fingerprint"] == fingerprint(clouds) and plan.get("made") in (None, made(clouds)))
+
+
+def _digest(columns: Sequence[NDArray[Any]]) -> str:
     rows = "\n".join("\t".join(map(str, row)) for row in zip(*(column.tolist() for column in columns), strict=True))
     return hashlib.sha256(rows.encode()).hexdigest()[:16]
 

@@ -14,7 +14,7 @@ from rtradar.classify.features import metadata_features, rdt_features, spatial_f
 from rtradar.classify.outcome import Outcome, outcome_of
 from rtradar.classify.scores import summary
 from rtradar.classify.splits import make_splits, values_of
-from rtradar.classify.study import Study, classes_of, fingerprint
+from rtradar.classify.study import Study, classes_of, fingerprint, made
 from rtradar.errors import InputError
 
 
@@ -25,7 +25,7 @@ def study_of(clouds: Any) -> Study:
     outcomes: list[Outcome] = [
         outcome_of(clouds, split, values_of(clouds, "folds"), truth, truth[split.test]) for split in splits
     ]
-    plan = {"fingerprint": fingerprint(clouds), "split": "folds", "folds": 3, "seed": 0}
+    plan = {"fingerprint": fingerprint(clouds), "made": made(clouds), "split": "folds", "folds": 3, "seed": 0}
     return Study(Path("study"), plan, outcomes)
 
 
@@ -44,6 +44,14 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(made_up:
 def test_other_clouds_are_refused(made_up: Callable[..., Any]) -> None:
     with pytest.raises(InputError, match="not those that 'study' learnt from"):
         judge_baselines(made_up(per_class=4), study_of(made_up(per_class=5)))
+
+
+def test_clouds_of_the_same_intervals_by_another_rung_are_refused(made_up: Callable[..., Any]) -> None:
+    clouds, others = made_up(), made_up()
+    for row in others.rows:
+        row["fidelity"] = "specular"
+    with pytest.raises(InputError, match="not those that 'study' learnt from"):
+        judge_baselines(others, study_of(clouds))
 
 
 def test_empty_clouds_and_single_points_have_features(made_up: Callable[..., Any]) -> None:

@@ -15,7 +15,8 @@ import torch
 
 from rtradar.classify import study
 from rtradar.classify.prepare import stack_clouds
-from rtradar.classify.study import load_network
+from rtradar.classify.recipes import RECIPES
+from rtradar.classify.study import load_network, train_study
 from rtradar.classify.training import Examples, predict
 from rtradar.cli import main
 from rtradar.errors import InputError
@@ -85,6 +86,20 @@ def test_what_is_done_is_not_done_again(
     monkeypatch.setattr(study, "train_network", lambda *given, **also: pytest.fail("it trains again"))
     assert rtradar("train", collection, "--out", trained, *TINY) == 0
     assert "2 of 2 trained" in capsys.readouterr().out
+
+
+def test_trainings_of_one_folder_learn_from_the_same_clouds(made_up: Callable[..., Any], tmp_path: Path) -> None:
+    recipe = RECIPES["lean"].changed(points=24, epochs=1)
+    clouds, others = made_up(), made_up(seed=1)
+    train_study(clouds, tmp_path, recipe, folds=2, only=[1])
+    for row in others.rows:
+        row["fidelity"] = "specular"
+    with pytest.raises(InputError, match="holds other trainings"):
+        train_study(others, tmp_path, recipe, folds=2, only=[2])
+    plan = json.loads((tmp_path / "plan.json").read_text())
+    del plan["made"]  # as older folders are, which shall go on
+    (tmp_path / "plan.json").write_text(json.dumps(plan))
+    assert len(train_study(clouds, tmp_path, recipe, folds=2).outcomes) == 2
 
 
 def test_an_interrupted_command_says_how_to_go_on(
