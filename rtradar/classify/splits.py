@@ -72,19 +72,19 @@ def make_splits(clouds: Clouds, scheme: str, *, folds: int | None = None, seed: 
     InputError
         Where the scheme is unknown, there are too few groups, or a class to be asked about is never learnt.
     """
-    moments = moments_of(clouds)
+    moments, recordings = moments_of(clouds), recordings_of(clouds)
     if scheme == "recorded":
         splits = _synthetic_to_recorded(clouds)
     elif scheme.startswith(_ACROSS):
         values = values_of(clouds, scheme)
-        parts = _folds(clouds, "recording", _numbered(clouds.column("recording")), folds, _MOST_FOLDS[_ACROSS], seed)
+        parts = _folds(clouds, "recording", recordings, folds, _MOST_FOLDS[_ACROSS], seed)
         splits = [
             Split(f"{value}, fold {number}", part.train[values[part.train] == value], part.test, value)
             for value in np.unique(values).tolist()
             for number, part in enumerate(parts, start=1)
         ]
     elif scheme in _MOST_FOLDS:
-        groups = moments if scheme == "folds" else _numbered(clouds.column(scheme))
+        groups = moments if scheme == "folds" else recordings if scheme == "recording" else _numbered(clouds.column(scheme))
         splits = _folds(clouds, scheme, groups, folds, _MOST_FOLDS[scheme], seed)
     else:
         raise InputError(f"split '{scheme}' is unknown; give one of {', '.join(SCHEMES)}")
@@ -104,11 +104,11 @@ def values_of(clouds: Clouds, scheme: str) -> NDArray[np.str_]:
 
 def moments_of(clouds: Clouds) -> NDArray[np.int64]:
     """A number for every cloud, (cloud,), the same for clouds whose intervals of one recording are the same or overlap."""
-    recording = clouds.column("recording").astype(str)
+    recording = recordings_of(clouds)
     start = clouds.column("start_s").astype(np.float64)
     end = start + clouds.column("duration_s").astype(np.float64)
     moments = np.zeros(len(clouds), dtype=np.int64)
-    number, last, begun, until = -1, None, -np.inf, -np.inf
+    number, last, begun, until = -1, -1, -np.inf, -np.inf
     for index in np.lexsort((start, recording)):
         # The same start is the same interval even where it has no length.
         if recording[index] != last or not (start[index] < until or start[index] == begun):
@@ -116,6 +116,24 @@ def moments_of(clouds: Clouds) -> NDArray[np.int64]:
         begun, until = start[index], max(until, end[index])
         moments[index] = number
     return moments
+
+
+def recordings_of(clouds: Clouds) -> NDArray[np.int64]:
+    """A number for every cloud, (cloud,), the same for clouds of one recording: one file has several names in several folders."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    names = _numbered(clouds.column("recording"))
+    try:
+        contents = clouds.column("recording_digest").astype(str)
+    except (KeyError, InputError):  # of none of them
+        return names
+    # Those that share a name or a content, or share one of them with others that do.
+    known = np.flatnonzero((contents != "") & (contents != "None"))
+    ends = names.max() + 1 + np.unique(contents[known], return_inverse=True)[1]
+    n_nodes = names.max() + 1 + len(known)
+    links = coo_array((np.ones(len(known)), (names[known], ends)), shape=(n_nodes, n_nodes))
+    return np.asarray(connected_components(links, directed=False)[1][names], dtype=np.int64)
 
 
 def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) -> None:

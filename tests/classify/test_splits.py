@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rtradar.classify.splits import Split, check, chosen, make_splits, moments_of, values_of
+from rtradar.classify.splits import Split, check, chosen, make_splits, moments_of, recordings_of, values_of
 from rtradar.errors import InputError
 
 
@@ -52,6 +52,37 @@ def tables(draw: st.DrawFn) -> Table:
             seen_by = draw(st.lists(st.sampled_from(["analytic", "specular"]), min_size=1, max_size=3))
             rows += [recording | interval | {"fidelity": fidelity} for fidelity in seen_by]
     return Table(draw(st.permutations(rows)))
+
+
+@pytest.mark.parametrize("scheme", ["folds", "recording", "across:fidelity"])
+def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
+    def row(name: str, content: str, label: str) -> dict[str, Any]:
+        told = {"recording": name, "recording_digest": content, "label": label, "fidelity": "specular"}
+        return told | {"start_s": 0.0, "duration_s": 1.0}
+
+    rows = []
+    for label in ("kick", "walk"):
+        for number in range(4):
+            # The same file in two data sets, of which each names it from a folder of its own, and once with another skeleton.
+            one, other = f"{label}/{number}.amc", f"{number}-{label}.amc"
+            content = f"{label}{number}"
+            rows += [row(one, content, label), row(other, content, label), row(other, f"{content} and another .asf", label)]
+        rows += [row(f"synthetic:{label}:{number}", "", label) for number in range(4)]  # these have none
+    table = Table(rows)
+    assert len(set(recordings_of(table).tolist())) == 2 * (4 + 4)
+    for split in make_splits(table, scheme, folds=4):
+        train, test = (
+            {rows[index]["recording_digest"].split()[0] for index in side if rows[index]["recording_digest"]}
+            for side in (split.train, split.test)
+        )
+        assert not train & test
+
+
+def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
+    # Folds follow from the numbers: trainings that are gone on with shall find those that they began with.
+    names = np.random.default_rng(0).permutation([f"{number}.amc" for number in range(40)] * 3)
+    rows = [{"recording": name, "recording_digest": f"{name[::-1]}", "label": "walk"} for name in names.tolist()]
+    assert recordings_of(Table(rows)).tolist() == np.unique(names, return_inverse=True)[1].tolist()
 
 
 @given(
