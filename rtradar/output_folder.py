@@ -7,7 +7,9 @@ the output folder, to write or to read, goes on with the moves. What is not whol
 
 from __future__ import annotations
 
+import errno
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -21,6 +23,9 @@ from rtradar.files import not_to_be_parted, unfinished
 _PREFIX = ".rtradar-"
 _WHOLE = f"{_PREFIX}whole-"
 _ASIDE = ".old-"
+
+_OF_DISK = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")} - {None}
+_HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
 
 
 @contextmanager
@@ -42,7 +47,7 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
     Raises
     ------
     InputError
-        Where ``out`` cannot be made or written.
+        Where ``out`` cannot be made or written, or the disk is full.
     """
     try:
         made = [folder for folder in (out, *out.parents) if not folder.exists()]
@@ -76,11 +81,21 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
                         "that uses the folder goes on with it"
                     ) from None
             shutil.rmtree(work)
-        except BaseException:
+        except BaseException as error:
             give_up()
+            if why := _trouble_of_disk(error):
+                raise InputError(f"cannot write to '{out}': {why}; make room, or give another folder (--out)") from None
             raise
         finally:
             _let_go(lock)
+
+
+def _trouble_of_disk(error: BaseException) -> str:
+    """What the disk has against more files, in few words; empty where something else went wrong."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number is None and isinstance(error, OSError | RuntimeError) and (told := _HDF5_ERRNO.search(str(error))):
+        number = int(told[1])
+    return os.strerror(number) if number is not None and number in _OF_DISK else ""
 
 
 def _own_folder(out: Path) -> tuple[Path, int | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -21,7 +22,7 @@ def fill(folder: Path, text: str) -> None:
     (folder / "store" / text).write_text(text)
 
 
-def fill_and_fail(out: Path, error: type[BaseException]) -> None:
+def fill_and_fail(out: Path, error: BaseException | type[BaseException]) -> None:
     with all_or_nothing(out) as folder:
         fill(folder, "second")
         raise error
@@ -51,6 +52,23 @@ def test_after_an_error_all_is_as_before(tmp_path: Path, error: type[BaseExcepti
     with pytest.raises(error):
         fill_and_fail(out, error)
     assert contents(out) == {"maps", "store", "store/first"}
+
+
+FULL = "Can't decrement id ref count (file write failed: time = now, errno = 28, error message = 'No space left on device')"
+
+
+@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), RuntimeError(FULL)])  # as of HDF5
+def test_a_full_disk_is_said_in_one_line(tmp_path: Path, error: Exception) -> None:
+    with pytest.raises(InputError, match=r"cannot write to '.*out': No space left on device; .*--out"):
+        fill_and_fail(tmp_path / "out", error)
+    assert contents(tmp_path) == set()
+
+
+def test_other_errors_are_not_taken_for_a_full_disk(tmp_path: Path) -> None:
+    for error in (FileNotFoundError(errno.ENOENT, "No such file", "x"), OSError("what"), RuntimeError("errno = 2")):
+        with pytest.raises(type(error)) as caught, all_or_nothing(tmp_path / "out"):
+            raise error
+        assert caught.value is error
 
 
 def test_folders_that_were_made_go_again_and_others_stay(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import zipfile
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -40,8 +41,10 @@ class Checkpoint(NamedTuple):
 
 def save_checkpoint(path: Path, state: Checkpoint) -> None:
     """Write it; one that is there is replaced in one step. InputError where it cannot be written."""
+    content = io.BytesIO()  # torch does not say what is wrong with a disk
+    torch.save(state._asdict(), content)
     with atomic_file(path) as file:
-        torch.save(state._asdict(), file)
+        file.write(content.getbuffer())
 
 
 def load_checkpoint(path: Path) -> Checkpoint:

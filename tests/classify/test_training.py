@@ -137,6 +137,18 @@ def test_a_file_that_is_no_checkpoint_is_refused_in_one_line(tmp_path: Path, how
     assert not harmed.exists()
 
 
+def test_a_full_disk_is_said_in_one_line(tmp_path: Path) -> None:
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
+    try:
+        with pytest.raises(InputError, match=r"cannot write '.*checkpoint\.pt': File too large"):
+            save_checkpoint(tmp_path / "checkpoint.pt", Checkpoint({"weights": torch.zeros(50_000)}, {}, 1, []))
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_checkpoint_of_another_network_is_refused(examples: Examples, tmp_path: Path) -> None:
     path = tmp_path / "checkpoint.pt"
     train_network(examples, examples, TINY.changed(epochs=1), checkpoint=path)
