@@ -21,6 +21,7 @@ from rtradar.radar import Radar
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _BODY = ("build", "height_m")
+"""What a synthetic subject has for life, and is drawn with the subject."""
 _LATER = (
     "multiplexing",
     "carrier_step_hz",
@@ -31,7 +32,7 @@ _LATER = (
     "tx_antenna",
     "rx_antenna",
 )
-"""What a synthetic subject has for life, and is drawn with the subject."""
+"""Fields of a radar that came later: not told where they are the default, so that the names of samples made before stay."""
 
 
 class _Interval(NamedTuple):
@@ -139,7 +140,6 @@ def _recipe(interval: _Interval, setting: Setting, common: Mapping[str, Any]) ->
 @lru_cache(maxsize=16)
 def _radar_parameters(radar: Radar) -> dict[str, Any]:
     told = asdict(radar)
-    # Left out where they are the default: these came later, and the names of samples made before shall stay.
     later = {field.name: field.default for field in fields(radar) if field.name in _LATER}
     told = {name: value for name, value in told.items() if name not in later or value != later[name]}
     return told | {"position_m": list(told["position_m"])}

@@ -118,6 +118,11 @@ def open_recording(folder: Path) -> IfRecording:
         radar = Radar(**summary["parameters"]["radar"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:  # an InputError is a ValueError
         raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
+    if not summary["parameters"].get("save_if", True):
+        raise InputError(
+            f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, which kept none; "
+            "run it again with --save-if, into another folder to keep both"
+        )
     if radar.multiplexing == "ddm":
         raise InputError(
             f"'{folder}' holds the sum of all Tx, as Doppler division receives it, which has no tx axis; "

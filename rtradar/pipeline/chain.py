@@ -213,6 +213,7 @@ def run(
             "body_material": body_material,
             "order": order,
             "keep_all": keep_all,
+            "save_if": save_if,
             "detector": detector,
             "radar": dataclasses.asdict(radar),
         }

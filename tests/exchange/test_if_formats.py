@@ -205,6 +205,15 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "walk"]
 
 
+def test_samples_that_a_later_run_into_the_folder_did_not_keep_are_refused(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+    summary = json.loads((run[0] / "summary.json").read_text())
+    summary["parameters"]["save_if"] = False
+    (run[0] / "summary.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match="of an earlier run than the last one"):
+        export(run[0], tmp_path / "x.mat")
+    assert not (tmp_path / "x.mat").exists()
+
+
 def test_samples_that_are_not_finite_are_refused_as_int16(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     zarr.open_array(run[0] / "if.zarr", mode="r+")[5, 1, 2] = np.nan
     with pytest.raises(InputError, match="not finite"):
