@@ -90,6 +90,32 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
             _let_go(lock)
 
 
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """While this lasts no other process of this machine does the same in the folder; after the end of a process it may.
+
+    Parameters
+    ----------
+    folder : path
+        One that is there.
+
+    Raises
+    ------
+    InputError
+        Where another is in it.
+    """
+    try:
+        lock = _lock(folder)
+    except BlockingIOError:
+        raise InputError(f"another command writes into '{folder}'; wait for its end, or give another folder (--out)") from None
+    except OSError as error:
+        raise InputError(f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)") from None
+    try:
+        yield
+    finally:
+        _let_go(lock)
+
+
 def _trouble_of_disk(error: BaseException) -> str:
     """What the disk has against more files, in few words; empty where something else went wrong."""
     number = error.errno if isinstance(error, OSError) else None

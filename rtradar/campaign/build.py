@@ -20,6 +20,7 @@ from rtradar.campaign.work import Outcome, work
 from rtradar.clouds.collection_index import sweep, write_index
 from rtradar.clouds.sample import is_whole, sample_path
 from rtradar.errors import InputError
+from rtradar.output_folder import alone_in
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,8 @@ def build_dataset(
     Raises
     ------
     InputError
-        Where the specification has no meaning, the folder cannot be written, or a sample cannot be made.
+        Where the specification has no meaning, the folder cannot be written, another build writes into it, or a sample cannot
+        be made.
     CampaignError
         Where workers or their scheduler were lost.
     """
@@ -89,29 +91,30 @@ def build_dataset(
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f"cannot make folder '{out}': {error.strerror}; give another one (--out)") from None
-    sweep(folder)
-    store = Store.look(found, folder)
-    write_index(folder, [recipe.identity for recipe in found])
-    report: dict[str, Any] = {
-        "samples": len(found),
-        "by": counts(found),
-        "whole": store.whole,
-        "damaged": store.damaged,
-    }
-    began = time.perf_counter()
-    done: list[Outcome] = []
-    count = 0
-    if store.missing:
-        try:
-            with dask_client(workers, scheduler) as client:
-                count = len(client.scheduler_info(n_workers=-1)["workers"])
-                chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
-                done = work(client, chosen, folder, made=make)
-        except BaseException:
-            if scheduler is None:  # its workers are gone; those of others may still write
-                sweep(folder)
-            raise
+    with alone_in(folder):
         sweep(folder)
+        store = Store.look(found, folder)
+        write_index(folder, [recipe.identity for recipe in found])
+        report: dict[str, Any] = {
+            "samples": len(found),
+            "by": counts(found),
+            "whole": store.whole,
+            "damaged": store.damaged,
+        }
+        began = time.perf_counter()
+        done: list[Outcome] = []
+        count = 0
+        if store.missing:
+            try:
+                with dask_client(workers, scheduler) as client:
+                    count = len(client.scheduler_info(n_workers=-1)["workers"])
+                    chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
+                    done = work(client, chosen, folder, made=make)
+            except BaseException:
+                if scheduler is None:  # its workers are gone; those of others may still write
+                    sweep(folder)
+                raise
+            sweep(folder)
     troubles = [outcome for outcome in done if outcome.trouble]
     good = [outcome for outcome in done if not outcome.trouble]
     if troubles:

@@ -26,6 +26,7 @@ from rtradar.clouds import Collection, Sample
 from rtradar.clouds.collection_index import sweep, write_index
 from rtradar.clouds.sample import sample_path
 from rtradar.errors import CampaignError, InputError
+from rtradar.output_folder import alone_in
 
 RECIPES = [
     Recipe(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
@@ -163,6 +164,20 @@ def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> N
     assert (sample.label, sample.points.shape) == ("walk", (3000, 3))
     assert sample.provenance["detections"] > 0
     assert 0 < len(found.spatial(0)) <= 3000
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
+def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_first(tmp_path: Path) -> None:
+    (tmp_path / "small.toml").write_text(RADAR)
+    (tmp_path / "set.toml").write_text(TINY)
+    out = tmp_path / "out"
+    out.mkdir()
+    unfinished = out / ".0123.npz.4567.part"
+    with alone_in(out):
+        unfinished.write_bytes(b"half")
+        with pytest.raises(InputError, match=r"another command writes into .*out.*; wait"):
+            build_dataset(tmp_path / "set.toml", out)
+    assert list(out.iterdir()) == [unfinished]
 
 
 def test_a_plan_estimates_what_it_does_not_make(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
