@@ -100,10 +100,10 @@ def test_an_isotropic_antenna_is_the_same_all_round() -> None:
         ({"azimuth_deg": [0]}, "of pattern = 'table'"),
         ({"gain": 3}, "unknown key 'gain'"),
         ({"two\nlines": 3}, r"unknown key 'two\\nlines'"),
-        ({"pattern": "cosine", "exponent": 16**500}, "exponent = a number of more than 20 digits; it must lie between 0"),
+        ({"pattern": "cosine", "exponent": 16**500}, "exponent = a number of more than 20 digits; it must be a number from 0"),
         ({"pattern": "isotropic", "exponent": 16**5000}, "exponent = a number of more than 20 digits; only 'cosine'"),
-        ({"gain_dbi": -(16**500)}, "gain_dbi = a number of more than 20 digits; it must lie between -100"),
-        ({"gain_dbi": float("nan")}, "gain_dbi = nan; it must lie between -100"),
+        ({"gain_dbi": -(16**500)}, "gain_dbi = a number of more than 20 digits; it must be a number from -100"),
+        ({"gain_dbi": float("nan")}, "gain_dbi = nan; it must be a number from -100"),
         ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": 16**5000}, "here it is a number of more than 20 digits"),
     ],
 )

@@ -86,7 +86,10 @@ def pieces(text: bytes, good: Arrays) -> dict[str, Piece]:
 
 
 def _piece(kind: str, shape: list[int], values: list[Any]) -> Piece:
-    made = np.dtype(kind)
+    try:
+        made = np.dtype(kind)
+    except SyntaxError:  # NumPy reads words with commas as Python
+        raise ValueError from None
     if made.hasobject or made.itemsize > 4096 or len(shape) > 6 or not all(0 <= length < 2**40 for length in shape):
         raise ValueError
     return Piece(made, tuple(map(int, shape)), np.array(values).astype(made).ravel()[:MOST_VALUES])
