@@ -140,7 +140,8 @@ def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) 
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
     meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
     names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)
-    return CloudTable(names, units, np.column_stack([rows[field].astype(np.float64) for field in order]))
+    with np.errstate(invalid="ignore"):  # a signalling NaN, which is a NaN afterwards and told of as such
+        return CloudTable(names, units, np.column_stack([rows[field].astype(np.float64) for field in order]))
 
 
 def checked(cloud: CloudTable, path: Path) -> CloudTable:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import json
 import shutil
-import time
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
@@ -34,13 +33,18 @@ def refused(read: Any, path: Path, says: str) -> None:
 
 
 @pytest.mark.parametrize(("ending", "head", "end"), [(".ply", PLY, b"end_header\n"), (".pcd", PCD, b"DATA binary\n")])
-@pytest.mark.parametrize("comment", [b"a" * 300_000, b"a = b [" * 40_000])
+@pytest.mark.parametrize("comment", [b"a" * 3_000_000, b"a = b [" * 400_000])
 def test_a_long_comment_takes_no_time(tmp_path: Path, ending: str, head: bytes, end: bytes, comment: bytes) -> None:
     path = tmp_path / f"x{ending}"
     path.write_bytes(head + b"# comment " + comment + b"\n" + end + bytes(24))
-    began = time.process_time()
-    assert read_cloud(path).names == ("x", "y", "z")
-    assert time.process_time() - began < 2.0  # with the square of its length: minutes
+    assert read_cloud(path).names == ("x", "y", "z")  # in time that grows with the square of its length: after hours
+
+
+@pytest.mark.parametrize(("ending", "head", "end"), [(".ply", PLY, b"end_header\n"), (".pcd", PCD, b"DATA binary\n")])
+def test_a_signalling_nan_is_told_as_any_other(tmp_path: Path, ending: str, head: bytes, end: bytes) -> None:
+    path = tmp_path / f"x{ending}"
+    path.write_bytes(head.replace(b"double", b"float").replace(b"8 8 8", b"4 4 4") + end + bytes.fromhex("0000a07f") + bytes(8))
+    refused(lambda place: export(place, tmp_path / "x.npz"), path, "holds NaN or infinity")
 
 
 def archive(path: Path, shape: tuple[int, ...], kind: str = "<f8", data_bytes: int = 24) -> Path:
