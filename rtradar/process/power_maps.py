@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import scipy.fft
 from numba import njit
@@ -9,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.process.doppler_division import without_copies
+from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
 from rtradar.process.tapers import weights
 from rtradar.radar import Radar
@@ -103,23 +106,25 @@ def power_map(
     n_cycles, _, _, n_range = cube.shape
     kind = complex_kind(cube)
     real = np.float32 if kind == np.complex64 else np.float64
-    scale = weights(doppler_window, n_cycles, "doppler_window").astype(real)
+    scale: NDArray[Any] = weights(doppler_window, n_cycles, "doppler_window").astype(real)
+    dft = slow_time_dft(n_cycles) if kind == np.complex64 else None
 
-    def add_channel(tx: int, rx: int, total: NDArray[np.floating]) -> None:
-        # One channel at a time fits the cache of a core.
-        weighted = np.empty((n_cycles, n_range), dtype=kind)
-        _weigh(cube[:, tx, rx], scale, weighted)
-        _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
-
-    def tx_power(tx: int) -> NDArray[np.floating]:
+    def tx_power(tx: int, receivers: slice = slice(None)) -> NDArray[np.floating]:
         total = np.zeros((n_cycles, n_range), dtype=real)
-        for rx in range(radar.n_rx):
-            add_channel(tx, rx, total)
+        if dft is not None:
+            add_doppler_power(cube[:, tx, receivers], scale, dft, total)
+            return total
+        for rx in range(radar.n_rx)[receivers]:
+            # One channel at a time fits the cache of a core.
+            weighted = np.empty((n_cycles, n_range), dtype=kind)
+            _weigh(cube[:, tx, rx], scale, weighted)
+            _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
         return total
 
     power = np.zeros((n_cycles, n_range), dtype=real)
     if channel is not None:
-        add_channel(*divmod(channel, radar.n_rx), power)
+        tx, rx = divmod(channel, radar.n_rx)
+        power = tx_power(tx, slice(rx, rx + 1))
     elif radar.multiplexing == "ddm":
         # The rows of all Tx are the same sum; those of the first are not turned.
         power = without_copies(tx_power(0), radar, radar.n_rx)

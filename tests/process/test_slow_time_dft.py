@@ -1,0 +1,64 @@
+from __future__ import annotations
+
+from math import gcd
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
+
+PRODUCTS = [
+    (n, [(a, n // a) for a in range(2, 41) if n % a == 0 and 2 <= n // a <= 40 and gcd(a, n // a) == 1]) for n in range(1, 700)
+]
+
+
+def plain(spectra: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    weighted = spectra.astype(np.complex128) * weights[:, None, None]
+    return (np.abs(np.fft.fft(weighted, axis=0)) ** 2).sum(axis=1)
+
+
+def test_it_serves_numbers_of_cycles_with_two_small_coprime_factors_and_no_others() -> None:
+    for n_cycles, pairs in PRODUCTS:
+        assert (slow_time_dft(n_cycles) is not None) == bool(pairs), n_cycles
+
+
+@given(
+    n_cycles=st.sampled_from([n for n, pairs in PRODUCTS if pairs]),
+    channels=st.integers(1, 3),
+    n_range=st.sampled_from([1, 5, 64, 65, 130]),
+    seed=st.integers(0, 2**32 - 1),
+)
+def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    spectra = rng.standard_normal((n_cycles, channels, n_range, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    weights = rng.uniform(0, 1, n_cycles).astype(np.float32)
+    before = rng.uniform(0, 1, (n_cycles, n_range)).astype(np.float32)
+    power, dft = before.copy(), slow_time_dft(n_cycles)
+    assert dft is not None
+    add_doppler_power(spectra, weights, dft, power)
+    expected = plain(spectra, weights)
+    # Rounding of float32 sums of some hundred terms, beside the largest.
+    np.testing.assert_allclose(power - before, expected, rtol=0, atol=3e-6 * expected.max())
+
+
+@pytest.mark.parametrize("n_cycles", [133, 666])
+def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
+    dft = slow_time_dft(n_cycles)
+    assert dft is not None
+    n = np.arange(n_cycles)
+    tones = np.exp(2j * np.pi * np.outer(n, n) / n_cycles).astype(np.complex64)[:, None]
+    power = np.zeros((n_cycles, n_cycles), dtype=np.float32)
+    add_doppler_power(tones, np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power)
+    np.testing.assert_allclose(power, np.eye(n_cycles), atol=1e-6)
+
+
+def test_what_is_no_number_stays_in_its_range_bin() -> None:
+    spectra = np.ones((133, 1, 70), dtype=np.complex64)
+    spectra[7, 0, 3] = np.nan
+    power, dft = np.zeros((133, 70), dtype=np.float32), slow_time_dft(133)
+    assert dft is not None
+    add_doppler_power(spectra, np.ones(133, dtype=np.float32), dft, power)
+    assert np.isnan(power[:, 3]).all()
+    assert np.isfinite(np.delete(power, 3, axis=1)).all()
