@@ -7,6 +7,7 @@ around it. At the edges of the map only those that exist count, with the rank an
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import lru_cache
 
 import numba
 import numpy as np
@@ -61,8 +62,7 @@ def os_cfar(
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     check_quantile(quantile)
-    scales = _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale)
-    ranks = _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
+    scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
     return _by_rows(_os_kernel, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train)
 
 
@@ -87,8 +87,30 @@ def ca_cfar(
         As in `os_cfar`.
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
-    scales = _by_count(counts, lambda n: ca_scale(n, pfa, looks) if scale is None else scale)
+    scales = _ca_law(cells.shape, guard, train, pfa, looks, scale)
     return _by_rows(_ca_kernel, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train)
+
+
+# What depends on the shape of the map alone is the same for all maps of a capture, and takes as long as the map itself.
+_remembered = lru_cache(maxsize=4)
+
+
+@_remembered
+def _os_law(
+    shape: tuple[int, int], guard: int, train: int, quantile: float, pfa: float, looks: int, scale: float | None
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Multiplier and rank of each cell (range, velocity)."""
+    counts = _training_counts(*shape, guard, guard + train)
+    scales = _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale)
+    return scales, _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
+
+
+@_remembered
+def _ca_law(shape: tuple[int, int], guard: int, train: int, pfa: float, looks: int, scale: float | None) -> NDArray[np.float64]:
+    """Multiplier of each cell (range, velocity)."""
+    return _by_count(
+        _training_counts(*shape, guard, guard + train), lambda n: ca_scale(n, pfa, looks) if scale is None else scale
+    )
 
 
 def _checked(
@@ -117,6 +139,7 @@ def _checked(
     return cells, counts
 
 
+@_remembered
 def _training_counts(n_range: int, n_velocity: int, guard: int, reach: int) -> NDArray[np.int32]:
     def overlap(n: int, half: int) -> NDArray[np.int32]:
         i = np.arange(n)
@@ -148,12 +171,31 @@ def _by_rows(kernel: Callable[..., None], cells: NDArray[np.floating], *given: o
 def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):  # type: ignore[no-untyped-def]
     """Mask of the rows from begin to end: at least ``rank`` training cells lie below the threshold, the cell over its multiplier.
 
-    Counting needs no sorting, and stops after the first rows that settle the question.
+    Counting needs no sorting, and stops after the first rows that settle the question: for most cells, which hold noise, as
+    few as could, and those are counted for all cells of a row side by side.
     """
     n_range, n_velocity = cells.shape
+    inside = max(n_velocity - 2 * reach, 0)  # cells with all their neighbours in the row
+    below_first = np.empty(inside, dtype=np.int32)
     for i in range(begin, end):
         top, bottom = max(i - reach, 0), min(i + reach, n_range - 1)
+        seen_first = 0
+        below_first[:] = 0
+        limits = thresholds[i, reach : reach + inside]
+        for a in range(top, bottom + 1):
+            if i - guard <= a <= i + guard or inside == 0:
+                continue
+            if seen_first > counts[i, reach] - ranks[i, reach]:
+                break
+            for shift in range(2 * reach + 1):
+                neighbours = cells[a, shift : shift + inside]
+                for j in range(inside):
+                    below_first[j] += neighbours[j] < limits[j]
+            seen_first += 2 * reach + 1
         for j in range(n_velocity):
+            if reach <= j < reach + inside and seen_first - below_first[j - reach] > counts[i, j] - ranks[i, j]:
+                mask[i, j] = False
+                continue
             left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
             inner_left, inner_right = max(j - guard, 0), min(j + guard, n_velocity - 1)
             threshold = thresholds[i, j]
