@@ -155,9 +155,10 @@ def _add_power(  # type: ignore[no-untyped-def]
 ):
     cycles, channels, n_range = spectra.shape
     # Made here, for then the compiler knows that they do not overlap.
-    grid = np.zeros((cycles, 2 * _COLUMNS), dtype=np.float32)
-    even, odd = np.zeros((_LARGEST, 2 * _COLUMNS), dtype=np.float32), np.zeros((_LARGEST, 2 * _COLUMNS), dtype=np.float32)
+    grid = np.empty((cycles, 2 * _COLUMNS), dtype=np.float32)
+    even, odd = np.empty((_LARGEST, 2 * _COLUMNS), dtype=np.float32), np.empty((_LARGEST, 2 * _COLUMNS), dtype=np.float32)
     cosine_part, sine_part = np.empty(2 * _COLUMNS, dtype=np.float32), np.empty(2 * _COLUMNS, dtype=np.float32)
+    grid[:] = 0
     for channel in range(channels):
         for begin in range(0, n_range, _COLUMNS):
             end = min(begin + _COLUMNS, n_range)

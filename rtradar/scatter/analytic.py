@@ -61,7 +61,7 @@ def far_field_echo(
 def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):  # type: ignore[no-untyped-def]
     chirps, receivers, parts = length.shape
     for chirp in prange(chirps):
-        to_tx, toward = np.empty(3), np.empty(3)
+        to_tx = np.empty(3)
         # Receivers side by side: to each of them in the axes of the part, then length and amplitude. One array of a size that is
         # known beforehand: of many the compiler would have to fear that they overlap.
         lanes = np.empty((5, _LANES))
@@ -74,8 +74,7 @@ def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
                     to_tx[i] += frame[j, i] * (tx[chirp, j] - centre[j])
             norm_tx = math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
             t0, t1, t2 = to_tx[0], to_tx[1], to_tx[2]
-            toward[:] = to_tx / norm_tx
-            u0, u1, u2 = toward[0], toward[1], toward[2]
+            u0, u1, u2 = t0 / norm_tx, t1 / norm_tx, t2 / norm_tx
             root_volume = math.sqrt(math.pi) * a * b * c
             for first in range(0, receivers, _LANES):
                 count = min(_LANES, receivers - first)

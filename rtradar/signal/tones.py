@@ -127,17 +127,14 @@ def add_tones(  # type: ignore[no-untyped-def]
     # The last pair of blocks may reach past the last sample, the last tones added together past the last tone: these are silent.
     pairs, tones = (samples + 2 * LANES - 1) // (2 * LANES), (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
     sum_re, sum_im = np.empty(pairs * 2 * LANES, dtype=ramp.dtype), np.empty(pairs * 2 * LANES, dtype=ramp.dtype)
-    lanes, now = np.zeros(tones * 2 * LANES, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
+    lanes, now = np.empty(tones * 2 * LANES, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
     rr, ii, ri, ir = np.empty_like(ramp), np.empty_like(ramp), np.empty_like(ramp), np.empty_like(ramp)
-    start_re, start_im = np.zeros(tones), np.zeros(tones)
-    squares_re, squares_im = np.zeros((_SQUARES, tones)), np.zeros((_SQUARES, tones))
-    middle_re, middle_im = np.zeros((pairs, tones), dtype=ramp.dtype), np.zeros((pairs, tones), dtype=ramp.dtype)
-    now_re, now_im = np.zeros(tones), np.zeros(tones)
-    varies, heard, coefficient = (
-        np.zeros(tones, dtype=np.bool_),
-        np.empty(echoes, dtype=np.int64),
-        np.empty(POWERS, dtype=np.complex128),
-    )
+    start_re, start_im, now_re, now_im = np.empty(tones), np.empty(tones), np.empty(tones), np.empty(tones)
+    squares_re, squares_im = np.empty((_SQUARES, tones)), np.empty((_SQUARES, tones))
+    middle_re, middle_im = np.empty((pairs, tones), dtype=ramp.dtype), np.empty((pairs, tones), dtype=ramp.dtype)
+    varies, heard, coefficient = np.empty(tones, np.bool_), np.empty(echoes, np.int64), np.empty(POWERS, np.complex128)
+    # What is not filled for a chirp is of the one before, and silent.
+    squares_re[:], squares_im[:], varies[:] = 0.0, 0.0, False
     delay = np.empty(echoes)
     for chirp in range(begin, end):
         for receiver in range(receivers):
@@ -201,7 +198,8 @@ def add_tones(  # type: ignore[no-untyped-def]
                     now_re[i], now_im[i] = start.real, start.imag
             _multiply(now_re, now_im, squares_re[_SQUARES - 2], squares_im[_SQUARES - 2], now_re, now_im)
             for pair in range(pairs):
-                middle_re[pair], middle_im[pair] = now_re, now_im
+                for i in range(tones):
+                    middle_re[pair, i], middle_im[pair, i] = now_re[i], now_im[i]
                 _multiply(now_re, now_im, squares_re[_SQUARES - 1], squares_im[_SQUARES - 1], now_re, now_im)
             _add_constants(lanes, middle_re, middle_im, rr, ii, ri, ir, sum_re, sum_im)
             for sample in range(samples):
