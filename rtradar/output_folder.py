@@ -23,13 +23,14 @@ from rtradar.files import not_to_be_parted, unfinished
 _PREFIX = ".rtradar-"
 _WHOLE = f"{_PREFIX}whole-"
 _ASIDE = ".old-"
+_GONE = ".gone-"
 
 _OF_DISK = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")} - {None}
 _HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
 
 
 @contextmanager
-def all_or_nothing(out: Path) -> Iterator[Path]:
+def all_or_nothing(out: Path, pictures: tuple[str, ...] = ()) -> Iterator[Path]:
     """A folder to write into; at the end what is in it moves to ``out``, replacing what has the same name.
 
     What a run that was killed left there is settled first.
@@ -38,6 +39,9 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
     ----------
     out : path
         Made if it is not there; other files in it are left alone.
+    pictures : tuple of str
+        Names, or patterns of names, of files that not every run makes: those of an earlier run go, for they would be taken for
+        this one's.
 
     Yields
     ------
@@ -70,6 +74,9 @@ def all_or_nothing(out: Path) -> Iterator[Path]:
         try:
             yield work
             with not_to_be_parted():
+                for place in {old for pattern in pictures for old in out.glob(pattern)}:
+                    if not (work / place.name).exists():
+                        (work / f"{_GONE}{place.name}").touch()
                 whole = work.with_name(work.name.replace(_PREFIX, _WHOLE, 1))
                 try:
                     work.rename(whole)
@@ -186,6 +193,11 @@ def _move(work: Path, out: Path) -> None:
     try:
         for item in sorted(work.iterdir()):
             if item.name.startswith(_ASIDE):
+                continue
+            if item.name.startswith(_GONE):
+                name = item.name.removeprefix(_GONE)
+                with suppress(FileNotFoundError):
+                    os.replace(out / name, work / f"{_ASIDE}{name}")
                 continue
             place = out / item.name
             if item.is_dir() or (place.is_dir() and not place.is_symlink()):

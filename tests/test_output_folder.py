@@ -44,6 +44,22 @@ def test_files_and_folders_of_the_same_name_are_replaced_and_others_left(tmp_pat
     assert (out / "maps").read_text() == "second"
 
 
+def test_pictures_that_the_new_run_does_not_make_go(tmp_path: Path) -> None:
+    for name in ("plan.png", "learning-1.png", "learning-12.png", "learning-mine.png", "other.png"):
+        (tmp_path / name).write_text("old")
+    with all_or_nothing(tmp_path, ("plan.png", "learning-[0-9]*.png", "never.png")) as folder:
+        (folder / "learning-1.png").write_text("new")
+    assert contents(tmp_path) == {"learning-1.png", "learning-mine.png", "other.png"}
+    assert (tmp_path / "learning-1.png").read_text() == "new"
+
+
+def test_after_an_error_pictures_stay(tmp_path: Path) -> None:
+    (tmp_path / "plan.png").touch()
+    with pytest.raises(ValueError, match="no"), all_or_nothing(tmp_path, ("plan.png",)):
+        raise ValueError("no")
+    assert contents(tmp_path) == {"plan.png"}
+
+
 @pytest.mark.parametrize("error", [ValueError, KeyboardInterrupt, MemoryError])
 def test_after_an_error_all_is_as_before(tmp_path: Path, error: type[BaseException]) -> None:
     out = tmp_path / "out"
@@ -140,7 +156,7 @@ def slowly(*places):
     print("moved", flush=True)
     time.sleep(0.5)
 os.replace = slowly
-with all_or_nothing(out) as folder:
+with all_or_nothing(out, ("plan*.png",)) as folder:
     for name in ("clouds", "maps"):
         (folder / name).write_text("first")
 """
@@ -173,7 +189,7 @@ def killed_at(real):
         return real(*places, **named)
     return move
 os.rename, os.replace, os.rmdir = killed_at(os.rename), killed_at(os.replace), killed_at(os.rmdir)
-with all_or_nothing(out) as folder:
+with all_or_nothing(out, ("plan*.png",)) as folder:
     for name in ("clouds", "maps"):
         (folder / name).write_text("second")
     for name in ("new", "store"):
@@ -190,20 +206,22 @@ def test_a_process_killed_at_any_move_leaves_all_of_the_old_or_all_of_the_new_to
         out = tmp_path / str(last)
         with all_or_nothing(out) as folder:
             fill(folder, "first")
+            (folder / "plan.png").touch()
         done = subprocess.run([sys.executable, "-c", KILLED, str(out), str(last)], stdout=subprocess.PIPE, text=True, check=False)
         settle(out)
         ends.append((out / "maps").read_text())
         if ends[-1] == "first":
-            assert contents(out) == {"maps", "store", "store/first"}
+            assert contents(out) == {"maps", "plan.png", "store", "store/first"}
         else:
             assert contents(out) == {"clouds", "maps", "new", "new/second", "store", "store/second"}
             assert (out / "clouds").read_text() == "second"
         if done.stdout:
             break
     assert done.returncode == 0
-    # The folder takes its new name; four things move, one over an old folder; it takes its name back; its folders are removed.
+    # The folder takes its new name; a picture goes, and four things move, one over an old folder; it takes its name back; its
+    # folders are removed.
     assert ends[0] == "first"
-    assert ends.count("second") > 6
+    assert ends.count("second") > 7
 
 
 def test_a_folder_in_use_is_let_be(tmp_path: Path) -> None:

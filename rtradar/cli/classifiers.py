@@ -109,7 +109,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     check_place(options.json)
     from rtradar.classify.study import load_study
     from rtradar.output_folder import all_or_nothing
-    from rtradar.report.evaluation import write_evaluation
+    from rtradar.report.evaluation import NUMBERED_PICTURES, write_evaluation
 
     studies = [load_study(folder) for folder in options.trained]
     baselines = {}
@@ -121,7 +121,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
     out = options.out or options.trained[0]
-    with all_or_nothing(out) as folder:
+    with all_or_nothing(out, NUMBERED_PICTURES) as folder:
         table, content = write_evaluation(studies, baselines, folder)
     if options.json is not None:
         write_json(options.json, content)

@@ -21,11 +21,11 @@ from rtradar.motion import Motion
 from rtradar.output_folder import all_or_nothing
 from rtradar.pipeline.if_array import if_array
 from rtradar.pipeline.moments import moments
-from rtradar.pipeline.pictures import draw_pictures
+from rtradar.pipeline.pictures import PICTURES, draw_pictures
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.room_pictures import draw_room_pictures
+from rtradar.pipeline.room_pictures import ROOM_PICTURES, draw_room_pictures
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
@@ -93,7 +93,7 @@ def run(
     scene : Scene, optional
         Free space if left out.
     out : path
-        Folder; files of the same name in it are replaced, others left alone.
+        Folder; files of the same name in it are replaced, pictures of an earlier run removed, others left alone.
     fidelity : str
         The rung; `rtradar.scatter.RUNGS` has their names.
     start_s, duration_s : float
@@ -172,7 +172,7 @@ def run(
     windows, n_chirps, warmup_s, title = capture.windows, capture.n_chirps, capture.warmup_s, capture.title
     received = ReceivedWindow(radar, int(windows[len(windows) // 2])) if clutter_removal != "none" else None
     give_back_memory()  # what compiling and the pass over the whole recording took
-    with all_or_nothing(Path(out)) as folder:
+    with all_or_nothing(Path(out), PICTURES + ROOM_PICTURES) as folder:
         products = Products(
             folder / "maps.h5", radar, detect=detect, seed=seed, stages=stages, title=title, removal=removal, received=received
         )

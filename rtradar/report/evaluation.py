@@ -28,6 +28,9 @@ from rtradar.report.classifier_figures import draw_accuracies, draw_confusion, d
 
 Group = tuple[str, Sequence[Outcome]]
 
+NUMBERED_PICTURES = ("confusion-[0-9]*.png", "learning-[0-9]*.png", "transfer-[0-9]*.png")
+"""Patterns of the names of those that are drawn for each study."""
+
 
 def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome]], out: Path) -> tuple[str, dict[str, Any]]:
     """Tables, pictures and numbers of some studies of the same clouds, and of baselines.

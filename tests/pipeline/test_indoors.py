@@ -59,7 +59,8 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tm
     # A conducting mirror d = 1.5 m to the left sends the field 1 / (2 d), that of sqrt(4 pi) / (2 d) for |F| / (R1 R2); 10 % in
     # power for antennas some 5 cm from the array's middle.
     assert kept["side"]["power_m2"] == pytest.approx(4 * np.pi / (2 * 1.5) ** 2, rel=0.1)
-    for picture in ("plan.png", "clutter_removal.png", "range_azimuth_walls.png"):
+    pictures = {"plan.png", "clutter_removal.png", "range_azimuth_walls.png"}
+    for picture in pictures:
         assert (tmp_path / "out" / picture).stat().st_size > 1000
     with h5py.File(tmp_path / "out" / "maps.h5") as maps:
         window = int(np.abs(maps["time"][:] - maps["range_doppler_received"].attrs["time_s"]).argmin())
@@ -69,6 +70,9 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tm
         assert before[wall, still] > 1e4 * after[wall, still]
         # What moves stays: beyond the bins beside zero both maps are the same.
         np.testing.assert_allclose(before[:, : still - 2], after[:, : still - 2], rtol=1e-2, atol=1e-6 * before.max())
+    # Without a room they would be of another run than all else.
+    rt.run(motion, RADAR, out=tmp_path / "out", fidelity="analytic", pfa=1e-4)
+    assert {path.name for path in (tmp_path / "out").glob("*.png")}.isdisjoint(pictures)
 
 
 def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
