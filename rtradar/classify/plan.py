@@ -18,8 +18,11 @@ _MOST_NAMES = 10_000  # of classes, and of trainings
 def check_plan(out: Path, plan: dict[str, Any]) -> None:
     """Raise where the folder holds another plan; where the data lie may change."""
     path = out / PLAN
-    if not path.exists():
-        return
+    try:
+        if not path.exists():
+            return
+    except OSError as error:  # such as a name that is too long
+        raise _unwritable(out, error) from None
     try:
         there = read_json(path)
         free = {"data"} | ({"made"} - there.keys())
@@ -36,7 +39,7 @@ def write_plan(out: Path, plan: dict[str, Any]) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+        raise _unwritable(out, error) from None
     with atomic_file(out / PLAN) as file:
         file.write((json.dumps(plan, indent=1) + "\n").encode())
 
@@ -58,6 +61,10 @@ def read_plan(folder: Path) -> dict[str, Any]:
         raise InputError(f"'{folder}' holds no trainings ({PLAN}: {error.strerror}); make them with: rtradar train") from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"'{folder / PLAN}' is damaged; train into another folder") from None
+
+
+def _unwritable(out: Path, error: OSError) -> InputError:
+    return InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)")
 
 
 def _difference(was: Any, now: Any) -> tuple[Any, Any]:

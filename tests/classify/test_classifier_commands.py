@@ -102,6 +102,15 @@ def test_trainings_of_one_folder_learn_from_the_same_clouds(made_up: Callable[..
     assert len(train_study(clouds, tmp_path, recipe, folds=2).outcomes) == 2
 
 
+def test_a_folder_that_cannot_be_is_said_in_one_line(
+    collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert rtradar("train", collection, "--out", tmp_path / ("a" * 300), *TINY) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert len(said) == 1
+    assert said[0].endswith("File name too long; give a folder that can be written (--out)")
+
+
 def test_an_interrupted_command_says_how_to_go_on(
     collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
