@@ -15,7 +15,7 @@ from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
 _ECHO = 24  # bytes of a float64 length and a complex128 amplitude
-_MULTIPLY_ADDS = 4  # of a complex amplitude times a complex power, added up
+_MULTIPLY_ADDS = 2  # of a complex amplitude times a complex power, which is another's conjugate, added up
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,10 @@ class Rates:
     random_words : float
         64-bit random words drawn.
     multiply_adds : float
-        float64, in a matrix product.
+        float32, in a matrix product.
     range_ffts, doppler_ffts, spectrogram_ffts, angle_ffts : float
         complex64 transforms of the radar's lengths: samples a chirp, cycles a frame, cycles of a spectrogram's window, and
-        directions of a line.
+        directions of a line; over the cycles of a frame by the library, or as fast as the multiply-adds of our own would go.
     """
 
     copied_bytes: float
@@ -141,13 +141,13 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
     return {
         ELSEWHERE: Floor(copied(2 * _SAMPLE * samples), "spectra kept for the windows"),
         "scatter": Floor(copied(_ECHO * echoes), "lengths and amplitudes written"),
-        "signal": Floor(tones, "four multiply-adds an echo and sample, or samples written"),
+        "signal": Floor(tones, "two multiply-adds an echo and sample, or samples written"),
         "noise": Floor(max(samples / rates.random_words, copied(2 * _SAMPLE * samples)), "a random word a sample"),
         "range": Floor(
             max(samples / work.samples / rates.range_ffts, copied(2 * _SAMPLE * samples)), "an FFT a chirp and receiver"
         ),
         "spectrogram": Floor(work.spectrogram_columns * work.samples / rates.spectrogram_ffts, "an FFT a column and range bin"),
-        "doppler": Floor(doppler, "an FFT a window, channel and range bin"),
+        "doppler": Floor(doppler, "an FFT a window, channel and range bin, or spectra read"),
         "cfar": Floor(copied(5 * work.cells), "power read, mask written"),
         "cloud": Floor(copied(work.cells), "masks read"),
         "angle": Floor(

@@ -12,6 +12,7 @@ import scipy.fft
 
 from rtradar.bench.floors import Rates, direction_count
 from rtradar.process import SPECTROGRAM_CYCLES
+from rtradar.process.slow_time_dft import slow_time_dft
 from rtradar.radar import Radar
 
 _REPEATS, _LEAST_S = 5, 0.3
@@ -23,12 +24,13 @@ _MATRIX = 1536
 
 def measure_rates(radar: Radar) -> Rates:
     """Measure all, the best of some, with the lengths of this radar's transforms; takes a few seconds."""
+    multiply_adds = _multiply_adds()
     return Rates(
         copied_bytes=_copied_bytes(),
         random_words=_random_words(),
-        multiply_adds=_multiply_adds(),
+        multiply_adds=multiply_adds,
         range_ffts=_ffts(radar.samples_per_chirp),
-        doppler_ffts=_ffts(radar.cycles_per_frame),
+        doppler_ffts=_doppler_ffts(radar.cycles_per_frame, multiply_adds),
         spectrogram_ffts=_ffts(SPECTROGRAM_CYCLES),
         angle_ffts=_ffts(max(1, direction_count(radar))),
     )
@@ -68,8 +70,14 @@ def _random_words() -> float:
 
 
 def _multiply_adds() -> float:
-    a, b, out = np.ones((_MATRIX, _MATRIX)), np.ones((_MATRIX, _MATRIX)), np.empty((_MATRIX, _MATRIX))
+    a, b, out = (np.ones((_MATRIX, _MATRIX), dtype=np.float32) for _ in range(3))
     return _MATRIX**3 / best_s(lambda: np.matmul(a, b, out=out))
+
+
+def _doppler_ffts(cycles: int, multiply_adds: float) -> float:
+    """Transforms a second by the library, or by our own sums if these are fewer multiply-adds."""
+    dft = slow_time_dft(cycles)
+    return max(_ffts(cycles), multiply_adds / dft.multiply_adds if dft is not None else 0)
 
 
 def _ffts(length: int) -> float:

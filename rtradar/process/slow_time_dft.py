@@ -46,6 +46,12 @@ class SlowTimeDft(NamedTuple):
     sines: tuple[NDArray[np.float32], NDArray[np.float32]]
     factors: tuple[int, int]
 
+    @property
+    def multiply_adds(self) -> int:
+        """Of one transform: those of the sums, real and imaginary parts."""
+        squares = [(factor // 2 + 1) ** 2 + ((factor - 1) // 2) ** 2 for factor in self.factors]
+        return 2 * sum(len(self.cycle_at) // factor * count for factor, count in zip(self.factors, squares, strict=True))
+
 
 @lru_cache(maxsize=8)
 def slow_time_dft(n_cycles: int) -> SlowTimeDft | None:

@@ -78,7 +78,7 @@ def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path
     assert specular["over_analytic"] == 2.0  # 8 s over 4 s
     assert specular["paper_over"] == {"to_cloud": 30.0 / 8.0, "if": 24.0 / 7.0}
     assert specular["stages"]["elsewhere"]["median"] == 0.5
-    assert specular["stages"]["signal"]["floor"] == pytest.approx(4 * 21 * CHIRPS * 8 * 256 / 1e10)
+    assert specular["stages"]["signal"]["floor"] == pytest.approx(2 * 21 * CHIRPS * 8 * 256 / 1e10)
     assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0, "floor": None, "rule": ""}
     assert [row["first_use"] is None for row in rows] == [False, False, False, True, True, True, True]
     assert found["growth"]["chirps"][0] == {

@@ -62,3 +62,10 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
     add_doppler_power(spectra, np.ones(133, dtype=np.float32), dft, power)
     assert np.isnan(power[:, 3]).all()
     assert np.isfinite(np.delete(power, 3, axis=1)).all()
+
+
+def test_its_multiply_adds_are_counted() -> None:
+    dft = slow_time_dft(6)
+    assert dft is not None
+    # Three sums of two terms, for two frequencies each, and two of three, folded to two even terms and an odd one: times two parts.
+    assert dft.multiply_adds == 2 * (3 * 2 * 2 + 2 * (2 * 2 + 1))
