@@ -54,6 +54,7 @@ TRAININGS = {
     "recorded": "paper-400 real --split recorded",
     "real": "real --split recording --folds 2",
     "noise": "noise --folds 5",
+    "transfer-free-space": "transfer-free-space --split across:fidelity",
     "transfer": "transfer-free-space transfer-room --split across:fidelity,scene",
 }
 """Folders of trainings, and the clouds and options of each."""
@@ -62,7 +63,7 @@ SHOWN = {
     "table-4": (*(f"lean-{size}" for size in SIZES), *(f"paper-{size}" for size in SIZES)),
     "dead-rate": ("paper-1000", "paper-1000-all-epochs", "paper-1000-first-trial"),
     "readings": ("paper-1000", "paper-1000-unit-sphere", "paper-1000-turned"),
-    **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer")},
+    **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer-free-space", "transfer")},
 }
 """Evaluations, each with simple classifiers on the first of its trainings."""
 
