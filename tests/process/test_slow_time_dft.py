@@ -67,5 +67,5 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
 def test_its_multiply_adds_are_counted() -> None:
     dft = slow_time_dft(6)
     assert dft is not None
-    # Three sums of two terms, for two frequencies each, and two of three, folded to two even terms and an odd one: times two parts.
+    # Three sums of two terms, for two frequencies each, and two of three, folded to two even terms and an odd one; of both parts.
     assert dft.multiply_adds == 2 * (3 * 2 * 2 + 2 * (2 * 2 + 1))
