@@ -8,6 +8,7 @@ the output folder, to write or to read, goes on with the moves. What is not whol
 from __future__ import annotations
 
 import errno
+import json
 import os
 import re
 import shutil
@@ -23,7 +24,7 @@ from rtradar.files import not_to_be_parted, unfinished
 _PREFIX = ".rtradar-"
 _WHOLE = f"{_PREFIX}whole-"
 _ASIDE = ".old-"
-_GONE = ".gone-"
+_TO_GO = ".to-go.json"
 
 _OF_DISK = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")} - {None}
 _HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
@@ -74,9 +75,9 @@ def all_or_nothing(out: Path, pictures: tuple[str, ...] = ()) -> Iterator[Path]:
         try:
             yield work
             with not_to_be_parted():
-                for place in {old for pattern in pictures for old in out.glob(pattern)}:
-                    if not (work / place.name).exists():
-                        (work / f"{_GONE}{place.name}").touch()
+                if pictures:
+                    own = [item.name for item in work.iterdir()]
+                    (work / _TO_GO).write_text(json.dumps({"pictures": pictures, "but": own}), encoding="utf-8")
                 whole = work.with_name(work.name.replace(_PREFIX, _WHOLE, 1))
                 try:
                     work.rename(whole)
@@ -191,13 +192,12 @@ def _move(work: Path, out: Path) -> None:
     # Of two runs that end at once in one folder, one waits: what lies there is of one run.
     alone = _lock(out, wait=True)
     try:
+        if (work / _TO_GO).exists():
+            told = json.loads((work / _TO_GO).read_text(encoding="utf-8"))
+            for old in sorted({old for pattern in told["pictures"] for old in out.glob(pattern) if old.name not in told["but"]}):
+                os.replace(old, work / f"{_ASIDE}{old.name}")
         for item in sorted(work.iterdir()):
-            if item.name.startswith(_ASIDE):
-                continue
-            if item.name.startswith(_GONE):
-                name = item.name.removeprefix(_GONE)
-                with suppress(FileNotFoundError):
-                    os.replace(out / name, work / f"{_ASIDE}{name}")
+            if item.name.startswith(_ASIDE) or item.name == _TO_GO:
                 continue
             place = out / item.name
             if item.is_dir() or (place.is_dir() and not place.is_symlink()):

@@ -156,8 +156,8 @@ def slowly(*places):
     print("moved", flush=True)
     time.sleep(0.5)
 os.replace = slowly
-with all_or_nothing(out, ("plan*.png",)) as folder:
-    for name in ("clouds", "maps"):
+with all_or_nothing(out) as folder:
+    for name in ("clouds", "maps", "plan.png"):
         (folder / name).write_text("first")
 """
 
@@ -166,7 +166,7 @@ with all_or_nothing(out, ("plan*.png",)) as folder:
 def test_two_processes_that_end_at_once_leave_what_is_of_one(tmp_path: Path) -> None:
     with subprocess.Popen([sys.executable, "-c", SLOW, str(tmp_path)], stdout=subprocess.PIPE, text=True) as other:
         assert other.stdout is not None
-        with all_or_nothing(tmp_path) as folder:
+        with all_or_nothing(tmp_path, ("plan*.png",)) as folder:
             for name in ("clouds", "maps"):
                 (folder / name).write_text("second")
             assert other.stdout.readline() == "moved\n"

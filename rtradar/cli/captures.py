@@ -103,7 +103,6 @@ def _run(options: argparse.Namespace) -> int:
     dials = {name: getattr(options, name) for name in ("tolerance_db", "tolerance_complex")}
     dials = {name: value for name, value in dials.items() if value is not None}
     result = run(
-        capture.pop("motion"),  # which nobody holds then but the run, and it lets go
         **capture,
         fidelity=options.fidelity,
         save_if=options.save_if,

@@ -168,8 +168,6 @@ def run(
         order=order,
         keep_all=keep_all,
     )
-    name = motion.name
-    del motion  # an hour of it takes as much memory as all the rest, and what is placed is a copy
     radar, body, inside = capture.radar, capture.body, capture.inside
     windows, n_chirps, warmup_s, title = capture.windows, capture.n_chirps, capture.warmup_s, capture.title
     received = ReceivedWindow(radar, int(windows[len(windows) // 2])) if clutter_removal != "none" else None
@@ -200,7 +198,7 @@ def run(
             return cost(stages, time.perf_counter() - began - warmup_s, warmup_s, n_chirps * radar.chirp_interval_s)
 
         parameters = {
-            "motion": name,
+            "motion": motion.name,
             "scene": scene.name,
             "fidelity": fidelity,
             "start_s": start_s,
