@@ -1,0 +1,245 @@
+"""Radars from files and by name, and values that mean nothing: refused in one line."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rtradar.errors import InputError
+from rtradar.radar import PRESETS, Radar
+
+
+def refusal(call: Any, *args: Any, **values: Any) -> str:
+    """What an `InputError` says, which is one line."""
+    with pytest.raises(InputError) as caught:
+        call(*args, **values)
+    message = str(caught.value)
+    assert message
+    assert "\n" not in message
+    return message
+
+
+def write(folder: Path, text: str | bytes) -> Path:
+    file = folder / "mine.toml"
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    return file
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_a_preset_by_its_name(name: str) -> None:
+    assert Radar.load(name) == Radar.preset(name)
+    assert Radar.load(name).name == name
+
+
+def test_a_file_that_names_every_field(tmp_path: Path) -> None:
+    file = write(
+        tmp_path,
+        """
+        name = "mine"
+        start_frequency_hz = 60e9
+        bandwidth_hz = 2_000_000_000   # a whole number does as well
+        chirp_duration_s = 25e-6
+        samples_per_chirp = 128
+        frame_duration_s = 0.05
+        frame_hop_s = 0.01
+        tx_y = 2
+        tx_z = 1
+        rx_y = 4
+        rx_z = 3
+        tx_spacing_wavelengths = 2
+        rx_spacing_wavelengths = 0.6
+        position_m = [-3, 0.5, 1.2]
+        channels = "all"
+        polarization = "h"
+        """,
+    )
+    expected = Radar(
+        name="mine",
+        start_frequency_hz=60e9,
+        bandwidth_hz=2e9,
+        chirp_duration_s=25e-6,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+        frame_hop_s=0.01,
+        tx_y=2,
+        tx_z=1,
+        rx_y=4,
+        rx_z=3,
+        tx_spacing_wavelengths=2.0,
+        rx_spacing_wavelengths=0.6,
+        position_m=(-3.0, 0.5, 1.2),
+        channels="all",
+        polarization="h",
+    )
+    assert Radar.load(file) == expected
+    assert Radar.load(str(file)) == expected
+
+
+def test_an_empty_file_is_the_default_by_the_name_of_the_file(tmp_path: Path) -> None:
+    assert Radar.load(write(tmp_path, "")) == Radar(name="mine")
+
+
+@pytest.mark.parametrize("call", [Radar.preset, Radar.load])
+def test_unknown_preset(call: Any) -> None:
+    message = refusal(call, "paper-24ghz")
+    assert "'paper-24ghz' is unknown" in message
+    for name in PRESETS:
+        assert name in message
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    message = refusal(Radar.load, tmp_path / "none.toml")
+    assert "none.toml" in message
+    assert "No such file" in message
+
+
+def test_a_folder_is_no_file(tmp_path: Path) -> None:
+    (tmp_path / "folder.toml").mkdir()
+    assert "folder.toml" in refusal(Radar.load, tmp_path / "folder.toml")
+
+
+@pytest.mark.parametrize("text", ["name = ", "tx_y = 6\ntx_y = 7", "\0", b"\xff\xfe", b'name = "\xe9"', "[radar", "12"])
+def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
+    assert "mine.toml' is not TOML: " in refusal(Radar.load, write(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("text", "key"), [("chirp_time_s = 1", "chirp_time_s"), ("[radar]\ntx_y = 1", "radar"), ("n_tx = 3", "n_tx")]
+)
+def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
+    message = refusal(Radar.load, write(tmp_path, text))
+    assert f"unknown key '{key}'" in message
+    assert "chirp_duration_s" in message  # what is allowed
+
+
+POSITIVE = (
+    "start_frequency_hz",
+    "bandwidth_hz",
+    "chirp_duration_s",
+    "frame_duration_s",
+    "frame_hop_s",
+    "tx_spacing_wavelengths",
+    "rx_spacing_wavelengths",
+)
+WHOLE = ("samples_per_chirp", "tx_y", "tx_z", "rx_y", "rx_z")
+
+
+@pytest.mark.parametrize("field", POSITIVE)
+@pytest.mark.parametrize(
+    "value", ["-4e9", "-1", "0", "0.0", "nan", "inf", "-inf", '"4e9"', "true", "[4e9]", "{hz = 4e9}", "1979-05-27"]
+)
+def test_a_quantity_is_a_positive_finite_number(tmp_path: Path, field: str, value: str) -> None:
+    message = refusal(Radar.load, write(tmp_path, f"{field} = {value}"))
+    assert "mine.toml" in message
+    assert f"{field} = " in message
+    assert "positive, finite number" in message
+
+
+@pytest.mark.parametrize("field", WHOLE)
+@pytest.mark.parametrize("value", ["-1", "2.0", "nan", '"8"', "false", "[8]"])
+def test_a_count_is_a_whole_number(tmp_path: Path, field: str, value: str) -> None:
+    message = refusal(Radar.load, write(tmp_path, f"{field} = {value}"))
+    assert f"{field} = " in message
+    assert "whole number" in message
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({"tx_y": 10**400}, "tx_y = a number of more than 20 digits"),
+        ({"bandwidth_hz": 10**400}, "bandwidth_hz = a number of more than 20 digits"),
+        ({"samples_per_chirp": 10**15}, "samples_per_chirp = 1000000000000000"),
+        ({"bandwidth_hz": 1e300}, "bandwidth_hz = 1e+300"),
+        ({"chirp_duration_s": 1e-300}, "chirp_duration_s = 1e-300"),
+        ({"name": 5}, "name = 5"),
+        ({"name": "two\nlines"}, "one line of text"),
+        ({"position_m": "123"}, "three finite numbers"),
+        ({"position_m": ["1", "2", "3"]}, "three finite numbers"),
+        ({"position_m": [True, 0, 0]}, "three finite numbers"),
+        ({"position_m": [10**400, 0, 0]}, "three finite numbers"),
+        ({"channels": "x" * 1000}, "..."),
+        ({"frame_duration_s": 1e9}, "more than 2.1e+09"),
+        ({"chirp_duration_s": 1e-14}, "shorten the frame"),
+        # Every Tx with every Rx: 137 GB, were they written down before the frame is looked at.
+        (dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), 65536) | {"channels": "all"}, "holds no whole TDM cycle"),
+    ],
+)
+def test_values_far_outside_are_refused_in_one_short_line(values: dict[str, Any], says: str) -> None:
+    message = refusal(Radar, **values)
+    assert says in message
+    assert len(message) < 300
+
+
+def test_numpy_scalars_do_as_well() -> None:
+    radar = Radar(bandwidth_hz=np.float32(2e9), tx_y=np.int64(3), position_m=np.array([-4, 1, 1]))  # type: ignore[arg-type]
+    assert (type(radar.bandwidth_hz), type(radar.tx_y)) == (float, int)
+    assert radar.position_m == (-4.0, 1.0, 1.0)
+    assert all(type(value) is float for value in radar.position_m)
+    fdm = Radar(multiplexing="fdm", carrier_step_hz=np.float32(5e6))  # type: ignore[arg-type]
+    ddm = Radar(multiplexing="ddm", channels="all", doppler_bands=np.int64(16))  # type: ignore[arg-type]
+    assert (type(fdm.carrier_step_hz), type(ddm.doppler_bands)) == (float, int)
+
+
+def test_a_hop_far_below_a_cycle_takes_every_cycle() -> None:
+    radar = Radar(tx_y=1, tx_z=0, frame_hop_s=1e-14, frame_duration_s=0.001)
+    assert radar.window_starts(20).tolist() == list(range(20 - radar.cycles_per_frame + 1))
+
+
+def test_a_chirp_has_a_sample() -> None:
+    assert "samples_per_chirp = 0; it must be a whole number from 1 to 65536" in refusal(Radar, samples_per_chirp=0)
+
+
+@pytest.mark.parametrize(
+    "value", ["[1, 2]", "[1, 2, 3, 4]", "[]", "5", "true", '"here"', "[1, 2, nan]", "[1, inf, 3]", '[1, 2, "x"]', "[[1, 2, 3]]"]
+)
+def test_a_place_is_three_finite_numbers(tmp_path: Path, value: str) -> None:
+    message = refusal(Radar.load, write(tmp_path, f"position_m = {value}"))
+    assert "position_m = " in message
+    assert "three finite numbers" in message
+
+
+@pytest.mark.parametrize(("field", "allowed"), [("channels", "pairs, all"), ("polarization", "v, h")])
+@pytest.mark.parametrize("value", ['"x"', '"V"', '""', "1", "true", '["v"]'])
+def test_a_choice_is_one_of_those_named(tmp_path: Path, field: str, allowed: str, value: str) -> None:
+    message = refusal(Radar.load, write(tmp_path, f"{field} = {value}"))
+    assert f"{field} = " in message
+    assert f"allowed: {allowed}" in message
+
+
+@pytest.mark.parametrize(
+    ("lines", "says"),
+    [
+        ({"tx_y": 0, "tx_z": 0}, "no Tx or no Rx"),
+        ({"rx_y": 0, "rx_z": 0}, "no Tx or no Rx"),
+        ({"rx_y": 8, "rx_z": 4}, "8 and 4"),
+        ({"rx_y": 0, "rx_z": 4}, "channels = 'all'"),
+        ({"tx_y": 1, "tx_z": 0, "rx_y": 0, "rx_z": 4}, "channels = 'all'"),
+    ],
+)
+def test_an_array_without_channels(lines: dict[str, int], says: str) -> None:
+    assert says in refusal(Radar, **lines)
+
+
+def test_other_lines_of_receivers_do_with_all_channels() -> None:
+    assert Radar(rx_y=8, rx_z=4, channels="all").n_channels == 12 * 12
+
+
+def test_a_frame_holds_a_cycle() -> None:
+    message = refusal(Radar, chirp_duration_s=0.01)
+    assert "frame_duration_s = 0.1" in message
+    assert "0.12 s" in message
+    assert Radar(chirp_duration_s=0.1 / 12).cycles_per_frame == 1
+
+
+@given(
+    field=st.sampled_from(POSITIVE),
+    value=st.one_of(st.floats(max_value=0), st.just(math.nan), st.just(math.inf), st.none(), st.text(max_size=5), st.booleans()),
+)
+def test_no_value_without_meaning_gets_through(field: str, value: object) -> None:
+    assert f"{field} = {value!r}" in refusal(Radar, **{field: value})
