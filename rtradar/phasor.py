@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from rtradar.compiled import taken_in
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def phasor(turns):  # type: ignore[no-untyped-def]
     """Cosine and sine of so many turns, to 2e-16: by Taylor's series of an eighth, branch-free, and so in vector lanes."""
     quarters = np.floor(4 * turns + 0.5)

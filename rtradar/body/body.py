@@ -8,10 +8,10 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.ellipsoids import Ellipsoids
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.motion.joints import to_nodes
 from rtradar.motion.motion import Motion
@@ -190,7 +190,7 @@ class Body:
         return np.stack([across, np.cross(along, across), along], axis=2)
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _turn(quaternions, rest, out):  # type: ignore[no-untyped-def]
     """Fill ``out (time, part, 3, 3)``: rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last.
 

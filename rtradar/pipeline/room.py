@@ -7,10 +7,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.compiled import compiled
 from rtradar.echoes import Echoes
 from rtradar.scatter.clutter import Clutter
 from rtradar.scatter.clutter_shadow import ClutterShadow, Hidden, smooth
@@ -19,7 +20,7 @@ from rtradar.signal import synthesize
 _Samples = NDArray[np.complex128]
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def _fade(kept, changed, share, tx, out):  # type: ignore[no-untyped-def]
     """Add to ``out (chirp, rx, sample)`` what is kept of the room, and the share of its change that has come."""
     for chirp in prange(len(out)):

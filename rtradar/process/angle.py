@@ -18,10 +18,10 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.compiled import compiled
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.process.cells import cell_spectra
@@ -206,7 +206,7 @@ _CELLS_A_THREAD = 64
 
 
 # By hand: for products of this size the threads of BLAS wait for each other longer than they work.
-@numba.njit(cache=True, nogil=True, fastmath=True)
+@compiled(fastmath=True)
 def _power(begin, end, values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
     """Fill power (cell, sine) of the cells from begin to end.
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.process.angle import AngleSpectra
 from rtradar.process.steering import sine_grid
@@ -90,7 +90,7 @@ def _laid_out(spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[
     return total
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _add_up(power, sines, first, step, bins, total):  # type: ignore[no-untyped-def]
     """Add power (cell, sine), read at sines (cell, angle) between points of the uniform grid, to total (bin, angle)."""
     last = power.shape[1] - 2

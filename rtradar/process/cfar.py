@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import lru_cache
 
-import numba
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.process.cfar_law import ca_scale, check_looks, check_pfa, check_quantile, order_rank, os_scale
 from rtradar.threads import in_threads
@@ -167,7 +167,7 @@ def _by_rows(kernel: Callable[..., None], cells: NDArray[np.floating], *given: o
     return mask
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):  # type: ignore[no-untyped-def]
     """Mask of the rows from begin to end: at least ``rank`` training cells lie below the threshold, the cell over its multiplier.
 
@@ -220,7 +220,7 @@ def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask)
             mask[i, j] = missing <= 0
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled()
 def _ca_kernel(begin, end, cells, sums_wanted, guard, reach, mask):  # type: ignore[no-untyped-def]
     """Mask of the rows from begin to end: the training cells sum to less than the cell times their number over the multiplier.
 

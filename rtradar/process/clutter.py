@@ -32,9 +32,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 
@@ -134,7 +135,7 @@ class ClutterRemoval:
         return cycles
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def _without_mean(cycles, out):  # type: ignore[no-untyped-def]
     """Fill ``out (cycle, cell)`` with what is left of ``cycles`` without their mean."""
     count, cells = cycles.shape

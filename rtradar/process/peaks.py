@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled
 from rtradar.process.parabola import refine
 
 MOST_PEAKS = 3
@@ -59,7 +59,7 @@ def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     return Peaks(*refine(sines, power, index), real)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _highest(power, below, above, index, count):  # type: ignore[no-untyped-def]
     """Fill index (cell, peak) with the maxima, the strongest first and again where there are no more, and count (cell,)."""
     sines, peaks = power.shape[1], index.shape[1]

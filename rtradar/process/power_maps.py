@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
@@ -135,7 +135,7 @@ def power_map(
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _weigh(values, weights, out):  # type: ignore[no-untyped-def]
     """Fill ``out (cycle, range)``: values times the weight of their cycle."""
     for cycle in range(len(out)):
@@ -143,7 +143,7 @@ def _weigh(values, weights, out):  # type: ignore[no-untyped-def]
             out[cycle, place] = values[cycle, place] * weights[cycle]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _add_power(values, total):  # type: ignore[no-untyped-def]
     """Add squared magnitudes to ``total (cycle, range)``."""
     for cycle in range(len(total)):

@@ -14,8 +14,9 @@ from math import gcd
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from rtradar.compiled import compiled, taken_in
 
 _LARGEST = 40
 """Factor: plain sums grow with its square."""
@@ -106,7 +107,7 @@ def add_doppler_power(
     _add_power(spectra, weights, dft.cycle_at, dft.bin_at, *dft.factors, cosines_1, sines_1, cosines_2, sines_2, power)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _fold(grid, first, step, factor, even, odd):  # type: ignore[no-untyped-def]
     """Sums and differences of the rows at the same distance from both ends; real parts stand in the left half of a row.
 
@@ -128,7 +129,7 @@ def _fold(grid, first, step, factor, even, odd):  # type: ignore[no-untyped-def]
             even[factor // 2, c] = grid[first + factor // 2 * step, c]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _combine(table, frequency, rows, out):  # type: ignore[no-untyped-def]
     """Fill ``out (column,)``: the sum of rows, times what the table has for this frequency."""
     t = table[frequency]
@@ -142,7 +143,7 @@ def _combine(table, frequency, rows, out):  # type: ignore[no-untyped-def]
                 out[c] += t0 * rows[k, c] + t1 * rows[k + 1, c] + t2 * rows[k + 2, c] + t3 * rows[k + 3, c] + t4 * rows[k + 4, c]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _add_squares(cosine_part, sine_part, sign, total):  # type: ignore[no-untyped-def]
     """Add squared magnitudes of cosine part plus ``sign`` times sine part to ``total (column,)``."""
     columns = len(cosine_part) // 2
@@ -155,7 +156,7 @@ def _add_squares(cosine_part, sine_part, sign, total):  # type: ignore[no-untype
 _PLUS, _MINUS = np.float32(1), np.float32(-1)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _add_power(  # type: ignore[no-untyped-def]
     spectra, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
 ):

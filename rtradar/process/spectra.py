@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.process.tapers import weights
 from rtradar.radar import Radar
@@ -134,7 +134,7 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
     return spectra
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _taper(values, weights, out):  # type: ignore[no-untyped-def]
     """Fill ``out (chirp, rx, sample)``: values times the weight of their sample."""
     for chirp in range(len(out)):

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.compiled import compiled
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
@@ -57,7 +58,7 @@ def far_field_echo(
     return length, amplitude
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath={"contract"})
+@compiled(parallel=True, fastmath={"contract"})
 def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):  # type: ignore[no-untyped-def]
     chirps, receivers, parts = length.shape
     for chirp in prange(chirps):

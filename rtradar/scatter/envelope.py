@@ -13,9 +13,9 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.first_come import FirstCome
 
 PIECES = 8
@@ -134,7 +134,7 @@ def whole_echo(sample: Sample) -> float:
     return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean()))
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, known_after, slope):  # type: ignore[no-untyped-def]
     """Slopes per place (place, node, pair, part) where a part is known; at the very start that of a straight line."""
     nodes, pairs, parts = ratio.shape[1:]
@@ -166,7 +166,7 @@ def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, 
             left = place
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def stretch(known, place):  # type: ignore[no-untyped-def]
     """The known places (place,) on either side of one in 0 to `PIECES`."""
     left = min(int(place), PIECES - 1)
@@ -178,7 +178,7 @@ def stretch(known, place):  # type: ignore[no-untyped-def]
     return left, right
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def hermite(place, left, right):  # type: ignore[no-untyped-def]
     """Weights of the values at two places and of the slopes there in the cubic between them."""
     step = right - left

@@ -12,15 +12,15 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.facets import Facets
 from rtradar.scatter.triangle_phase import FAST, SERIES, largest_spread, sum_large, sum_small
 from rtradar.threads import in_threads
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):  # type: ignore[no-untyped-def]
     """Facets that any of the antennas may light, by the ball round them all; their count."""
     count_antennas = len(antennas)
@@ -41,7 +41,7 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
     return count
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
     """Path from the antenna to each vertex less that to the origin, which is returned."""
     a, b, c = antenna[0], antenna[1], antenna[2]
@@ -54,7 +54,7 @@ def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
     return distance
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):  # type: ignore[no-untyped-def]
     """Rows of ``view`` for the chosen facets: mean path, two deviations from it, n.s, and the share that is seen."""
     for i in range(len(chosen)):
@@ -69,7 +69,7 @@ def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):
         view[4, i] = seen[f]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u, v, strength):  # type: ignore[no-untyped-def]
     """Mean path, two deviations from it and strength of facets under two views."""
     tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
@@ -89,7 +89,7 @@ def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u,
         strength[i] = size
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled()
 def _integrate(  # type: ignore[no-untyped-def]
     begin, end, vertices, faces, normals, areas, bend, both, part, antennas, row, seen, pairs, carrier, k, spreading, out
 ):
@@ -193,7 +193,8 @@ def facet_integral(
         seen,
         np.ascontiguousarray(pairs, dtype=np.int64),
         np.ascontiguousarray(carrier, dtype=np.float64),
-        np.ascontiguousarray(wavenumber, dtype=np.float64),
+        # What may not be written to is another type to Numba, for which it would compile everything again.
+        np.require(wavenumber, np.float64, ["C", "W"]),
         spreading,
         out,
     )

@@ -11,16 +11,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.facets import Facets
 from rtradar.scatter.triangle_share import positive_share
 from rtradar.trace.clearance import clearance
 from rtradar.trace.facet_visibility import FacetTracer
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, around, out):  # type: ignore[no-untyped-def]
     """Shares of the facets of one part for one antenna; whether any of it is hidden."""
     corner, value, hiders = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
@@ -59,7 +59,7 @@ def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, a
     return hidden
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _all_shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices, faces, around, row, out):  # type: ignore[no-untyped-def]
     """Fill the rows from the second on; the first is that of parts in full view. How many are filled."""
     out[0] = 1.0

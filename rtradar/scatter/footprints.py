@@ -24,9 +24,10 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled
 from rtradar.phasor import phasor
 from rtradar.scatter.triangle_mean import mean_of_phasor
 
@@ -150,7 +151,7 @@ def across(direction: Array, polarization: Literal["v", "h"]) -> Array:
     return side if polarization == "h" else np.cross(direction, side)
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def _radiate(  # type: ignore[no-untyped-def]
     places,
     path,

@@ -19,10 +19,11 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
+from rtradar.compiled import compiled
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
@@ -151,7 +152,7 @@ def _views(
     return share, seen, np.asarray(np.sqrt(smaller * larger)), hiders
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def _clearances(eye, points, centres, frames, semi_axes, out):  # type: ignore[no-untyped-def]
     """How far outside each other part, stretched to a unit sphere, the ray from ``eye`` to each part's point passes."""
     times, parts = points.shape[:2]

@@ -16,10 +16,10 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.compiled import compiled
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import array_nodes
@@ -173,7 +173,7 @@ class ZoneShares:
         return here.fine, nodes, slopes
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _blend(nodes, slopes, fine, where, spread, inside, out):  # type: ignore[no-untyped-def]
     """Cubics in time, then the polynomials over the array."""
     frequencies, pairs, parts = nodes.shape[1:]

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.small_vectors import apply, apply_transposed, dot, normalize, subtract
 
 RIM = 7.0
@@ -25,14 +25,14 @@ MERIDIANS, CELLS = 24, 48
 _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def from_centre(antenna, centre, back, way, out):  # type: ignore[no-untyped-def]
     """The antenna from the centre, in axes in which the ellipsoid is the unit sphere."""
     subtract(antenna, centre, way)
     apply(back, way, out)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, pole, along):  # type: ignore[no-untyped-def]
     """Fill in the map of one zone; False where there is no mirror point.
 
@@ -82,7 +82,7 @@ def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, 
     return True
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untyped-def]
     """Direction of one meridian on the unit sphere into ``step (3,)``; its radians a unit of rho, and rho at its end."""
     for i in range(3):
@@ -96,7 +96,7 @@ def meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untyped
     return pace, min(RIM, end / pace)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _lay_rays(tx, rx, centres, frames, semi_axes, points, wavenumber, out):  # type: ignore[no-untyped-def]
     zones, rays = out.shape[:2]
     stretch, back, pole, along, step = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty(3)

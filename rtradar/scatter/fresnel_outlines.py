@@ -9,14 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
+from rtradar.compiled import taken_in
 from rtradar.scatter.fresnel_meridians import CELLS, MERIDIANS, from_centre, meridian
 from rtradar.scatter.small_vectors import apply
 from rtradar.scatter.triangle_share import positive_share
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def outlines(part, centres, frames, semi_axes, antennas, hiders, cap_t, cap_r, stretch, pole, along):  # type: ignore[no-untyped-def]
     """Least clearance of the rays from each antenna to the corners of the cells: (meridian, antenna, corner)."""
     n_antennas, n_others = len(antennas), 0
@@ -53,7 +53,7 @@ def outlines(part, centres, frames, semi_axes, antennas, hiders, cap_t, cap_r, s
     return clear
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untyped-def]
     """Lower ``clear`` to how far outside the unit sphere the ray from ``antenna`` to each o + cos u + sin t passes."""
     a0, a1, a2 = antenna[0], antenna[1], antenna[2]
@@ -68,7 +68,7 @@ def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untype
         clear[j] = min(clear[j], math.sqrt(n0 * n0 + n1 * n1 + n2 * n2) - 1)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def open_share(a, b, c, d):  # type: ignore[no-untyped-def]
     """Share of a cell where a function is positive, from its values a, b and c, d at the ends of two opposite sides.
 

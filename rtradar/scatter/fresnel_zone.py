@@ -15,9 +15,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.fresnel_meridians import CELLS, MERIDIANS, axes_of_zone, from_centre, meridian
 from rtradar.scatter.fresnel_outlines import open_share, outlines
 from rtradar.scatter.small_vectors import apply, apply_transposed, dot, subtract
@@ -28,7 +28,7 @@ _TAPER = 0.4
 """Of the way to the rim the window stays 1."""
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
     """exp(-2 pi j turns) to 1e-7, in vector lanes, which the library's sine does not take."""
     for j in range(len(turns)):
@@ -40,7 +40,7 @@ def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
         real[j], imaginary[j] = 1 - 2 * sine * sine, -2 * sine * cosine
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@taken_in(fastmath={"reassoc", "contract", "nsz"})
 def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):  # type: ignore[no-untyped-def]
     """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
     free_re, free_im, lost_re, lost_im, open_ = 0.0, 0.0, 0.0, 0.0, 0.0
@@ -62,7 +62,7 @@ def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, s
     sums[4] += open_
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _zone_share(  # type: ignore[no-untyped-def]
     tx, rx, point, part, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out
 ):
@@ -146,7 +146,7 @@ def _zone_share(  # type: ignore[no-untyped-def]
                 out[f, pair] = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled()
 def _zone_shares(  # type: ignore[no-untyped-def]
     begin, end, tx, rx, points, part, pose, centres, frames, semi_axes, antennas, pairs, hiders, wavenumber, laid_for, out
 ):

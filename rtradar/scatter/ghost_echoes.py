@@ -13,8 +13,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
+
+from rtradar.compiled import compiled, taken_in
 
 Array = NDArray[np.float64]
 
@@ -54,7 +56,7 @@ class Nearby(NamedTuple):
         return np.asarray(ends[0] + self.share[:, None, None] * (ends[1] - ends[0]), dtype=np.float64)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
     """Range from ``point``, and its direction along two tangents: ``out`` = range, e, f."""
     x, y, z = antenna[0] - point[0], antenna[1] - point[1], antenna[2] - point[2]
@@ -64,14 +66,14 @@ def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
     out[2] = (x * to_f[0] + y * to_f[1] + z * to_f[2]) / distance
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _facing(point, normal, antenna, distance):  # type: ignore[no-untyped-def]
     return (
         (antenna[0] - point[0]) * normal[0] + (antenna[1] - point[1]) * normal[1] + (antenna[2] - point[2]) * normal[2]
     ) / distance
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untyped-def]
     """Tangents and normal in world axes at a point in the part's own; ``bend`` = ee, ff, ef of the shape operator."""
     n0, n1, n2 = local[0] / axes[0] ** 2, local[1] / axes[1] ** 2, local[2] / axes[2] ** 2
@@ -93,7 +95,7 @@ def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untype
         normal[i] = frame[i, 0] * n0 + frame[i, 1] * n1 + frame[i, 2] * n2
 
 
-@njit(cache=True, error_model="numpy", parallel=True)
+@compiled(parallel=True)
 def nearby_echoes(  # type: ignore[no-untyped-def]
     tx, rx, middle, tx_index, out_leg, back_leg, part, centres, frames, semi_axes, near, length, amplitude, known
 ):

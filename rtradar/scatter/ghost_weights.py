@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
+
+from rtradar.compiled import compiled
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath={"contract"})
+@compiled(parallel=True, fastmath={"contract"})
 def weigh(amplitude, before, after, seen_before, seen_after, share, interval, line, tx_weight, rx_weight, out):  # type: ignore[no-untyped-def]
     """Fill ``out (node, chirp, rx, echo)`` complex64: amplitude times what walls, body and shadows leave of it, conjugated.
 

@@ -22,6 +22,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.threads import in_threads
 
 _MAX_STEPS = 60
@@ -86,7 +87,7 @@ def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, hori
     return ROOT_PI * facing / math.sqrt(determinant) * polarization if there else 0.0
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
     """Mirror point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
 
@@ -140,7 +141,7 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
     out[2], out[3], out[4] = x, y, z
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
     """The same for up to `_LANES` receivers ``rx (3, rx)`` side by side, from a ``start`` near all of their mirror points.
 
@@ -179,7 +180,7 @@ def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ign
         out[2, i], out[3, i], out[4, i] = lanes[0, i], lanes[1, i], lanes[2, i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled()
 def _mirror(  # type: ignore[no-untyped-def]
     begin, end, tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point
 ):

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.body.body import Poses
+from rtradar.compiled import compiled
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
@@ -25,7 +25,7 @@ _COARSE, _FINE = (2, 1), (6, 2)
 _MOST_FREQUENCIES = 9
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):  # type: ignore[no-untyped-def]
     """Amplitude (node, chirp, rx, part) at these chirps, which stand at these shares of the way from anchor to anchor."""
     nodes, pairs, parts = ratio.shape[1:]

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from rtradar.compiled import taken_in
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def dot(a, b):  # type: ignore[no-untyped-def]
     """Product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def apply(matrix, vector, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the matrix times the vector."""
     x, y, z = vector[0], vector[1], vector[2]
@@ -21,7 +21,7 @@ def apply(matrix, vector, out):  # type: ignore[no-untyped-def]
         out[i] = matrix[i, 0] * x + matrix[i, 1] * y + matrix[i, 2] * z
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with the transpose of the matrix times the vector."""
     x, y, z = vector[0], vector[1], vector[2]
@@ -29,14 +29,14 @@ def apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
         out[i] = matrix[0, i] * x + matrix[1, i] * y + matrix[2, i] * z
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def subtract(a, b, out):  # type: ignore[no-untyped-def]
     """Fill ``out`` with a - b."""
     for i in range(3):
         out[i] = a[i] - b[i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def normalize(vector):  # type: ignore[no-untyped-def]
     """Make a unit vector of it; its length is returned."""
     length = math.sqrt(dot(vector, vector))

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from rtradar.compiled import taken_in
 from rtradar.phasor import phasor
 
 _SERIES = 3.4
@@ -15,7 +14,7 @@ _ODD = tuple(2.0 * (-1) ** ((m - 3) // 2) / math.factorial(m + 2) for m in range
 _EVEN = tuple(2.0 * (-1) ** ((m + 1) // 2) / math.factorial(m + 3) for m in range(_TERMS))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def mean_of_phasor(a: float, b: float, c: float) -> tuple[float, float]:
     """Mean of exp(-j phase) over a triangle on which the phase is linear, a, b and c at its corners.
 

@@ -12,7 +12,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
+
+from rtradar.compiled import taken_in
 
 SERIES = 4.0
 """Largest p for the series: what it leaves out, p^6 2 / 14!, is then 1e-7 of a facet."""
@@ -25,7 +26,7 @@ _LEAST = 1e-4
 """Least spread of the phases over a facet in the formula for large ones: what is less is taken for it, 1e-9 of a facet."""
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def _phasor(angle):  # type: ignore[no-untyped-def]
     """Cosine and sine by Taylor's series of half the angle, within 1e-11: branch-free, and so in vector lanes."""
     turns = angle * (0.5 / math.pi)
@@ -39,7 +40,7 @@ def _phasor(angle):  # type: ignore[no-untyped-def]
     return 1 - 2 * sine * sine, 2 * sine * cosine
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def _sine(angle):  # type: ignore[no-untyped-def]
     """Sine of an angle from 0 on, within 1e-12 of itself where it is small."""
     halves = np.floor(angle * (1 / math.pi) + 0.5)
@@ -50,7 +51,7 @@ def _sine(angle):  # type: ignore[no-untyped-def]
     return sine * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), of facets with small deviations."""
     real, imaginary = 0.0, 0.0
@@ -69,7 +70,7 @@ def sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     return complex(real, imaginary)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST)
+@taken_in(fastmath=FAST)
 def sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     """The same for any deviations, by differences.
 
@@ -93,7 +94,7 @@ def sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     return complex(real, imaginary)
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=FAST | {"nnan"})
+@taken_in(fastmath=FAST | {"nnan"})
 def largest_spread(u, v):  # type: ignore[no-untyped-def]
     """The largest p, for k = 1. Apart, for only without regard to NaN does a maximum run in vector lanes."""
     largest = 0.0

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from numba import njit
+from rtradar.compiled import taken_in
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def positive_share(a, b, c):  # type: ignore[no-untyped-def]
     """Share of a triangle on which the linear function with these values at its corners is positive."""
     low, high = min(a, min(b, c)), max(a, max(b, c))

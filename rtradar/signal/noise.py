@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
 
@@ -103,7 +103,7 @@ _S3, _S5, _S7, _S9, _S11 = (np.float32((-1) ** (n // 2) / math.factorial(n)) for
 _C2, _C4, _C6, _C8, _C10 = (np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (2, 4, 6, 8, 10))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def _add(streams, rows, sigma, out):  # type: ignore[no-untyped-def]
     """Add complex normal numbers, of deviation sigma in either part, to ``out (chirp, rx, sample)``, from 64 random bits each.
 

@@ -12,10 +12,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 from scipy import fft
 
+from rtradar.compiled import compiled
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.phasor import phasor
 
@@ -118,7 +119,7 @@ def _gaussian(samples: int, cells: int) -> tuple[NDArray[np.float32], float, NDA
     return np.exp(-(distance**2) / (2 * variance)).astype(np.float32), variance, weights.astype(np.float32)
 
 
-@njit(cache=True, error_model="numpy", parallel=True, fastmath={"contract"})
+@compiled(parallel=True, fastmath={"contract"})
 def _spread(  # type: ignore[no-untyped-def]
     length, amplitude, powers, start_frequency, sweep, sample_rate, half, samples, gaussian, variance, grid
 ):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.phasor import phasor
 
@@ -21,7 +21,7 @@ POWERS = 3
 """Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _multiply(a_re, a_im, b_re, b_im, out_re, out_im):  # type: ignore[no-untyped-def]
     """Products of complex numbers side by side; ``out`` may be one of the factors."""
     for i in range(len(a_re)):
@@ -30,7 +30,7 @@ def _multiply(a_re, a_im, b_re, b_im, out_re, out_im):  # type: ignore[no-untype
         out_re[i], out_im[i] = re, im
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _double(lanes, known, re, im):  # type: ignore[no-untyped-def]
     """As many powers again: those known times the one that is as many sample numbers on."""
     for i in range(known):
@@ -38,7 +38,7 @@ def _double(lanes, known, re, im):  # type: ignore[no-untyped-def]
         lanes[LANES + known + i] = re * lanes[LANES + i] + im * lanes[i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _powers(squares_re, squares_im, lanes):  # type: ignore[no-untyped-def]
     """Fill ``lanes (tone * 2 * LANES,)``: powers 1/2, 3/2, ... of each tone's turn, real parts first.
 
@@ -54,7 +54,7 @@ def _powers(squares_re, squares_im, lanes):  # type: ignore[no-untyped-def]
         _double(own, 16, squares_re[5, tone], squares_im[5, tone])
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _add_constants(lanes, middle_re, middle_im, rr, ii, ri, ir, out_re, out_im):  # type: ignore[no-untyped-def]
     """Add tones to ``out``, two blocks at a time, of which ``middle (pair, tone)`` are the values in their middle.
 
@@ -84,7 +84,7 @@ def _add_constants(lanes, middle_re, middle_im, rr, ii, ri, ir, out_re, out_im):
             out_im[early + i] += ir[LANES - 1 - i] - ri[LANES - 1 - i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath={"contract"})
+@taken_in(fastmath={"contract"})
 def _add_parabola(real, imaginary, ramp, start, block_turn, step, c0, c1, c2, now, out_re, out_im):  # type: ignore[no-untyped-def]
     """Add a tone whose amplitude is c0 + c1 x + c2 x^2, x the sample number times ``step``; ``ramp`` counts the lanes."""
     for block in range(len(out_re) // LANES):
@@ -102,7 +102,7 @@ def _add_parabola(real, imaginary, ramp, start, block_turn, step, c0, c1, c2, no
         start = start * block_turn
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: ignore[no-untyped-def]
     """Which echoes (echo,) are in the band and not hidden; ``amplitude (node, echo)``. Their count."""
     count = 0
@@ -117,7 +117,7 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
     return count
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@compiled(fastmath={"contract"})
 def add_tones(  # type: ignore[no-untyped-def]
     begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, ramp, out
 ):

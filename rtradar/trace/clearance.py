@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
+from rtradar.compiled import taken_in
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-def]
     """Least distance of the way from antenna to point from the ellipsoid's middle, in its own unit, less 1.
 

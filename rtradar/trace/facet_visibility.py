@@ -12,9 +12,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.trace.outlines import VIEWS, may_hide, outlines
 from rtradar.trace.unit_sphere import UnitSphere
 
@@ -22,7 +22,7 @@ _NEAR = 0.01
 """Lines of sight are traced that pass a part, outside or inside of its outline, by less than this share of its semi-axes."""
 
 
-@njit(cache=True, forceinline=True, error_model="numpy", fastmath=True)
+@taken_in(fastmath=True)
 def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: ignore[no-untyped-def]
     """What a hider, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
 
@@ -53,7 +53,7 @@ def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: i
     return count
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _before(part, other, antenna, centres, frames, semi_axes, turn, shift, start):  # type: ignore[no-untyped-def]
     """From the axes of a part to those of another in which it is the unit ball; and the antenna in these."""
     for i in range(3):
@@ -66,7 +66,7 @@ def _before(part, other, antenna, centres, frames, semi_axes, turn, shift, start
                 turn[i, j] += frames[other, k, i] * frames[part, k, j] / semi_axes[other, i]
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _facing(local, vertices, axes, margin, chosen, begin):  # type: ignore[no-untyped-def]
     """Vertices that face an antenna, or not away by more than the margin; their count.
 
@@ -97,7 +97,7 @@ def _facing(local, vertices, axes, margin, chosen, begin):  # type: ignore[no-un
     return count
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _grown(rays):  # type: ignore[no-untyped-def]
     """Twice the room; number by number, as to assign slices takes seconds to compile."""
     rows, columns = rays.shape
@@ -108,7 +108,7 @@ def _grown(rays):  # type: ignore[no-untyped-def]
     return out
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidden):  # type: ignore[no-untyped-def]
     """Name what certainly hides a vertex, and the rays that have to be followed for others.
 

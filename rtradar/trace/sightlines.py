@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from rtradar.compiled import compiled, taken_in
 from rtradar.trace.clearance import clearance
 
 DOUBTFUL = 0.005
@@ -57,7 +57,7 @@ def clearances(
     return out
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@taken_in()
 def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
     """Mean (own, 3) of one end of the lines to each part, and how far (own,) squared they stray from it; added to zeros."""
     for ray in range(len(own)):
@@ -70,7 +70,7 @@ def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
         reach[own[ray]] = max(reach[own[ray]], square)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-def]
     """Which parts come near any of the lines to a part, (own, part)."""
     # One more than there are parts: targets that are on none come last.
@@ -100,7 +100,7 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
     return near
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _clearances(origins, targets, own, centres, frames, axes, longest, near, out):  # type: ignore[no-untyped-def]
     for ray in range(len(origins)):
         least = 1.0
@@ -145,7 +145,7 @@ def outline_rays(
     return _outline_rays(starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, turns, axes)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled()
 def _outline_rays(origins, targets, own, centres, frames, axes):  # type: ignore[no-untyped-def]
     most = len(origins) * len(centres)
     rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0

@@ -79,11 +79,11 @@ def compiled_functions() -> dict[tuple[Path, str], tuple[set[str], bool]]:
     for path in sorted(Path(rtradar.__file__).parent.rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             made = [ast.unparse(one) for one in node.decorator_list] if isinstance(node, ast.FunctionDef) else []
-            if any("njit" in words for words in made):
+            if any(words.startswith(("compiled(", "taken_in(", "njit(")) for words in made):
                 calls = {
                     call.func.id for call in ast.walk(node) if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
                 }
-                found[path, node.name] = calls, "inline=" in made[0]
+                found[path, node.name] = calls, made[0].startswith("taken_in(") or "inline=" in made[0]
     return found
 
 

@@ -1,0 +1,65 @@
+"""How loops are compiled: zero as NumPy divides by it, functions that are taken in, and Python's collector meanwhile."""
+
+import gc
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+from numba.core.errors import TypingError
+
+from rtradar.compiled import compiled, taken_in
+
+
+@taken_in()
+def half(number: float) -> float:
+    return number / 2
+
+
+# Not kept on disk, unlike those of the package: each is compiled when it is first called.
+def uncached(function: Callable[..., Any]) -> Any:
+    made: Any = compiled()(function)
+    made._cache.disable()
+    return made
+
+
+@pytest.fixture(params=[True, False])
+def collector(request: pytest.FixtureRequest) -> Iterator[bool]:
+    (gc.enable if request.param else gc.disable)()
+    yield request.param
+    gc.enable()
+
+
+def test_dividing_by_zero_raises_nothing() -> None:
+    assert uncached(lambda number: number / 0.0)(1.0) == math.inf
+
+
+def test_what_is_taken_in_is_called_by_python_and_by_compiled_functions() -> None:
+    assert half(3.0) == uncached(lambda number: half(number))(3.0) == 1.5
+
+
+def test_the_collector_is_afterwards_as_it_was(collector: bool) -> None:
+    uncached(lambda number: half(number) + 1)(3.0)
+    assert gc.isenabled() == collector
+
+
+def test_the_collector_is_as_it_was_after_what_cannot_be_compiled(collector: bool) -> None:
+    with pytest.raises(TypingError):
+        uncached(lambda number: half(number).nothing)(3.0)
+    assert gc.isenabled() == collector
+
+
+def test_the_collector_rests_meanwhile() -> None:
+    runs: list[str] = []
+
+    def note(phase: str, _: object) -> None:
+        runs.append(phase)
+
+    gc.collect()
+    gc.callbacks.append(note)
+    try:
+        uncached(lambda number: max(half(number), number * 3) + 2)(3.0)
+    finally:
+        gc.callbacks.remove(note)
+    # Thousands of objects are made, and every 700 would start it; afterwards it starts once.
+    assert runs.count("start") <= 1
