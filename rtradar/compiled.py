@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from numba import njit
@@ -52,6 +53,22 @@ def taken_in(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
     """
     decorator: Callable[[_Function], _Function] = register_jitable(forceinline=True, error_model="numpy", fastmath=fastmath)
     return decorator
+
+
+def is_on_disk(function: _Function) -> bool:
+    """Whether any process here has compiled it before.
+
+    Parameters
+    ----------
+    function : callable
+        Made by `compiled`.
+
+    Returns
+    -------
+    bool
+    """
+    kept: Any = function
+    return any(Path(kept.stats.cache_path).glob(f"*.{kept.py_func.__qualname__}-*.nbi"))
 
 
 class _CollectorAtRest(event.Listener):

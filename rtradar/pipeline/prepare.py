@@ -13,17 +13,18 @@ import numpy as np
 from rtradar.body import Body
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion, place
-from rtradar.pipeline.capture import Capture, chirps_of
+from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.survey import survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import angle_spectra, cell_spectra, measures_angle, os_cfar
+from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.radar import Radar
 from rtradar.scatter import Rung, build_rung
 from rtradar.scatter.antenna_gain import is_shaped
+from rtradar.scatter.mirror import mirror
 from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
-from rtradar.signal import Noise, synthesize
+from rtradar.signal import Noise
 
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
@@ -59,38 +60,42 @@ def prepare(
             raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
         radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
     walled = bool(scene.walls or scene.furniture)
-    with stages.time("motion"):
-        radar = scene.place(radar)
-        heading = heading_deg + scene.heading_deg
-        placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading)
-        body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
-    n_cycles = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
-    n_chirps = n_cycles * radar.n_tx
-    windows = radar.window_starts(n_chirps)
-    if len(windows) == 0:
-        raise InputError(
-            f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame of {radar.frame_duration_s} s "
-            f"of radar '{radar.name}'; choose a longer one (--start, --duration)"
-        )
-    warm = time.perf_counter()
-    paths: Multipath | None = None
-    rung: Rung
-    if walled:
-        if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
+    with processing_compiled_beside():
+        with stages.time("motion"):
+            radar = scene.place(radar)
+            heading = heading_deg + scene.heading_deg
+            placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading)
+            body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
+        n_cycles = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
+        n_chirps = n_cycles * radar.n_tx
+        windows = radar.window_starts(n_chirps)
+        if len(windows) == 0:
             raise InputError(
-                f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths over walls, whose "
-                "directions at the antennas are not followed; take free-space, or antennas with pattern = 'isotropic'"
+                f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame of "
+                f"{radar.frame_duration_s} s of radar '{radar.name}'; choose a longer one (--start, --duration)"
             )
-        if dials:
-            raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
-        paths = Multipath(
-            radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
-        )
-        rung = paths.person
-    else:
-        of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
-        rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
-    _warm_up(paths or rung, radar)
+        warm = time.perf_counter()
+        paths: Multipath | None = None
+        rung: Rung
+        if walled:
+            if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
+                raise InputError(
+                    f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths over walls, whose "
+                    "directions at the antennas are not followed; take free-space, or antennas with pattern = 'isotropic'"
+                )
+            if dials:
+                raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
+            paths = Multipath(
+                radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
+            )
+            rung = paths.person
+        else:
+            of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
+            rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
+        echoes = (paths or rung).echoes(np.arange(2 * radar.n_tx))
+        # Not every rung has mirror points; the report shows them of all.
+        mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
+    warm_up_processing(echoes, radar)
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
@@ -158,14 +163,3 @@ def _check(snr_db: float | Literal["physical"], pfa: float, seed: int, noise_pow
         raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
     if seed < 0:
         raise InputError(f"seed = {seed}; it must be a whole number, at least 0 (--seed)")
-
-
-def _warm_up(rung: Rung, radar: Radar) -> None:
-    """Compile, or load from disk, all that is compiled on first use, so that times are of the work."""
-    # A slice of more, as in the stream: code is compiled for how arrays lie in memory.
-    echoes = chirps_of(rung.echoes(np.arange(2 * radar.n_tx)), 0, radar.n_tx)
-    synthesize(echoes, radar, radar.chirp_times(radar.n_tx), dtype=np.complex64)
-    os_cfar(np.ones((16, 16), dtype=np.float32), looks=radar.n_channels)
-    if measures_angle(radar):
-        cycle = np.zeros((1, radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex64)
-        angle_spectra(cell_spectra(cycle, radar, [0], [0]), radar, [0.0], [0.0])

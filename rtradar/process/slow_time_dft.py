@@ -104,6 +104,9 @@ def add_doppler_power(
         Added to, in the order of the DFT.
     """
     (cosines_1, cosines_2), (sines_1, sines_2) = dft.cosines, dft.sines
+    # What may be written to and what may not are two types to Numba, each with code of its own.
+    spectra = spectra.view()
+    spectra.flags.writeable = False
     _add_power(spectra, weights, dft.cycle_at, dft.bin_at, *dft.factors, cosines_1, sines_1, cosines_2, sines_2, power)
 
 
