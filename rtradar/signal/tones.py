@@ -1,6 +1,9 @@
-"""Tones added up one by one: their powers side by side in vector lanes, phases in float64."""
+"""Tones added up one by one: samples side by side in vector lanes, phases in float64."""
 
 from __future__ import annotations
+
+import math
+from typing import Any
 
 import numpy as np
 
@@ -11,70 +14,75 @@ from rtradar.phasor import phasor
 LANES = 32
 """Samples that are made side by side."""
 
-_SQUARES = 8
-"""Powers 1/2, 1, 2, 4, ... of a turn, up to that which goes on by two blocks."""
-
 _TOGETHER = 4
 """Tones added up at once, so that sums are read and written a quarter as often."""
 
 POWERS = 3
 """Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
 
-
-@taken_in(fastmath={"contract"})
-def _multiply(a_re, a_im, b_re, b_im, out_re, out_im):  # type: ignore[no-untyped-def]
-    """Products of complex numbers side by side; ``out`` may be one of the factors."""
-    for i in range(len(a_re)):
-        re = a_re[i] * b_re[i] - a_im[i] * b_im[i]
-        im = a_re[i] * b_im[i] + a_im[i] * b_re[i]
-        out_re[i], out_im[i] = re, im
+_TERMS = 8
+"""Of the series of sine and cosine, for up to an eighth of a turn: the next are below 1e-16."""
 
 
-@taken_in(fastmath={"contract"})
-def _double(lanes, known, re, im):  # type: ignore[no-untyped-def]
-    """As many powers again: those known times the one that is as many sample numbers on."""
-    for i in range(known):
-        lanes[known + i] = re * lanes[i] - im * lanes[LANES + i]
-        lanes[LANES + known + i] = re * lanes[LANES + i] + im * lanes[i]
+def series(kind: type[np.floating]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
+    """Coefficients of sine and cosine, over the odd and the even powers of the angle, in the precision they are to be used in."""
+    signed = [(-1) ** n for n in range(_TERMS)]
+    return (
+        tuple(kind(sign / math.factorial(2 * n + 1)) for n, sign in enumerate(signed)),
+        tuple(kind(sign / math.factorial(2 * n)) for n, sign in enumerate(signed)),
+    )
 
 
-@taken_in(fastmath={"contract"})
-def _powers(squares_re, squares_im, lanes):  # type: ignore[no-untyped-def]
-    """Fill ``lanes (tone * 2 * LANES,)``: powers 1/2, 3/2, ... of each tone's turn, real parts first.
-
-    ``squares (square, tone)`` are its powers 1/2, 1, 2, 4, ...
-    """
-    for tone in range(squares_re.shape[1]):
-        own = lanes[tone * 2 * LANES : (tone + 1) * 2 * LANES]
-        own[0], own[LANES] = squares_re[0, tone], squares_im[0, tone]
-        _double(own, 1, squares_re[1, tone], squares_im[1, tone])
-        _double(own, 2, squares_re[2, tone], squares_im[2, tone])
-        _double(own, 4, squares_re[3, tone], squares_im[3, tone])
-        _double(own, 8, squares_re[4, tone], squares_im[4, tone])
-        _double(own, 16, squares_re[5, tone], squares_im[5, tone])
+# Compared in float32, so that float32 stays what it is.
+_ONE, _TWO, _THREE = np.float32(1), np.float32(2), np.float32(3)
 
 
 @taken_in(fastmath={"contract"})
-def _add_constants(lanes, middle_re, middle_im, rr, ii, ri, ir, out_re, out_im):  # type: ignore[no-untyped-def]
-    """Add tones to ``out``, two blocks at a time, of which ``middle (pair, tone)`` are the values in their middle.
+def _reduce(turns, angle, quadrant, place):  # type: ignore[no-untyped-def]
+    """Whole quarters taken out in float64, of which the quadrant is told; the rest is an angle of up to an eighth of a turn."""
+    quarters = np.floor(4 * turns + 0.5)
+    angle[place] = (turns - 0.25 * quarters) * (2 * math.pi)
+    quadrant[place] = quarters - 4 * np.floor(0.25 * quarters)
+
+
+@taken_in(fastmath={"contract"})
+def _phasors(count, angle, quadrant, sines, cosines, re, im):  # type: ignore[no-untyped-def]
+    """exp(j angle) of what `_reduce` left, side by side, in the precision of the arrays."""
+    for i in range(count):
+        x = angle[i] * angle[i]
+        sine = sines[3] + x * (sines[4] + x * (sines[5] + x * (sines[6] + x * sines[7])))
+        sine = angle[i] * (sines[0] + x * (sines[1] + x * (sines[2] + x * sine)))
+        cosine = cosines[3] + x * (cosines[4] + x * (cosines[5] + x * (cosines[6] + x * cosines[7])))
+        cosine = cosines[0] + x * (cosines[1] + x * (cosines[2] + x * cosine))
+        odd = quadrant[i] == _ONE or quadrant[i] == _THREE
+        across, up = (sine, cosine) if odd else (cosine, sine)
+        re[i] = -across if quadrant[i] == _ONE or quadrant[i] == _TWO else across
+        im[i] = -up if quadrant[i] >= _TWO else up
+
+
+@taken_in(fastmath={"contract"})
+def _add_constants(pairs, lanes_re, lanes_im, middle_re, middle_im, rr, ii, ri, ir, out_re, out_im):  # type: ignore[no-untyped-def]
+    """Add tones to ``out``, two blocks at a time, of which ``middle (pair * tone,)`` are the values in their middle.
 
     As far before it as after it a power is the conjugate: products of real and imaginary parts serve both.
     """
-    for pair in range(len(middle_re)):
+    tones = len(middle_re) // pairs
+    for pair in range(pairs):
         rr[:] = 0.0
         ii[:] = 0.0
         ri[:] = 0.0
         ir[:] = 0.0
-        for tone in range(0, middle_re.shape[1], _TOGETHER):
-            a, b, c, d = middle_re[pair, tone], middle_re[pair, tone + 1], middle_re[pair, tone + 2], middle_re[pair, tone + 3]
-            p, q, r, s = middle_im[pair, tone], middle_im[pair, tone + 1], middle_im[pair, tone + 2], middle_im[pair, tone + 3]
-            four = lanes[tone * 2 * LANES : (tone + 4) * 2 * LANES]
+        for tone in range(0, tones, _TOGETHER):
+            at = pair * tones + tone
+            a, b, c, d = middle_re[at], middle_re[at + 1], middle_re[at + 2], middle_re[at + 3]
+            p, q, r, s = middle_im[at], middle_im[at + 1], middle_im[at + 2], middle_im[at + 3]
+            re, im = lanes_re[tone * LANES : (tone + 4) * LANES], lanes_im[tone * LANES : (tone + 4) * LANES]
             for i in range(LANES):
-                rr[i] += a * four[i] + b * four[i + 2 * LANES] + c * four[i + 4 * LANES] + d * four[i + 6 * LANES]
-                ir[i] += p * four[i] + q * four[i + 2 * LANES] + r * four[i + 4 * LANES] + s * four[i + 6 * LANES]
+                rr[i] += a * re[i] + b * re[i + LANES] + c * re[i + 2 * LANES] + d * re[i + 3 * LANES]
+                ir[i] += p * re[i] + q * re[i + LANES] + r * re[i + 2 * LANES] + s * re[i + 3 * LANES]
             for i in range(LANES):
-                ri[i] += a * four[i + LANES] + b * four[i + 3 * LANES] + c * four[i + 5 * LANES] + d * four[i + 7 * LANES]
-                ii[i] += p * four[i + LANES] + q * four[i + 3 * LANES] + r * four[i + 5 * LANES] + s * four[i + 7 * LANES]
+                ri[i] += a * im[i] + b * im[i + LANES] + c * im[i + 2 * LANES] + d * im[i + 3 * LANES]
+                ii[i] += p * im[i] + q * im[i + LANES] + r * im[i + 2 * LANES] + s * im[i + 3 * LANES]
         early, late = 2 * pair * LANES, (2 * pair + 1) * LANES
         for i in range(LANES):
             out_re[late + i] += rr[i] - ii[i]
@@ -119,44 +127,39 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
 
 @compiled(fastmath={"contract"})
 def add_tones(  # type: ignore[no-untyped-def]
-    begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, ramp, out
+    begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, ramp, sines, cosines, out
 ):
-    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the precision of ``ramp``, which counts the lanes."""
+    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the precision of ``ramp``, which counts the lanes.
+
+    ``sines`` and ``cosines`` are those of `series`, in this precision.
+    """
     receivers, samples = out.shape[1:]
     nodes, echoes = amplitude.shape[0], length.shape[2]
     # The last pair of blocks may reach past the last sample, the last tones added together past the last tone: these are silent.
     pairs, tones = (samples + 2 * LANES - 1) // (2 * LANES), (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
     sum_re, sum_im = np.empty(pairs * 2 * LANES, dtype=ramp.dtype), np.empty(pairs * 2 * LANES, dtype=ramp.dtype)
-    lanes, now = np.empty(tones * 2 * LANES, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
+    lanes_re, lanes_im = np.empty(tones * LANES, dtype=ramp.dtype), np.empty(tones * LANES, dtype=ramp.dtype)
     rr, ii, ri, ir = np.empty_like(ramp), np.empty_like(ramp), np.empty_like(ramp), np.empty_like(ramp)
-    start_re, start_im, now_re, now_im = np.empty(tones), np.empty(tones), np.empty(tones), np.empty(tones)
-    squares_re, squares_im = np.empty((_SQUARES, tones)), np.empty((_SQUARES, tones))
-    middle_re, middle_im = np.empty((pairs, tones), dtype=ramp.dtype), np.empty((pairs, tones), dtype=ramp.dtype)
+    middle_re, middle_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
+    now_re, now_im, now = np.empty(tones, dtype=ramp.dtype), np.empty(tones, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
+    most = tones * max(LANES, pairs)
+    angle, quadrant = np.empty(most, dtype=ramp.dtype), np.empty(most, dtype=ramp.dtype)
+    start, step = np.empty(tones), np.empty(tones)
     varies, heard, coefficient = np.empty(tones, np.bool_), np.empty(echoes, np.int64), np.empty(POWERS, np.complex128)
     # What is not filled for a chirp is of the one before, and silent.
-    squares_re[:], squares_im[:], varies[:] = 0.0, 0.0, False
-    delay = np.empty(echoes)
+    lanes_re[:], lanes_im[:], start[:], step[:], varies[:] = 0.0, 0.0, 0.0, 0.0, False
     for chirp in range(begin, end):
         for receiver in range(receivers):
             own = amplitude[:, chirp, receiver]
             count = _heard(length[chirp, receiver], own, slope / SPEED_OF_LIGHT_MPS, sample_rate, heard)
             for i in range(count):
-                delay[i] = length[chirp, receiver, heard[i]] / SPEED_OF_LIGHT_MPS
+                delay = length[chirp, receiver, heard[i]] / SPEED_OF_LIGHT_MPS
+                # Turns at the first sample, and from one to the next.
+                start[i], step[i] = delay * (start_frequency - 0.5 * slope * delay), slope * delay / sample_rate
             for i in range(count):
-                beat = slope * delay[i]
-                # Half a sample before the first, as far as the first power is behind.
-                start_re[i], start_im[i] = phasor(start_frequency * delay[i] - 0.5 * beat * (delay[i] + 1 / sample_rate))
-                squares_re[0, i], squares_im[0, i] = phasor(0.5 * beat / sample_rate)
-            for square in range(1, _SQUARES):
-                _multiply(
-                    squares_re[square - 1],
-                    squares_im[square - 1],
-                    squares_re[square - 1],
-                    squares_im[square - 1],
-                    squares_re[square],
-                    squares_im[square],
-                )
-            _powers(squares_re, squares_im, lanes)
+                for lane in range(LANES):
+                    _reduce(step[i] * (lane + 0.5), angle, quadrant, i * LANES + lane)
+            _phasors(count * LANES, angle, quadrant, sines, cosines, lanes_re, lanes_im)
             sum_re[:] = 0.0
             sum_im[:] = 0.0
             # Horner's scheme over threes of powers of the sample number.
@@ -177,12 +180,14 @@ def add_tones(  # type: ignore[no-untyped-def]
                     for power in range(lowest, min(lowest + POWERS, nodes)):
                         for node in range(nodes):
                             coefficient[power - lowest] += powers[power, node] * own[node, echo]
+                    before_re, before_im = phasor(start[i] - 0.5 * step[i])
+                    block_re, block_im = phasor(LANES * step[i])
                     _add_parabola(
-                        lanes[2 * i * LANES : (2 * i + 1) * LANES],
-                        lanes[(2 * i + 1) * LANES : (2 * i + 2) * LANES],
+                        lanes_re[i * LANES : (i + 1) * LANES],
+                        lanes_im[i * LANES : (i + 1) * LANES],
                         ramp,
-                        complex(start_re[i], start_im[i]),
-                        complex(squares_re[_SQUARES - 2, i], squares_im[_SQUARES - 2, i]),
+                        complex(before_re, before_im),
+                        complex(block_re, block_im),
                         1 / samples,
                         coefficient[0],
                         coefficient[1],
@@ -194,13 +199,16 @@ def add_tones(  # type: ignore[no-untyped-def]
             for i in range(tones):
                 now_re[i], now_im[i] = 0.0, 0.0
                 if i < count and not varies[i]:
-                    start = complex(start_re[i], start_im[i]) * own[0, heard[i]]
-                    now_re[i], now_im[i] = start.real, start.imag
-            _multiply(now_re, now_im, squares_re[_SQUARES - 2], squares_im[_SQUARES - 2], now_re, now_im)
+                    now_re[i], now_im[i] = own[0, heard[i]].real, own[0, heard[i]].imag
             for pair in range(pairs):
                 for i in range(tones):
-                    middle_re[pair, i], middle_im[pair, i] = now_re[i], now_im[i]
-                _multiply(now_re, now_im, squares_re[_SQUARES - 1], squares_im[_SQUARES - 1], now_re, now_im)
-            _add_constants(lanes, middle_re, middle_im, rr, ii, ri, ir, sum_re, sum_im)
+                    _reduce(start[i] + step[i] * ((2 * pair + 1) * LANES - 0.5), angle, quadrant, pair * tones + i)
+            _phasors(pairs * tones, angle, quadrant, sines, cosines, middle_re, middle_im)
+            for pair in range(pairs):
+                for i in range(tones):
+                    re, im = middle_re[pair * tones + i], middle_im[pair * tones + i]
+                    middle_re[pair * tones + i] = re * now_re[i] - im * now_im[i]
+                    middle_im[pair * tones + i] = re * now_im[i] + im * now_re[i]
+            _add_constants(pairs, lanes_re, lanes_im, middle_re, middle_im, rr, ii, ri, ir, sum_re, sum_im)
             for sample in range(samples):
                 out[chirp, receiver, sample] = complex(sum_re[sample], sum_im[sample])
