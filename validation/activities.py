@@ -38,6 +38,7 @@ DATA = {
     "noise": "noise_100",
     "transfer-free-space": "transfer_free_space",
     "transfer-room": "transfer_room",
+    "transfer-scenes": "transfer_scenes",
 }
 """Folders of clouds, and the specification of each."""
 
@@ -55,6 +56,7 @@ TRAININGS = {
     "real": "real --split recording --folds 2",
     "noise": "noise --folds 5",
     "transfer-free-space": "transfer-free-space --split across:fidelity",
+    "transfer-scenes": "transfer-scenes --split across:scene",
     "transfer": "transfer-free-space transfer-room --split across:fidelity,scene",
 }
 """Folders of trainings, and the clouds and options of each."""
@@ -63,7 +65,7 @@ SHOWN = {
     "table-4": (*(f"lean-{size}" for size in SIZES), *(f"paper-{size}" for size in SIZES)),
     "dead-rate": ("paper-1000", "paper-1000-all-epochs", "paper-1000-first-trial"),
     "readings": ("paper-1000", "paper-1000-unit-sphere", "paper-1000-turned"),
-    **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer-free-space", "transfer")},
+    **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer-free-space", "transfer-scenes", "transfer")},
 }
 """Evaluations, each with simple classifiers on the first of its trainings."""
 
