@@ -135,7 +135,23 @@ def evaluate(out: Path) -> list[str]:
         subprocess.run([*RTRADAR, "evaluate", *map(str, there), "--baselines", "--out", str(folder)], check=True)
         for group in json.loads((folder / "evaluation.json").read_text())["groups"]:
             missed += judged(name, group["title"], group["summary"]["mean"], group["summary"]["test_clouds"])
+    wandering(out)
     return missed
+
+
+def wandering(out: Path) -> None:
+    """Print what the last epochs of the paper's 200 change, of which those after the 70th hardly move a weight."""
+    path = out / "trained" / "paper-1000-all-epochs" / "training-01" / "outcome.json"
+    if path.exists():
+        history = json.loads(path.read_text())["history"]
+        print("\n200 epochs of one fold: epochs, loss and accuracy of the clouds it learns from, accuracy of test clouds")
+        for first, last in ((51, 60), (61, 70), (71, 100), (101, 150), (151, 200)):
+            rows = history[first - 1 : last]
+            loss, learning, test = (np.array([row[name] for row in rows]) for name in _WATCHED)
+            print(f"{first} to {last}: {loss.mean():.2f}, {learning.mean():.1%}, {test.mean():.1%} +- {test.std():.1%}")
+
+
+_WATCHED = ("train_loss", "train_accuracy", "test_accuracy")
 
 
 def judged(name: str, title: str, accuracy: float, answers: int) -> list[str]:
