@@ -56,7 +56,7 @@ def taken_in(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
 
 
 def is_on_disk(function: _Function) -> bool:
-    """Whether any process here has compiled it before.
+    """Whether any process here has compiled it before, or none ever will (``NUMBA_DISABLE_JIT``).
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def is_on_disk(function: _Function) -> bool:
     -------
     bool
     """
-    kept: Any = function
-    return any(Path(kept.stats.cache_path).glob(f"*.{kept.py_func.__qualname__}-*.nbi"))
+    stats = getattr(function, "stats", None)
+    return stats is None or any(Path(stats.cache_path).glob(f"*.{function.__qualname__}-*.nbi"))
 
 
 class _CollectorAtRest(event.Listener):

@@ -3,17 +3,23 @@
 import gc
 import math
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
+from numba import config
 from numba.core.errors import TypingError
 
-from rtradar.compiled import compiled, taken_in
+from rtradar.compiled import compiled, is_on_disk, taken_in
 
 
 @taken_in()
 def half(number: float) -> float:
     return number / 2
+
+
+def double(number: float) -> float:
+    return number * 2
 
 
 # Not kept on disk, unlike those of the package: each is compiled when it is first called.
@@ -36,6 +42,15 @@ def test_dividing_by_zero_raises_nothing() -> None:
 
 def test_what_is_taken_in_is_called_by_python_and_by_compiled_functions() -> None:
     assert half(3.0) == uncached(lambda number: half(number))(3.0) == 1.5
+
+
+def test_what_is_on_disk_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    twice: Any = compiled()(double)
+    assert not is_on_disk(twice)
+    twice(2.0)
+    assert is_on_disk(twice)
+    assert is_on_disk(double)  # as NUMBA_DISABLE_JIT leaves it: nothing to compile
 
 
 def test_the_collector_is_afterwards_as_it_was(collector: bool) -> None:
