@@ -74,7 +74,7 @@ def is_on_disk(function: _Function) -> bool:
 class _CollectorAtRest(event.Listener):
     """Python's garbage collector rests while Numba compiles.
 
-    Compiling makes so many objects that the collector goes through all of Numba's own again and again: a tenth of the time.
+    Compiling makes so many objects that the collector would go through all of Numba's own again and again.
     """
 
     def __init__(self) -> None:

@@ -21,7 +21,7 @@ POWERS = 3
 """Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
 
 _TERMS = 8
-"""Of the series of sine and cosine, for up to an eighth of a turn: the next are below 1e-16."""
+"""Of the series of sine and cosine, for up to an eighth of a turn: the next are (pi / 4)^16 / 16! = 1e-15 at most."""
 
 
 def series(kind: type[np.floating]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
