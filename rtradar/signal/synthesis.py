@@ -13,7 +13,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
 from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
-from rtradar.signal.tones import LANES, POWERS, add_tones, series
+from rtradar.signal.tones import LANES, POWERS, add_tones, first_powers, series
 from rtradar.threads import in_threads
 
 MAX_BINS_IN_CHIRP = 0.1
@@ -106,7 +106,7 @@ def synthesize(
         # More powers than those of a parabola cancel too much for float32.
         kind = np.float32 if out.dtype == np.complex64 and len(echoes.frequency) <= POWERS else np.float64
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
-        lanes = np.arange(LANES, dtype=kind), *series(kind)
+        lanes = first_powers(kind), np.arange(LANES, dtype=kind), *series(kind)
 
         def fill(begin: int) -> None:
             add_tones(begin, min(begin + _CHIRPS_A_THREAD, len(out)), length, amplitude, powers, *waveform, *lanes, out)
