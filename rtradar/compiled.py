@@ -30,9 +30,16 @@ def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Ca
     -------
     decorator
     """
-    decorator: Callable[[_Function], _Function] = njit(
+    numba_decorator: Callable[[_Function], Any] = njit(
         cache=True, nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
     )
+
+    def decorator(function: _Function) -> _Function:
+        dispatcher = numba_decorator(function)
+        if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
+            dispatcher.compile = _with_room(dispatcher.compile)
+        return dispatcher
+
     return decorator
 
 
@@ -53,6 +60,24 @@ def taken_in(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
     """
     decorator: Callable[[_Function], _Function] = register_jitable(forceinline=True, error_model="numpy", fastmath=fastmath)
     return decorator
+
+
+_ROOM = 2**16 + 2**10
+"""Places of a frame: with a few more than half a megabyte it gets a chunk of one, and leaves the rest to what it calls."""
+
+
+def _with_room(call: _Function) -> _Function:
+    """Call it where Python has room for the frames of what it calls.
+
+    CPython keeps frames in chunks of 16 KB. A recursion to and fro across the end of one, as that of Numba's compiler, has the
+    next chunk mapped and unmapped by the system each time; a frame too large for such a chunk gets a larger one.
+    """
+
+    def in_a_chunk_of_its_own(*arguments: Any) -> Any:
+        return call(*arguments)
+
+    in_a_chunk_of_its_own.__code__ = in_a_chunk_of_its_own.__code__.replace(co_stacksize=_ROOM)
+    return in_a_chunk_of_its_own
 
 
 def is_on_disk(function: _Function) -> bool:

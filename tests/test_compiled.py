@@ -2,12 +2,14 @@
 
 import gc
 import math
+import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
 from numba import config
+from numba.core import event
 from numba.core.errors import TypingError
 
 from rtradar.compiled import compiled, is_on_disk, taken_in
@@ -78,3 +80,32 @@ def test_the_collector_rests_meanwhile() -> None:
         gc.callbacks.remove(note)
     # Thousands of objects are made, and every 700 would start it; afterwards it starts once.
     assert runs.count("start") <= 1
+
+
+def test_compiling_has_room_for_frames() -> None:
+    resource = pytest.importorskip("resource")
+
+    def faults_of_calls_from(depth: int) -> int:
+        """Pages that the system maps while a function is called a thousand times from under so many frames."""
+        if depth:
+            return faults_of_calls_from(depth - 1)
+        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+        for _ in range(1000):
+            double(1.0)
+        return int(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+
+    found: list[int] = []
+
+    class Watch(event.Listener):
+        def on_start(self, _: event.Event) -> None:
+            found.extend(faults_of_calls_from(depth) for depth in range(200))
+
+        def on_end(self, _: event.Event) -> None: ...
+
+    # A thread's frames begin in a chunk of their own; otherwise its end is at one of these depths, where each call maps a page.
+    with event.install_listener("numba:compile", Watch()):
+        compiling = threading.Thread(target=uncached(double), args=(2.0,))
+        compiling.start()
+        compiling.join()
+    assert len(found) == 200
+    assert max(found) < 1000
