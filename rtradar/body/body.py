@@ -158,10 +158,9 @@ class Body:
             Where a time lies outside.
         """
         positions, quaternions = self.motion.at(times)
-        parents = np.array(self.motion.parents[1:])
-        centres = (positions[:, 1:] + positions[:, parents]) / 2
-        frames = np.empty((len(quaternions), len(self.semi_axes), 3, 3))
-        _turn(quaternions, self._rest_frames, frames)
+        shape = len(positions), len(self.semi_axes), 3
+        centres, frames = np.empty(shape), np.empty((*shape, 3))
+        _stand(positions, quaternions, np.array(self.motion.parents), self._rest_frames, centres, frames)
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
@@ -191,19 +190,23 @@ class Body:
 
 
 @compiled(fastmath={"contract"})
-def _turn(quaternions, rest, out):  # type: ignore[no-untyped-def]
-    """Fill ``out (time, part, 3, 3)``: rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last.
+def _stand(positions, quaternions, parents, rest, centres, frames):  # type: ignore[no-untyped-def]
+    """Fill ``centres (time, part, 3)`` and ``frames (time, part, 3, 3)`` from joints (time, joint, 3).
 
-    The first joint is the root, which has no bone.
+    Frames are rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last. The first joint is the root, which has
+    no bone.
     """
-    for time in range(out.shape[0]):
-        for part in range(out.shape[1]):
+    for time in range(frames.shape[0]):
+        for part in range(frames.shape[1]):
+            for axis in range(3):
+                ends = positions[time, part + 1, axis] + positions[time, parents[part + 1], axis]
+                centres[time, part, axis] = 0.5 * ends
             q = quaternions[time, part + 1]
             x, y, z, w = q[0], q[1], q[2], q[3]
             a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
             d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
             g, h, k = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-            own, turned = rest[part], out[time, part]
+            own, turned = rest[part], frames[time, part]
             for column in range(3):
                 u, v, s = own[0, column], own[1, column], own[2, column]
                 turned[0, column] = a * u + b * v + c * s

@@ -147,6 +147,8 @@ class Motion:
         InputError
             Where a time lies outside [0, duration_s].
         """
+        from rtradar.motion.posing import pose  # Numba is loaded when poses are asked for, not to read a file
+
         instants = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if instants.ndim != 1:
             raise InputError(f"Motion.at: times have shape {instants.shape}; they must be one-dimensional")
@@ -158,14 +160,16 @@ class Motion:
         if len(self.root_positions) == 1:
             quaternions = np.repeat(self.rotations, len(instants), axis=0)
             return self._forward(np.repeat(self.root_positions, len(instants), axis=0), quaternions), quaternions
-        roots, quaternions = np.empty((len(instants), 3)), np.empty((len(instants), len(self.joints), 4))
+        positions = np.empty((len(instants), len(self.joints), 3))
+        quaternions = np.empty((len(instants), len(self.joints), 4))
         stretches = np.floor((instants - self.first_frame_s) * self.rate_hz / _STRETCH_FRAMES).astype(np.int64)
+        skeleton = np.ascontiguousarray(self.offsets, dtype=np.float64), np.asarray(self.parents, dtype=np.int64)
         for stretch in np.unique(stretches):
-            here = stretches == stretch
-            root_spline, rotation_spline = self._splines(int(stretch))
-            roots[here], quaternions[here] = root_spline(instants[here]), rotation_spline(instants[here])
-        quaternions /= np.sqrt(np.einsum("tjk,tjk->tj", quaternions, quaternions))[..., None]
-        return self._forward(roots, quaternions), quaternions
+            here = np.flatnonzero(stretches == stretch)
+            root, rotation = self._splines(int(stretch))
+            cubics = root.c, rotation.c.reshape(*rotation.c.shape[:2], -1)
+            pose(instants, here, root.x, *cubics, *skeleton, positions, quaternions.reshape(len(instants), -1))
+        return positions, quaternions
 
     def _splines(self, stretch: int) -> tuple[PPoly, PPoly]:
         """Splines of the root and of the rotations for one stretch of frames: those of a long recording take much memory."""

@@ -1,0 +1,42 @@
+"""A skeleton's pose from splines of its root and its bones, time by time."""
+
+from __future__ import annotations
+
+import math
+
+from rtradar.compiled import compiled
+
+
+@compiled(fastmath={"contract"})
+def pose(times, which, knots, root, rotation, offsets, parents, positions, quaternions):  # type: ignore[no-untyped-def]
+    """Fill ``positions (time, joint, 3)`` and ``quaternions (time, joint * 4)`` for those of ``times`` that are ``which``.
+
+    ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power, interval, joint * 4)`` are the
+    cubics from each to the next, the highest power first, as of `scipy.interpolate.PPoly`. Quaternions are normalised here.
+    """
+    rate, last = (len(knots) - 1) / (knots[-1] - knots[0]), len(knots) - 2
+    for k in range(len(which)):
+        # At a knot both cubics have the same value, so that rounding may take either.
+        interval = min(max(int((times[which[k]] - knots[0]) * rate), 0), last)
+        t = times[which[k]] - knots[interval]
+        own, place = quaternions[which[k]], positions[which[k]]
+        c3, c2, c1, c0 = rotation[0, interval], rotation[1, interval], rotation[2, interval], rotation[3, interval]
+        for i in range(len(own)):
+            own[i] = c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i]))
+        r3, r2, r1, r0 = root[0, interval], root[1, interval], root[2, interval], root[3, interval]
+        for axis in range(3):
+            place[0, axis] = r0[axis] + t * (r1[axis] + t * (r2[axis] + t * r3[axis]))
+        for joint in range(len(parents)):
+            four = own[4 * joint : 4 * joint + 4]
+            scale = 1 / math.sqrt(four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3])
+            for i in range(4):
+                four[i] *= scale
+            if joint > 0:
+                # As `rtradar.motion.quaternions.rotate` does it.
+                x, y, z, w = four[0], four[1], four[2], four[3]
+                a, b, c = offsets[joint, 0], offsets[joint, 1], offsets[joint, 2]
+                u, v, s = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
+                parent = place[parents[joint]]
+                place[joint, 0] = parent[0] + a + w * u + y * s - z * v
+                place[joint, 1] = parent[1] + b + w * v + z * u - x * s
+                place[joint, 2] = parent[2] + c + w * s + x * v - y * u
