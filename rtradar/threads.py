@@ -20,6 +20,11 @@ def thread_limit() -> int | None:
     return int(named) if named.isdigit() and int(named) > 0 else None
 
 
+def thread_count() -> int:
+    """Threads that `in_threads` has: as many as this process may use."""
+    return thread_limit() or os.cpu_count() or 1
+
+
 def environment_of(threads: int) -> dict[str, str]:
     """Environment that holds a new process to that many threads: ours, those of compiled loops, and of linear algebra."""
     own = THREADS_VARIABLE, "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
@@ -38,7 +43,7 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(thread_limit() or os.cpu_count(), thread_name_prefix="rtradar")
+    return ThreadPoolExecutor(thread_count(), thread_name_prefix="rtradar")
 
 
 # Threads do not follow into a forked process: there they are started anew.

@@ -20,7 +20,7 @@ from rtradar.process import measures_angle, os_cfar, power_map, range_azimuth, r
 from rtradar.radar import Radar
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.signal.tones import add_tones
-from rtradar.threads import environment_of, thread_limit
+from rtradar.threads import environment_of, thread_count
 
 _LONGEST_S = 120.0
 """For a second process; what it has not done by then is done here."""
@@ -66,9 +66,8 @@ def warm_up_usual_processing() -> None:
 @contextmanager
 def processing_compiled_beside() -> Iterator[None]:
     """Have another process compile what echoes go through, if none has; it is done when this ends."""
-    cores = thread_limit() or os.cpu_count() or 1
     # Within another program, the interpreter is that program.
-    if is_on_disk(add_tones) or cores < 2 or not Path(sys.executable or "").name.startswith("python"):
+    if is_on_disk(add_tones) or thread_count() < 2 or not Path(sys.executable or "").name.startswith("python"):
         yield
         return
     words = [sys.executable, "-c", "from rtradar.pipeline.warm_up import warm_up_usual_processing as go; go()"]

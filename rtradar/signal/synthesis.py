@@ -14,7 +14,7 @@ from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
 from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
 from rtradar.signal.tones import LANES, POWERS, add_tones, first_powers, series
-from rtradar.threads import in_threads
+from rtradar.threads import in_threads, thread_count
 
 MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
@@ -23,7 +23,7 @@ MANY_ECHOES = 32
 """From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` has what it saves)."""
 
 _CHIRPS_A_THREAD = 16
-"""Handed out at once: half a millisecond or more of work."""
+"""Handed out at once, or more: Python takes its time to hand out the next."""
 
 _INSTANTS = 16
 """At so many instants of a block the speed of echoes is looked at."""
@@ -108,10 +108,12 @@ def synthesize(
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
         lanes = first_powers(kind), np.arange(LANES, dtype=kind), *series(kind)
 
-        def fill(begin: int) -> None:
-            add_tones(begin, min(begin + _CHIRPS_A_THREAD, len(out)), length, amplitude, powers, *waveform, *lanes, out)
+        at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
 
-        in_threads(fill, range(0, len(out), _CHIRPS_A_THREAD))
+        def fill(begin: int) -> None:
+            add_tones(begin, min(begin + at_once, len(out)), length, amplitude, powers, *waveform, *lanes, out)
+
+        in_threads(fill, range(0, len(out), at_once))
     return out
 
 
@@ -136,11 +138,11 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     first = np.unique(np.linspace(0, len(same) - 2, _INSTANTS).astype(np.int64))
     before, after = same[first], same[first + 1]
     # The ends of the line of receivers: those in between see no other speed.
-    ends = [0, -1]
-    lengths = [echoes.length[chirps][:, ends] for chirps in (before, after)]
+    ends = slice(None, None, max(1, echoes.length.shape[1] - 1))
+    lengths = [echoes.length[chirps, ends] for chirps in (before, after)]
     heard = np.ones(lengths[0].shape, dtype=bool)
     for chirps, length in zip((before, after), lengths, strict=True):
-        heard &= (echoes.amplitude[:, chirps][:, :, ends] != 0).any(axis=0) & _in_band(length, radar)
+        heard &= (echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar)
     rate = np.abs(lengths[1] - lengths[0]) / (times[after] - times[before])[:, None, None]
     bins = float(np.where(heard, rate, 0.0).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
     if bins > MAX_BINS_IN_CHIRP:
