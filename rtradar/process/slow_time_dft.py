@@ -21,8 +21,11 @@ from rtradar.compiled import compiled, taken_in
 _LARGEST = 40
 """Factor: plain sums grow with its square."""
 
-_COLUMNS = 64
-"""Range bins side by side: of two factors' worth of rows this many stay in the cache of a core."""
+_COLUMNS = 256
+"""Range bins side by side, at most: each cycle's lie together in memory, and of all cycles these stay in the cache of a core."""
+
+_LANES = 16
+"""Of which their number is a multiple."""
 
 _TERMS = 5
 """Added at once, so that sums are read and written back a fifth as often."""
@@ -36,8 +39,8 @@ class SlowTimeDft(NamedTuple):
     cycle_at, bin_at : (place,) int64
         Which cycle stands at each place of the grid (first, second) of the factors, and which Doppler bin afterwards.
     cosines, sines : pair of (frequency, term) float32
-        Of each factor: frequencies and terms 0 to half of it, and without those of which the sine is 0; filled up with zeros to a
-        multiple of `_TERMS`.
+        Of each factor: frequencies and terms 0 to half of it, the latter without those of which the sine is 0; filled up with
+        zeros to an even number of frequencies and a multiple of `_TERMS`.
     factors : pair of int
     """
 
@@ -81,10 +84,16 @@ def slow_time_dft(n_cycles: int) -> SlowTimeDft | None:
 
 
 def _tables(factor: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    even, odd = np.arange(factor // 2 + 1), np.arange(1, (factor + 1) // 2)
-    cosines, sines = np.cos(2 * np.pi * np.outer(even, even) / factor), np.sin(2 * np.pi * np.outer(odd, odd) / factor)
-    filled = [np.pad(table, ((0, 0), (0, -table.shape[1] % _TERMS))) for table in (cosines, sines)]
-    return filled[0].astype(np.float32), filled[1].astype(np.float32)
+    frequencies, odd = np.arange(factor // 2 + 1), np.arange(1, (factor + 1) // 2)
+    cosines = np.cos(2 * np.pi * np.outer(frequencies, frequencies) / factor)
+    sines = np.sin(2 * np.pi * np.outer(frequencies, odd) / factor)
+    return _filled(cosines), _filled(sines)
+
+
+def _filled(table: NDArray[np.float64]) -> NDArray[np.float32]:
+    frequencies, terms = table.shape
+    whole = max(1, -(-terms // _TERMS)) * _TERMS  # a factor of two has no sines
+    return np.pad(table, ((0, frequencies % 2), (0, whole - terms))).astype(np.float32)
 
 
 def add_doppler_power(
@@ -111,52 +120,76 @@ def add_doppler_power(
 
 
 @taken_in(fastmath={"contract"})
-def _fold(grid, first, step, factor, even, odd):  # type: ignore[no-untyped-def]
-    """Sums and differences of the rows at the same distance from both ends; real parts stand in the left half of a row.
-
-    Differences are multiplied by -j, which the sine has before it.
-    """
-    columns = grid.shape[1] // 2
-    for c in range(2 * columns):
-        even[0, c] = grid[first, c]
+def _fold(grid, row, first, step, factor, even, odd):  # type: ignore[no-untyped-def]
+    """Sums of rows at the same distance from both ends, and differences, times -j, which the sine has before it."""
+    half = row // 2
+    own, out = grid[first * row : (first + 1) * row], even[:row]
+    for c in range(row):
+        out[c] = own[c]
     for term in range(1, (factor + 1) // 2):
-        near, far = first + term * step, first + (factor - term) * step
-        for c in range(2 * columns):
-            even[term, c] = grid[near, c] + grid[far, c]
-        for c in range(columns):
-            odd[term - 1, c] = grid[near, columns + c] - grid[far, columns + c]
-        for c in range(columns):
-            odd[term - 1, columns + c] = grid[far, c] - grid[near, c]
+        at, mirrored = first + term * step, first + (factor - term) * step
+        near, far = grid[at * row : (at + 1) * row], grid[mirrored * row : (mirrored + 1) * row]
+        out = even[term * row : (term + 1) * row]
+        for c in range(row):
+            out[c] = near[c] + far[c]
+        out, other = odd[(term - 1) * row : term * row - half], odd[term * row - half : term * row]
+        near_re, near_im, far_re, far_im = near[:half], near[half:], far[:half], far[half:]
+        for c in range(half):
+            out[c] = near_im[c] - far_im[c]
+        for c in range(half):
+            other[c] = far_re[c] - near_re[c]
     if factor % 2 == 0:
-        for c in range(2 * columns):
-            even[factor // 2, c] = grid[first + factor // 2 * step, c]
+        at, last = first + factor // 2 * step, factor // 2
+        own, out = grid[at * row : (at + 1) * row], even[last * row : (last + 1) * row]
+        for c in range(row):
+            out[c] = own[c]
 
 
 @taken_in(fastmath={"contract"})
-def _combine(table, frequency, rows, out):  # type: ignore[no-untyped-def]
-    """Fill ``out (column,)``: the sum of rows, times what the table has for this frequency."""
-    t = table[frequency]
+def _combine(table, frequency, row, rows, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (2 * row,)`` for this frequency and the next: the sum of rows, times what the table has for them."""
+    t, u = table[frequency], table[frequency + 1]
+    one, two = out[:row], out[row:]
     for k in range(0, len(t), _TERMS):
         t0, t1, t2, t3, t4 = t[k], t[k + 1], t[k + 2], t[k + 3], t[k + 4]
+        u0, u1, u2, u3, u4 = u[k], u[k + 1], u[k + 2], u[k + 3], u[k + 4]
+        r0, r1, r2 = rows[k * row : (k + 1) * row], rows[(k + 1) * row : (k + 2) * row], rows[(k + 2) * row : (k + 3) * row]
+        r3, r4 = rows[(k + 3) * row : (k + 4) * row], rows[(k + 4) * row : (k + 5) * row]
         if k == 0:
-            for c in range(len(out)):
-                out[c] = t0 * rows[k, c] + t1 * rows[k + 1, c] + t2 * rows[k + 2, c] + t3 * rows[k + 3, c] + t4 * rows[k + 4, c]
+            for c in range(row):
+                one[c] = t0 * r0[c] + t1 * r1[c] + t2 * r2[c] + t3 * r3[c] + t4 * r4[c]
+                two[c] = u0 * r0[c] + u1 * r1[c] + u2 * r2[c] + u3 * r3[c] + u4 * r4[c]
         else:
-            for c in range(len(out)):
-                out[c] += t0 * rows[k, c] + t1 * rows[k + 1, c] + t2 * rows[k + 2, c] + t3 * rows[k + 3, c] + t4 * rows[k + 4, c]
+            for c in range(row):
+                one[c] += t0 * r0[c] + t1 * r1[c] + t2 * r2[c] + t3 * r3[c] + t4 * r4[c]
+                two[c] += u0 * r0[c] + u1 * r1[c] + u2 * r2[c] + u3 * r3[c] + u4 * r4[c]
 
 
 @taken_in(fastmath={"contract"})
-def _add_squares(cosine_part, sine_part, sign, total):  # type: ignore[no-untyped-def]
-    """Add squared magnitudes of cosine part plus ``sign`` times sine part to ``total (column,)``."""
-    columns = len(cosine_part) // 2
-    for c in range(len(total)):
-        real = cosine_part[c] + sign * sine_part[c]
-        imaginary = cosine_part[columns + c] + sign * sine_part[columns + c]
-        total[c] += real * real + imaginary * imaginary
+def _add_squares(cosine_part, sine_part, low, high):  # type: ignore[no-untyped-def]
+    """Add squared magnitudes of cosine part plus sine part to ``low (column,)``, and of their difference to ``high``."""
+    half = len(low)
+    cosine_re, cosine_im, sine_re, sine_im = cosine_part[:half], cosine_part[half:], sine_part[:half], sine_part[half:]
+    for c in range(half):
+        real, imaginary = cosine_re[c] + sine_re[c], cosine_im[c] + sine_im[c]
+        low[c] += real * real + imaginary * imaginary
+        real, imaginary = cosine_re[c] - sine_re[c], cosine_im[c] - sine_im[c]
+        high[c] += real * real + imaginary * imaginary
 
 
-_PLUS, _MINUS = np.float32(1), np.float32(-1)
+@taken_in(fastmath={"contract"})
+def _put(cosine_part, sine_part, low, high):  # type: ignore[no-untyped-def]
+    """Fill ``low`` with cosine part plus sine part, and ``high`` with their difference."""
+    for c in range(len(low)):
+        low[c], high[c] = cosine_part[c] + sine_part[c], cosine_part[c] - sine_part[c]
+
+
+@taken_in()
+def _on_lines(count):  # type: ignore[no-untyped-def]
+    """So many numbers that begin where a cache line does: every load of 64 bytes would else touch two."""
+    store = np.empty(count + 16, dtype=np.float32)
+    begin = (-store.ctypes.data % 64) // 4
+    return store[begin : begin + count]
 
 
 @compiled(fastmath={"contract"})
@@ -164,45 +197,52 @@ def _add_power(  # type: ignore[no-untyped-def]
     spectra, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
 ):
     cycles, channels, n_range = spectra.shape
-    # Made here, for then the compiler knows that they do not overlap.
-    grid = np.empty((cycles, 2 * _COLUMNS), dtype=np.float32)
-    even, odd = np.empty((_LARGEST, 2 * _COLUMNS), dtype=np.float32), np.empty((_LARGEST, 2 * _COLUMNS), dtype=np.float32)
-    cosine_part, sine_part = np.empty(2 * _COLUMNS, dtype=np.float32), np.empty(2 * _COLUMNS, dtype=np.float32)
+    blocks = max(1, -(-n_range // _COLUMNS))
+    columns = -(-n_range // (blocks * _LANES)) * _LANES
+    # Real parts of a row of range bins, then imaginary ones. All is flat, and cut into slices before it is worked on: lanes are
+    # only filled from what is surely not counted from an array's end.
+    row = 2 * columns
+    grid, sums = _on_lines((cycles + 1) * row), _on_lines((cycles + 1) * columns)
+    even, odd = _on_lines(_LARGEST * row), _on_lines(_LARGEST * row)
+    cosine_part, sine_part = _on_lines(2 * row), _on_lines(2 * row)
     grid[:] = 0
-    for channel in range(channels):
-        for begin in range(0, n_range, _COLUMNS):
-            end = min(begin + _COLUMNS, n_range)
+    for begin in range(0, n_range, columns):
+        end = min(begin + columns, n_range)
+        sums[:] = 0
+        for channel in range(channels):
             for place in range(cycles):
                 weight = weights[cycle_at[place]]
                 samples = spectra[cycle_at[place], channel, begin:end]
+                re, im = grid[place * row : place * row + columns], grid[place * row + columns : (place + 1) * row]
                 for c in range(end - begin):
-                    grid[place, c] = samples[c].real * weight
-                    grid[place, _COLUMNS + c] = samples[c].imag * weight
+                    re[c] = samples[c].real * weight
+                    im[c] = samples[c].imag * weight
             for last in (False, True):
                 # First along the second factor, whose places are neighbours, then along the first.
                 factor, step = (n_1, n_2) if last else (n_2, 1)
                 cosines, sines = (cosines_1, sines_1) if last else (cosines_2, sines_2)
                 odd_terms = (factor - 1) // 2
-                even[factor // 2 + 1 :] = 0
-                odd[odd_terms:] = 0
+                even[(factor // 2 + 1) * row : cosines.shape[1] * row] = 0
+                odd[odd_terms * row : sines.shape[1] * row] = 0
                 for line in range(cycles // factor):
                     first = line if last else line * n_2
-                    _fold(grid, first, step, factor, even, odd)
-                    for frequency in range(factor // 2 + 1):
-                        _combine(cosines, frequency, even, cosine_part)
-                        paired = 1 <= frequency <= odd_terms
-                        if paired:
-                            _combine(sines, frequency - 1, odd, sine_part)
-                        else:
-                            sine_part[:] = 0
-                        low, high = first + frequency * step, first + (factor - frequency) * step
-                        if last:
-                            _add_squares(cosine_part, sine_part, _PLUS, power[bin_at[low], begin:end])
-                            if paired:
-                                _add_squares(cosine_part, sine_part, _MINUS, power[bin_at[high], begin:end])
-                        else:
-                            for c in range(2 * _COLUMNS):
-                                grid[low, c] = cosine_part[c] + sine_part[c]
-                            if paired:
-                                for c in range(2 * _COLUMNS):
-                                    grid[high, c] = cosine_part[c] - sine_part[c]
+                    _fold(grid, row, first, step, factor, even, odd)
+                    for pair in range(0, factor // 2 + 1, 2):
+                        _combine(cosines, pair, row, even, cosine_part)
+                        _combine(sines, pair, row, odd, sine_part)
+                        for frequency in range(pair, min(pair + 2, factor // 2 + 1)):
+                            # The sine of a frequency without a mirror image is 0: what would be put there goes to a row behind.
+                            low, high = first + frequency * step, first + (factor - frequency) * step
+                            if not 1 <= frequency <= odd_terms:
+                                high = cycles
+                            part = slice((frequency - pair) * row, (frequency - pair + 1) * row)
+                            cosine, sine = cosine_part[part], sine_part[part]
+                            if last:
+                                near, far = slice(low * columns, (low + 1) * columns), slice(high * columns, (high + 1) * columns)
+                                _add_squares(cosine, sine, sums[near], sums[far])
+                            else:
+                                near, far = slice(low * row, (low + 1) * row), slice(high * row, (high + 1) * row)
+                                _put(cosine, sine, grid[near], grid[far])
+        for place in range(cycles):
+            for c in range(end - begin):
+                power[bin_at[place], begin + c] += sums[place * columns + c]

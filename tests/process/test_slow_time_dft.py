@@ -27,7 +27,7 @@ def test_it_serves_numbers_of_cycles_with_two_small_coprime_factors_and_no_other
 @given(
     n_cycles=st.sampled_from([n for n, pairs in PRODUCTS if pairs]),
     channels=st.integers(1, 3),
-    n_range=st.sampled_from([1, 5, 64, 65, 130]),
+    n_range=st.sampled_from([1, 5, 64, 65, 130, 257, 600]),
     seed=st.integers(0, 2**32 - 1),
 )
 def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, seed: int) -> None:
