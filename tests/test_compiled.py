@@ -7,12 +7,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from numba import config
 from numba.core import event
 from numba.core.errors import TypingError
 
-from rtradar.compiled import compiled, is_on_disk, taken_in
+from rtradar.compiled import compiled, is_on_disk, on_cache_lines, taken_in
 
 
 @taken_in()
@@ -44,6 +45,15 @@ def test_dividing_by_zero_raises_nothing() -> None:
 
 def test_what_is_taken_in_is_called_by_python_and_by_compiled_functions() -> None:
     assert half(3.0) == uncached(lambda number: half(number))(3.0) == 1.5
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.complex128])
+def test_an_array_on_cache_lines(kind: type[np.generic]) -> None:
+    for made in (on_cache_lines, uncached(lambda count, like: on_cache_lines(count, like))):
+        array = made(33, np.zeros(1, dtype=kind))
+        assert array.dtype == kind
+        assert array.shape == (33,)
+        assert array.ctypes.data % 64 == 0
 
 
 def test_what_is_on_disk_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, taken_in
+from rtradar.compiled import compiled, on_cache_lines, taken_in
 
 _LARGEST = 40
 """Factor: plain sums grow with its square."""
@@ -184,14 +184,6 @@ def _put(cosine_part, sine_part, low, high):  # type: ignore[no-untyped-def]
         low[c], high[c] = cosine_part[c] + sine_part[c], cosine_part[c] - sine_part[c]
 
 
-@taken_in()
-def _on_lines(count):  # type: ignore[no-untyped-def]
-    """So many numbers that begin where a cache line does: every load of 64 bytes would else touch two."""
-    store = np.empty(count + 16, dtype=np.float32)
-    begin = (-store.ctypes.data % 64) // 4
-    return store[begin : begin + count]
-
-
 @compiled(fastmath={"contract"})
 def _add_power(  # type: ignore[no-untyped-def]
     spectra, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
@@ -202,9 +194,9 @@ def _add_power(  # type: ignore[no-untyped-def]
     # Real parts of a row of range bins, then imaginary ones. All is flat, and cut into slices before it is worked on: lanes are
     # only filled from what is surely not counted from an array's end.
     row = 2 * columns
-    grid, sums = _on_lines((cycles + 1) * row), _on_lines((cycles + 1) * columns)
-    even, odd = _on_lines(_LARGEST * row), _on_lines(_LARGEST * row)
-    cosine_part, sine_part = _on_lines(2 * row), _on_lines(2 * row)
+    grid, sums = on_cache_lines((cycles + 1) * row, weights), on_cache_lines((cycles + 1) * columns, weights)
+    even, odd = on_cache_lines(_LARGEST * row, weights), on_cache_lines(_LARGEST * row, weights)
+    cosine_part, sine_part = on_cache_lines(2 * row, weights), on_cache_lines(2 * row, weights)
     grid[:] = 0
     for begin in range(0, n_range, columns):
         end = min(begin + columns, n_range)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, taken_in
+from rtradar.compiled import compiled, on_cache_lines, taken_in
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.phasor import phasor
 
@@ -164,28 +164,20 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
     return count
 
 
-@taken_in()
-def _on_lines(count, like):  # type: ignore[no-untyped-def]
-    """An array of so many that begins where a cache line does: every load of 64 bytes would else touch two."""
-    store = np.empty(count + 64 // like.itemsize, dtype=like.dtype)
-    begin = (-store.ctypes.data % 64) // like.itemsize
-    return store[begin : begin + count]
-
-
 @compiled(fastmath={"contract"})
 def add_tones(  # type: ignore[no-untyped-def]
     begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, table, ramp, sines, cosines, out
 ):
     """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the precision of ``ramp``, which counts the lanes.
 
-    ``sines`` and ``cosines`` are those of `series`, in this precision.
+    ``sines`` and ``cosines`` are those of `series`, ``table`` that of `first_powers`, in this precision.
     """
     receivers, samples = out.shape[1:]
     nodes, echoes = amplitude.shape[0], length.shape[2]
     # The last pair of blocks may reach past the last sample, the last tones added together past the last tone: these are silent.
     pairs, tones = (samples + 2 * LANES - 1) // (2 * LANES), (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
     sum_re, sum_im = np.empty(pairs * 2 * LANES, dtype=ramp.dtype), np.empty(pairs * 2 * LANES, dtype=ramp.dtype)
-    lanes, sums = _on_lines(tones * _NEXT, ramp), _on_lines(2 * _NEXT, ramp)
+    lanes, sums = on_cache_lines(tones * _NEXT, ramp), on_cache_lines(2 * _NEXT, ramp)
     middle_re, middle_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
     now_re, now_im, now = np.empty(tones, dtype=ramp.dtype), np.empty(tones, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
     angle, quadrant = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
