@@ -3,7 +3,8 @@
 Plain: x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, an exponential for every echo
 and sample. It is timed with its turns in float64, and compared with them in long double, one chirp in sixteen. 21 echoes
 anywhere in the band: constant amplitudes, the parabola through three frequencies, a third of the echoes on such parabolas
-and the others constant, and the polynomial through five. Then 252 echoes in complex64, which are added up in another way.
+and the others constant, and the polynomial through five. Then 315 echoes in complex64, which are added up in another way,
+spread over a grid; and how long adding them one by one takes beside that, of more and more echoes.
 Relative to the root mean square of the IF. Speed is reported, not judged: it is the machine's.
 
     python validation/if_sum.py [--quick] [--json FILE]
@@ -14,6 +15,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
+from unittest import mock
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,14 +24,15 @@ from rows import Row, judged, main, reported
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.signal import synthesize
+from rtradar.signal import synthesis, synthesize
 
 Complex = NDArray[np.complex128]
 
 PARTS = 21
 TOLERANCE = 1e-5
 CASES = ((1, 0), (3, 0), (3, 14), (5, 0))  # nodes, constant echoes
-CROWD, CROWD_CASES = 252, ((1, 0), (3, 0), (5, 0))  # a body and twelve ways over walls
+CROWD, CROWD_CASES = 315, ((1, 0), (3, 0), (5, 0))  # a body and fourteen ways over walls
+CROSSINGS = ((1, (150, 300, 600)), (3, (12, 24, 48)))  # nodes, echoes
 COMPARED = slice(None, None, 16)
 REPEATS = 3
 
@@ -94,6 +97,23 @@ def crowd_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator)
     yield from compared(claim, block(radar, 192, nodes, constant, CROWD, rng), radar, np.complex64)
 
 
+def crossing_rows(preset: str, nodes: int, counts: tuple[int, ...], rng: np.random.Generator) -> Iterator[Row]:
+    """Where spreading begins to pay, which `synthesize` has as constants: both ways of the same echoes in turn."""
+    radar = Radar.preset(preset)
+    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}, complex64"
+    times = radar.chirp_times(192)
+    for count in counts:
+        echoes = block(radar, len(times), nodes, 0, count, rng)
+        seconds: dict[int, list[float]] = {}
+        for _ in range(1 + 3 * REPEATS):  # compiled before it is timed
+            for many in (1, count + 1):
+                with mock.patch.multiple(synthesis, MANY_ECHOES=many, MANY_VARYING_ECHOES=many):
+                    took = timed(lambda echoes=echoes: synthesize(echoes, radar, times, dtype=np.complex64))  # type: ignore[misc]
+                seconds.setdefault(many, []).append(took)
+        spread, one_by_one = (float(np.median(own[1:])) for own in seconds.values())
+        yield reported(claim, f"{count} echoes: one by one over spread, time", "", one_by_one / spread, key="if-sum")
+
+
 def compared(claim: str, echoes: Echoes, radar: Radar, dtype: type[np.complexfloating]) -> Iterator[Row]:
     chirps, _, count = echoes.length.shape
     times = radar.chirp_times(chirps)
@@ -117,7 +137,7 @@ def timed(work: Callable[[], object]) -> float:
 def measure(quick: bool) -> list[Row]:
     rng = np.random.default_rng(0)
     presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
-    kinds = ((CASES, case_rows), (CROWD_CASES, crowd_rows))
+    kinds = ((CASES, case_rows), (CROWD_CASES, crowd_rows), (CROSSINGS, crossing_rows))
     return [row for preset in presets for cases, rows in kinds for case in cases for row in rows(preset, *case, rng)]
 
 

@@ -19,8 +19,9 @@ from rtradar.threads import in_threads, thread_count
 MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
 
-MANY_ECHOES = 32
-"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` has what it saves)."""
+MANY_ECHOES, MANY_VARYING_ECHOES = 300, 24
+"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` times both ways): of
+amplitudes that are one number, and of those that are given at several frequencies."""
 
 _CHIRPS_A_THREAD = 16
 """Handed out at once, or more: Python takes its time to hand out the next."""
@@ -64,7 +65,7 @@ def synthesize(
         Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
         Of the samples. Phases are float64 in both. For complex64, samples are added up in float32, to 1e-6 of the sum of the
-        magnitudes: by `spread_sum` from `MANY_ECHOES` and 16 samples on, with at most 6 frequencies, else where amplitudes are
+        magnitudes: by `spread_sum` of many echoes and 16 samples or more, with at most 6 frequencies, else where amplitudes are
         given at 3 frequencies at most.
 
     Returns
@@ -95,7 +96,8 @@ def synthesize(
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
     out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
-    many = echoes.length.shape[2] >= MANY_ECHOES and len(echoes.frequency) <= MOST_NODES
+    nodes = len(echoes.frequency)
+    many = echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES) and nodes <= MOST_NODES
     many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES
     length, powers = np.ascontiguousarray(echoes.length), _powers_of_sample_number(echoes.frequency, radar)
     waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
@@ -104,7 +106,7 @@ def synthesize(
         spread_sum(length, echoes.amplitude, powers, *waveform, out)
     else:
         # More powers than those of a parabola cancel too much for float32.
-        kind = np.float32 if out.dtype == np.complex64 and len(echoes.frequency) <= POWERS else np.float64
+        kind = np.float32 if out.dtype == np.complex64 and nodes <= POWERS else np.float64
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
         lanes = first_powers(kind), np.arange(LANES, dtype=kind), *series(kind)
 
