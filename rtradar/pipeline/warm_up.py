@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -63,6 +64,17 @@ def warm_up_usual_processing() -> None:
     warm_up_processing(echoes, radar)
 
 
+def compile_for_another_process() -> None:
+    """`warm_up_usual_processing`, but for no longer than standard input is open, which it is while that process is there."""
+
+    def end_with_it() -> None:
+        os.read(sys.stdin.fileno(), 1)
+        os._exit(1)
+
+    threading.Thread(target=end_with_it, daemon=True).start()
+    warm_up_usual_processing()
+
+
 @contextmanager
 def processing_compiled_beside() -> Iterator[None]:
     """Have another process compile what echoes go through, if none has; it is done when this ends."""
@@ -70,9 +82,9 @@ def processing_compiled_beside() -> Iterator[None]:
     if is_on_disk(add_tones) or thread_count() < 2 or not Path(sys.executable or "").name.startswith("python"):
         yield
         return
-    words = [sys.executable, "-c", "from rtradar.pipeline.warm_up import warm_up_usual_processing as go; go()"]
+    words = [sys.executable, "-c", "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"]
     environment, nothing = {**os.environ, **environment_of(1)}, subprocess.DEVNULL
-    with subprocess.Popen(words, env=environment, stdin=nothing, stdout=nothing, stderr=nothing) as other:
+    with subprocess.Popen(words, env=environment, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing) as other:
         try:
             yield
             with suppress(subprocess.TimeoutExpired):

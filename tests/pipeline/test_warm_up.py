@@ -56,6 +56,21 @@ def test_an_error_leaves_no_process_behind(others: list[subprocess.Popen[bytes]]
     assert other.returncode not in (None, 0)
 
 
+def test_standard_input_is_open_as_long_as_the_first_process_is_there(others: list[subprocess.Popen[bytes]]) -> None:
+    with processing_compiled_beside():
+        (other,) = others
+        assert other.stdin is not None
+        assert not other.stdin.closed
+        other.kill()
+
+
+def test_it_ends_with_standard_input(tmp_path: Path) -> None:
+    words = "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"
+    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
+    ended = subprocess.run([sys.executable, "-c", words], env=environment, stdin=subprocess.DEVNULL, check=False)
+    assert ended.returncode == 1  # and 0 when all is compiled
+
+
 def test_one_that_takes_too_long_is_not_waited_for(
     others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
