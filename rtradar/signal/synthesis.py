@@ -13,7 +13,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
 from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
-from rtradar.signal.tones import LANES, POWERS, add_tones, first_powers, series
+from rtradar.signal.tones import LANES, MIDDLE, add_tones, first_powers, series
 from rtradar.threads import in_threads, thread_count
 
 MAX_BINS_IN_CHIRP = 0.1
@@ -25,6 +25,9 @@ amplitudes that are one number, and of those that are given at several frequenci
 
 _CHIRPS_A_THREAD = 16
 """Handed out at once, or more: Python takes its time to hand out the next."""
+
+_MOST_POWERS = 3
+"""Of the sample number, in float32: those of more than a parabola cancel too much."""
 
 _INSTANTS = 16
 """At so many instants of a block the speed of echoes is looked at."""
@@ -99,15 +102,15 @@ def synthesize(
     nodes = len(echoes.frequency)
     many = echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES) and nodes <= MOST_NODES
     many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES
-    length, powers = np.ascontiguousarray(echoes.length), _powers_of_sample_number(echoes.frequency, radar)
+    length = np.ascontiguousarray(echoes.length)
     waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
     if many:
         # A slice of a block serves as it is where amplitudes are only picked.
-        spread_sum(length, echoes.amplitude, powers, *waveform, out)
+        spread_sum(length, echoes.amplitude, _powers_of_sample_number(echoes.frequency, radar, 0.0), *waveform, out)
     else:
-        # More powers than those of a parabola cancel too much for float32.
-        kind = np.float32 if out.dtype == np.complex64 and nodes <= POWERS else np.float64
+        kind = np.float32 if out.dtype == np.complex64 and nodes <= _MOST_POWERS else np.float64
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
+        powers = _powers_of_sample_number(echoes.frequency, radar, MIDDLE)
         lanes = first_powers(kind), np.arange(LANES, dtype=kind), *series(kind)
 
         at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
@@ -125,9 +128,9 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
     return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
 
-def _powers_of_sample_number(frequency: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
-    """Weights (power, node) of an amplitude's values at the nodes in its polynomial in n / samples."""
-    nodes = (frequency - radar.start_frequency_hz) / radar.bandwidth_hz
+def _powers_of_sample_number(frequency: NDArray[np.float64], radar: Radar, origin: float) -> NDArray[np.float64]:
+    """Weights (power, node) of an amplitude's values at the nodes in its polynomial in n / samples less an origin."""
+    nodes = (frequency - radar.start_frequency_hz) / radar.bandwidth_hz - origin
     return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
 
 

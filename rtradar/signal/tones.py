@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from rtradar.compiled import compiled, on_cache_lines, taken_in
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.phasor import phasor
 
 LANES = 32
 """Samples that are made side by side."""
@@ -22,11 +21,11 @@ _TOGETHER = 6
 _NEXT = 2 * LANES
 """From the lanes of one tone to those of the next."""
 
-POWERS = 3
-"""Powers of the sample number that one pass over a tone takes: all of an amplitude given at up to three frequencies."""
-
 _TERMS = 8
 """Of the series of sine and cosine, for up to an eighth of a turn: the next are (pi / 4)^16 / 16! = 1e-15 at most."""
+
+MIDDLE = 0.5
+"""Share of the sweep about which powers of the sample number are taken, where they cancel least."""
 
 _GRID = 4096
 """Steps from sample to sample of which the first powers are kept in a table, 1 / 4096 turn apart."""
@@ -131,22 +130,27 @@ def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  #
             early_im[i] += sums[2 * LANES - 1 - i] - sums[3 * LANES - 1 - i]
 
 
-@taken_in(fastmath={"contract"})
-def _add_parabola(powers, ramp, start, block_turn, step, c0, c1, c2, now, out_re, out_im):  # type: ignore[no-untyped-def]
-    """Add a tone whose amplitude is c0 + c1 x + c2 x^2, x the sample number times ``step``; ``ramp`` counts the lanes."""
-    for block in range(len(out_re) // LANES):
-        block_re, block_im = out_re[block * LANES : (block + 1) * LANES], out_im[block * LANES : (block + 1) * LANES]
-        first = block * LANES * step
-        # The parabola about the first sample of the block.
-        d0, d1, d2 = start * (c0 + first * (c1 + first * c2)), start * (c1 + 2 * first * c2) * step, start * c2 * step * step
-        now[0], now[1], now[2], now[3], now[4], now[5] = d0.real, d0.imag, d1.real, d1.imag, d2.real, d2.imag
-        re0, im0, re1, im1, re2, im2 = now[0], now[1], now[2], now[3], now[4], now[5]
-        for lane in range(LANES):
-            re = re0 + ramp[lane] * (re1 + ramp[lane] * re2)
-            im = im0 + ramp[lane] * (im1 + ramp[lane] * im2)
-            block_re[lane] += re * powers[lane] - im * powers[lane + LANES]
-            block_im[lane] += re * powers[lane + LANES] + im * powers[lane]
-        start = start * block_turn
+@taken_in()
+def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im):  # type: ignore[no-untyped-def]
+    """Coefficients ``now (tone,)`` of a power of the sample number, and whether any is other than 0.
+
+    ``change (node * tone,)`` is what amplitudes at the other frequencies are more than those at the ``first``: 0 where they are
+    constant, and so are then the coefficients of all powers but the first, whose weights add up to 0 over the nodes.
+    """
+    tones = len(first_re)
+    for i in range(tones):
+        weight_re[i], weight_im[i] = (first_re[i], first_im[i]) if power == 0 else (0.0, 0.0)
+    for node in range(1, powers.shape[1]):
+        share = powers[power, node]
+        own_re, own_im = change_re[(node - 1) * tones : node * tones], change_im[(node - 1) * tones : node * tones]
+        for i in range(tones):
+            weight_re[i] += share * own_re[i]
+            weight_im[i] += share * own_im[i]
+    any_there = False
+    for i in range(tones):
+        now_re[i], now_im[i] = weight_re[i], weight_im[i]
+        any_there |= weight_re[i] != 0 or weight_im[i] != 0
+    return any_there
 
 
 @taken_in()
@@ -179,13 +183,17 @@ def add_tones(  # type: ignore[no-untyped-def]
     sum_re, sum_im = np.empty(pairs * 2 * LANES, dtype=ramp.dtype), np.empty(pairs * 2 * LANES, dtype=ramp.dtype)
     lanes, sums = on_cache_lines(tones * _NEXT, ramp), on_cache_lines(2 * _NEXT, ramp)
     middle_re, middle_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
-    now_re, now_im, now = np.empty(tones, dtype=ramp.dtype), np.empty(tones, dtype=ramp.dtype), np.empty(6, dtype=ramp.dtype)
     angle, quadrant = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
-    rest, middles = np.empty(tones, dtype=ramp.dtype), ramp + _HALF
-    start, step = np.empty(tones), np.empty(tones)
-    varies, heard, coefficient = np.empty(tones, np.bool_), np.empty(echoes, np.int64), np.empty(POWERS, np.complex128)
+    first_re, first_im, weight_re, weight_im = np.zeros(tones), np.zeros(tones), np.empty(tones), np.empty(tones)
+    now_re, now_im = np.empty(tones, dtype=ramp.dtype), np.empty(tones, dtype=ramp.dtype)
+    change_re, change_im = np.zeros((nodes - 1) * tones), np.zeros((nodes - 1) * tones)
+    weighed_re, weighed_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
+    rest, middles, share = np.empty(tones, dtype=ramp.dtype), ramp + _HALF, np.empty(samples, dtype=ramp.dtype)
+    start, step, heard = np.empty(tones), np.empty(tones), np.empty(echoes, np.int64)
+    for sample in range(samples):
+        share[sample] = sample / samples - MIDDLE
     # What is not filled for a chirp is of the one before, and silent.
-    lanes[:], start[:], step[:], varies[:] = 0.0, 0.0, 0.0, False
+    lanes[:], start[:], step[:] = 0.0, 0.0, 0.0
     for chirp in range(begin, end):
         for receiver in range(receivers):
             own = amplitude[:, chirp, receiver]
@@ -194,59 +202,35 @@ def add_tones(  # type: ignore[no-untyped-def]
                 delay = length[chirp, receiver, heard[i]] / SPEED_OF_LIGHT_MPS
                 # Turns at the first sample, and from one to the next.
                 start[i], step[i] = delay * (start_frequency - 0.5 * slope * delay), slope * delay / sample_rate
+            for i in range(tones):
+                here = own[0, heard[i]] if i < count else 0j
+                first_re[i], first_im[i] = here.real, here.imag
+                for node in range(1, nodes):
+                    there = own[node, heard[i]] - here if i < count else 0j
+                    change_re[(node - 1) * tones + i], change_im[(node - 1) * tones + i] = there.real, there.imag
             for i in range(count):
                 row = int(step[i] * _GRID + 0.5)
                 rest[i] = (step[i] - row / _GRID) * (2 * math.pi)
                 _lanes(table[row], rest[i], middles, sines, cosines, lanes[i * _NEXT : (i + 1) * _NEXT])
-            sum_re[:] = 0.0
-            sum_im[:] = 0.0
-            # Horner's scheme over threes of powers of the sample number.
-            for lowest in range((nodes - 1) // POWERS * POWERS, -1, -POWERS):
-                if lowest + POWERS < nodes:
-                    for sample in range(samples):
-                        cube = (sample / samples) ** 3
-                        sum_re[sample] *= cube
-                        sum_im[sample] *= cube
-                for i in range(count):
-                    echo = heard[i]
-                    varies[i] = False
-                    for node in range(1, nodes):
-                        varies[i] |= own[node, echo] != own[0, echo]
-                    if not varies[i]:
-                        continue
-                    coefficient[:] = 0
-                    for power in range(lowest, min(lowest + POWERS, nodes)):
-                        for node in range(nodes):
-                            coefficient[power - lowest] += powers[power, node] * own[node, echo]
-                    before_re, before_im = phasor(start[i] - 0.5 * step[i])
-                    block_re, block_im = phasor(LANES * step[i])
-                    _add_parabola(
-                        lanes[i * _NEXT : (i + 1) * _NEXT],
-                        ramp,
-                        complex(before_re, before_im),
-                        complex(block_re, block_im),
-                        1 / samples,
-                        coefficient[0],
-                        coefficient[1],
-                        coefficient[2],
-                        now,
-                        sum_re,
-                        sum_im,
-                    )
-            for i in range(tones):
-                now_re[i], now_im[i] = 0.0, 0.0
-                if i < count and not varies[i]:
-                    now_re[i], now_im[i] = own[0, heard[i]].real, own[0, heard[i]].imag
             for pair in range(pairs):
                 for i in range(tones):
                     _reduce(start[i] + step[i] * ((2 * pair + 1) * LANES - 0.5), angle, quadrant, pair * tones + i)
             _phasors(pairs * tones, angle, quadrant, sines, cosines, middle_re, middle_im)
-            for pair in range(pairs):
-                for i in range(tones):
-                    re, im = middle_re[pair * tones + i], middle_im[pair * tones + i]
-                    middle_re[pair * tones + i] = re * now_re[i] - im * now_im[i]
-                    middle_im[pair * tones + i] = re * now_im[i] + im * now_re[i]
-            _add_constants(pairs, lanes, middle_re, middle_im, sums, sum_re, sum_im)
+            sum_re[:] = 0.0
+            sum_im[:] = 0.0
+            # Horner's scheme over powers of the sample number from the middle: for each a sum of tones that do not change.
+            for power in range(nodes - 1, -1, -1):
+                for sample in range(samples if power < nodes - 1 else 0):
+                    sum_re[sample] *= share[sample]
+                    sum_im[sample] *= share[sample]
+                if not _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im):
+                    continue
+                for pair in range(pairs):
+                    for i in range(tones):
+                        re, im = middle_re[pair * tones + i], middle_im[pair * tones + i]
+                        weighed_re[pair * tones + i] = re * now_re[i] - im * now_im[i]
+                        weighed_im[pair * tones + i] = re * now_im[i] + im * now_re[i]
+                _add_constants(pairs, lanes, weighed_re, weighed_im, sums, sum_re, sum_im)
             heard_there = out[chirp, receiver]
             for sample in range(samples):
                 heard_there[sample] = complex(sum_re[sample], sum_im[sample])
