@@ -32,7 +32,7 @@ PARTS = 21
 TOLERANCE = 1e-5
 CASES = ((1, 0), (3, 0), (3, 14), (5, 0))  # nodes, constant echoes
 CROWD, CROWD_CASES = 315, ((1, 0), (3, 0), (5, 0))  # a body and fourteen ways over walls
-CROSSINGS = ((1, (150, 300, 600)), (3, (12, 24, 48)))  # nodes, echoes
+CROSSINGS = ((1, (150, 300, 600)), (3, (42, 84, 168)))  # nodes, echoes
 COMPARED = slice(None, None, 16)
 REPEATS = 3
 
