@@ -108,30 +108,30 @@ def power_map(
     real = np.float32 if kind == np.complex64 else np.float64
     scale: NDArray[Any] = weights(doppler_window, n_cycles, "doppler_window").astype(real)
     dft = slow_time_dft(n_cycles) if kind == np.complex64 else None
+    channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
 
-    def tx_power(tx: int, receivers: slice = slice(None)) -> NDArray[np.floating]:
+    def power_of(chosen: range) -> NDArray[np.floating]:
         total = np.zeros((n_cycles, n_range), dtype=real)
         if dft is not None:
-            add_doppler_power(cube[:, tx, receivers], scale, dft, total)
+            add_doppler_power(channels, chosen, scale, dft, total)
             return total
-        for rx in range(radar.n_rx)[receivers]:
+        for own in chosen:
             # One channel at a time fits the cache of a core.
             weighted = np.empty((n_cycles, n_range), dtype=kind)
-            _weigh(cube[:, tx, rx], scale, weighted)
+            _weigh(channels[:, own], scale, weighted)
             _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
         return total
 
-    power = np.zeros((n_cycles, n_range), dtype=real)
     if channel is not None:
-        tx, rx = divmod(channel, radar.n_rx)
-        power = tx_power(tx, slice(rx, rx + 1))
+        power = power_of(range(channel, channel + 1))
     elif radar.multiplexing == "ddm":
         # The rows of all Tx are the same sum; those of the first are not turned.
-        power = without_copies(tx_power(0), radar, radar.n_rx)
+        power = without_copies(power_of(range(radar.n_rx)), radar, radar.n_rx)
     else:
         # The order of the sum is fixed, so the map does not depend on the number of threads.
-        for own in in_threads(tx_power, range(radar.n_tx)):
-            power += own
+        power = np.zeros((n_cycles, n_range), dtype=real)
+        for part in in_threads(lambda tx: power_of(range(tx * radar.n_rx, (tx + 1) * radar.n_rx)), range(radar.n_tx)):
+            power += part
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
 

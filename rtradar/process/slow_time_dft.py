@@ -22,13 +22,13 @@ _LARGEST = 40
 """Factor: plain sums grow with its square."""
 
 _COLUMNS = 256
-"""Range bins side by side, at most: each cycle's lie together in memory, and of all cycles these stay in the cache of a core."""
+"""Range bins side by side, those of one cycle after the other: many, for what begins anew with every row takes time."""
 
-_LANES = 16
-"""Of which their number is a multiple."""
+_ROW = 2 * _COLUMNS
+"""Real parts of these, then imaginary ones."""
 
-_TERMS = 5
-"""Added at once, so that sums are read and written back a fifth as often."""
+_TOGETHER = 3
+"""Terms added at once, and frequencies they are added for: sums and terms are read and written back a third as often."""
 
 
 class SlowTimeDft(NamedTuple):
@@ -39,8 +39,8 @@ class SlowTimeDft(NamedTuple):
     cycle_at, bin_at : (place,) int64
         Which cycle stands at each place of the grid (first, second) of the factors, and which Doppler bin afterwards.
     cosines, sines : pair of (frequency, term) float32
-        Of each factor: frequencies and terms 0 to half of it, the latter without those of which the sine is 0; filled up with
-        zeros to an even number of frequencies and a multiple of `_TERMS`.
+        Of each factor: frequencies and terms that have a mirror image, 1 to below half of it; filled up with zeros to multiples
+        of `_TOGETHER`.
     factors : pair of int
     """
 
@@ -52,8 +52,8 @@ class SlowTimeDft(NamedTuple):
 
     @property
     def multiply_adds(self) -> int:
-        """Of one transform: those of the sums, real and imaginary parts."""
-        squares = [(factor // 2 + 1) ** 2 + ((factor - 1) // 2) ** 2 for factor in self.factors]
+        """Of one transform: those of terms that have a mirror image, real and imaginary parts."""
+        squares = [2 * ((factor - 1) // 2) ** 2 for factor in self.factors]
         return 2 * sum(len(self.cycle_at) // factor * count for factor, count in zip(self.factors, squares, strict=True))
 
 
@@ -84,27 +84,24 @@ def slow_time_dft(n_cycles: int) -> SlowTimeDft | None:
 
 
 def _tables(factor: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    frequencies, odd = np.arange(factor // 2 + 1), np.arange(1, (factor + 1) // 2)
-    cosines = np.cos(2 * np.pi * np.outer(frequencies, frequencies) / factor)
-    sines = np.sin(2 * np.pi * np.outer(frequencies, odd) / factor)
-    return _filled(cosines), _filled(sines)
-
-
-def _filled(table: NDArray[np.float64]) -> NDArray[np.float32]:
-    frequencies, terms = table.shape
-    whole = max(1, -(-terms // _TERMS)) * _TERMS  # a factor of two has no sines
-    return np.pad(table, ((0, frequencies % 2), (0, whole - terms))).astype(np.float32)
+    mirrored = np.arange(1, (factor + 1) // 2)
+    angles = 2 * np.pi * np.outer(mirrored, mirrored) / factor
+    rest = -len(mirrored) % _TOGETHER
+    cosines, sines = (np.pad(table, (0, rest)).astype(np.float32) for table in (np.cos(angles), np.sin(angles)))
+    return cosines, sines
 
 
 def add_doppler_power(
-    spectra: NDArray[np.complex64], weights: NDArray[np.float32], dft: SlowTimeDft, power: NDArray[np.float32]
+    spectra: NDArray[np.complex64], channels: range, weights: NDArray[np.float32], dft: SlowTimeDft, power: NDArray[np.float32]
 ) -> None:
     """Add the squared magnitudes of weighted DFTs over the cycles of some channels.
 
     Parameters
     ----------
     spectra : (cycle, channel, range) complex64
-        Of any strides.
+        Contiguous.
+    channels : range
+        Which of them, in steps of one.
     weights : (cycle,) float32
         Of the cycles.
     dft : SlowTimeDft
@@ -116,125 +113,192 @@ def add_doppler_power(
     # What may be written to and what may not are two types to Numba, each with code of its own.
     spectra = spectra.view()
     spectra.flags.writeable = False
-    _add_power(spectra, weights, dft.cycle_at, dft.bin_at, *dft.factors, cosines_1, sines_1, cosines_2, sines_2, power)
+    _add_power(
+        spectra,
+        channels.start,
+        channels.stop,
+        weights,
+        dft.cycle_at,
+        dft.bin_at,
+        *dft.factors,
+        cosines_1,
+        sines_1,
+        cosines_2,
+        sines_2,
+        power,
+    )
+
+
+# Rows are `_ROW` long, a constant, and a function's rows stand one after the other in as few arrays as may be: were they arrays
+# each, the compiler would have every call ask first whether any two overlap.
+
+
+@taken_in()
+def _row(store, number):  # type: ignore[no-untyped-def]
+    return store[number * _ROW : (number + 1) * _ROW]
+
+
+@taken_in()
+def _powers(store, number):  # type: ignore[no-untyped-def]
+    return store[number * _COLUMNS : (number + 1) * _COLUMNS]
 
 
 @taken_in(fastmath={"contract"})
-def _fold(grid, row, first, step, factor, even, odd):  # type: ignore[no-untyped-def]
-    """Sums of rows at the same distance from both ends, and differences, times -j, which the sine has before it."""
-    half = row // 2
-    own, out = grid[first * row : (first + 1) * row], even[:row]
-    for c in range(row):
-        out[c] = own[c]
-    for term in range(1, (factor + 1) // 2):
-        at, mirrored = first + term * step, first + (factor - term) * step
-        near, far = grid[at * row : (at + 1) * row], grid[mirrored * row : (mirrored + 1) * row]
-        out = even[term * row : (term + 1) * row]
-        for c in range(row):
-            out[c] = near[c] + far[c]
-        out, other = odd[(term - 1) * row : term * row - half], odd[term * row - half : term * row]
-        near_re, near_im, far_re, far_im = near[:half], near[half:], far[:half], far[half:]
-        for c in range(half):
-            out[c] = near_im[c] - far_im[c]
-        for c in range(half):
-            other[c] = far_re[c] - near_re[c]
-    if factor % 2 == 0:
-        at, last = first + factor // 2 * step, factor // 2
-        own, out = grid[at * row : (at + 1) * row], even[last * row : (last + 1) * row]
-        for c in range(row):
-            out[c] = own[c]
+def _read(samples, weight, out):  # type: ignore[no-untyped-def]
+    """Fill ``out (row,)``: real parts of what is read, then imaginary ones, weighted."""
+    for c in range(len(samples)):
+        out[c] = samples[c].real * weight
+        out[_COLUMNS + c] = samples[c].imag * weight
 
 
 @taken_in(fastmath={"contract"})
-def _combine(table, frequency, row, rows, out):  # type: ignore[no-untyped-def]
-    """Fill ``out (2 * row,)`` for this frequency and the next: the sum of rows, times what the table has for them."""
-    t, u = table[frequency], table[frequency + 1]
-    one, two = out[:row], out[row:]
-    for k in range(0, len(t), _TERMS):
-        t0, t1, t2, t3, t4 = t[k], t[k + 1], t[k + 2], t[k + 3], t[k + 4]
-        u0, u1, u2, u3, u4 = u[k], u[k + 1], u[k + 2], u[k + 3], u[k + 4]
-        r0, r1, r2 = rows[k * row : (k + 1) * row], rows[(k + 1) * row : (k + 2) * row], rows[(k + 2) * row : (k + 3) * row]
-        r3, r4 = rows[(k + 3) * row : (k + 4) * row], rows[(k + 4) * row : (k + 5) * row]
-        if k == 0:
-            for c in range(row):
-                one[c] = t0 * r0[c] + t1 * r1[c] + t2 * r2[c] + t3 * r3[c] + t4 * r4[c]
-                two[c] = u0 * r0[c] + u1 * r1[c] + u2 * r2[c] + u3 * r3[c] + u4 * r4[c]
-        else:
-            for c in range(row):
-                one[c] += t0 * r0[c] + t1 * r1[c] + t2 * r2[c] + t3 * r3[c] + t4 * r4[c]
-                two[c] += u0 * r0[c] + u1 * r1[c] + u2 * r2[c] + u3 * r3[c] + u4 * r4[c]
+def _fold(near, far, even, odd):  # type: ignore[no-untyped-def]
+    """Sum of two rows, and their difference times -j, which the sine has before it."""
+    for c in range(_COLUMNS):
+        near_re, near_im, far_re, far_im = near[c], near[_COLUMNS + c], far[c], far[_COLUMNS + c]
+        even[c] = near_re + far_re
+        even[_COLUMNS + c] = near_im + far_im
+        odd[c] = near_im - far_im
+        odd[_COLUMNS + c] = far_re - near_re
 
 
 @taken_in(fastmath={"contract"})
-def _add_squares(cosine_part, sine_part, low, high):  # type: ignore[no-untyped-def]
-    """Add squared magnitudes of cosine part plus sine part to ``low (column,)``, and of their difference to ``high``."""
-    half = len(low)
-    cosine_re, cosine_im, sine_re, sine_im = cosine_part[:half], cosine_part[half:], sine_part[:half], sine_part[half:]
-    for c in range(half):
-        real, imaginary = cosine_re[c] + sine_re[c], cosine_im[c] + sine_im[c]
+def _read_folded(near, near_weight, far, far_weight, even, odd):  # type: ignore[no-untyped-def]
+    """The same of what is read, weighted."""
+    for c in range(len(near)):
+        near_re, near_im = near[c].real * near_weight, near[c].imag * near_weight
+        far_re, far_im = far[c].real * far_weight, far[c].imag * far_weight
+        even[c] = near_re + far_re
+        even[_COLUMNS + c] = near_im + far_im
+        odd[c] = near_im - far_im
+        odd[_COLUMNS + c] = far_re - near_re
+
+
+@taken_in()
+def _put(row, out):  # type: ignore[no-untyped-def]
+    for i in range(_ROW):
+        out[i] = row[i]
+
+
+@taken_in(fastmath={"contract"})
+def _add_products(table, begin, terms, out):  # type: ignore[no-untyped-def]
+    """Add to three rows ``out``: those of ``terms``, times what the table has for the three frequencies from ``begin`` on."""
+    a, b, c = table[begin], table[begin + 1], table[begin + 2]
+    for k in range(0, len(a), _TOGETHER):
+        rows = terms[k * _ROW : (k + _TOGETHER) * _ROW]
+        a0, a1, a2, b0, b1, b2, c0, c1, c2 = a[k], a[k + 1], a[k + 2], b[k], b[k + 1], b[k + 2], c[k], c[k + 1], c[k + 2]
+        for i in range(_ROW):
+            r0, r1, r2 = rows[i], rows[_ROW + i], rows[2 * _ROW + i]
+            out[i] = out[i] + a0 * r0 + a1 * r1 + a2 * r2
+            out[_ROW + i] = out[_ROW + i] + b0 * r0 + b1 * r1 + b2 * r2
+            out[2 * _ROW + i] = out[2 * _ROW + i] + c0 * r0 + c1 * r1 + c2 * r2
+
+
+@taken_in(fastmath={"contract"})
+def _add_signed(terms, count, sign, out):  # type: ignore[no-untyped-def]
+    """Add rows to one: all of them, or (``sign`` -1) with signs that alternate."""
+    factor = sign
+    for k in range(count):
+        row = _row(terms, k)
+        for i in range(_ROW):
+            out[i] += factor * row[i]
+        factor *= sign
+
+
+@taken_in(fastmath={"contract"})
+def _add_squares(row, out):  # type: ignore[no-untyped-def]
+    for c in range(_COLUMNS):
+        out[c] += row[c] * row[c] + row[_COLUMNS + c] * row[_COLUMNS + c]
+
+
+@taken_in(fastmath={"contract"})
+def _unfold(one, other, low, high):  # type: ignore[no-untyped-def]
+    """Fill ``low`` with the sum of two parts, and ``high``, of the mirrored frequency, with their difference."""
+    for i in range(_ROW):
+        low[i], high[i] = one[i] + other[i], one[i] - other[i]
+
+
+@taken_in(fastmath={"contract"})
+def _add_unfolded_squares(cosine, sine, low, high):  # type: ignore[no-untyped-def]
+    """The same, but squared magnitudes, added."""
+    for c in range(_COLUMNS):
+        cosine_re, cosine_im, sine_re, sine_im = cosine[c], cosine[_COLUMNS + c], sine[c], sine[_COLUMNS + c]
+        real, imaginary = cosine_re + sine_re, cosine_im + sine_im
         low[c] += real * real + imaginary * imaginary
-        real, imaginary = cosine_re[c] - sine_re[c], cosine_im[c] - sine_im[c]
+        real, imaginary = cosine_re - sine_re, cosine_im - sine_im
         high[c] += real * real + imaginary * imaginary
-
-
-@taken_in(fastmath={"contract"})
-def _put(cosine_part, sine_part, low, high):  # type: ignore[no-untyped-def]
-    """Fill ``low`` with cosine part plus sine part, and ``high`` with their difference."""
-    for c in range(len(low)):
-        low[c], high[c] = cosine_part[c] + sine_part[c], cosine_part[c] - sine_part[c]
 
 
 @compiled(fastmath={"contract"})
 def _add_power(  # type: ignore[no-untyped-def]
-    spectra, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
+    spectra, channel_begin, channel_end, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
 ):
-    cycles, channels, n_range = spectra.shape
-    blocks = max(1, -(-n_range // _COLUMNS))
-    columns = -(-n_range // (blocks * _LANES)) * _LANES
-    # Real parts of a row of range bins, then imaginary ones. All is flat, and cut into slices before it is worked on: lanes are
-    # only filled from what is surely not counted from an array's end.
-    row = 2 * columns
-    grid, sums = on_cache_lines((cycles + 1) * row, weights), on_cache_lines((cycles + 1) * columns, weights)
-    even, odd = on_cache_lines(_LARGEST * row, weights), on_cache_lines(_LARGEST * row, weights)
-    cosine_part, sine_part = on_cache_lines(2 * row, weights), on_cache_lines(2 * row, weights)
-    grid[:] = 0
-    for begin in range(0, n_range, columns):
-        end = min(begin + columns, n_range)
-        sums[:] = 0
-        for channel in range(channels):
-            for place in range(cycles):
-                weight = weights[cycle_at[place]]
-                samples = spectra[cycle_at[place], channel, begin:end]
-                re, im = grid[place * row : place * row + columns], grid[place * row + columns : (place + 1) * row]
-                for c in range(end - begin):
-                    re[c] = samples[c].real * weight
-                    im[c] = samples[c].imag * weight
+    cycles, _, n_range = spectra.shape
+    # Behind the rows of the grid is one of zeros.
+    grid, sums = on_cache_lines((cycles + 1) * _ROW, weights), on_cache_lines(cycles * _COLUMNS, weights)
+    terms = max(cosines_1.shape[1], cosines_2.shape[1])
+    even, odd = on_cache_lines(terms * _ROW, weights), on_cache_lines(terms * _ROW, weights)
+    alone, total = on_cache_lines(2 * _ROW, weights), on_cache_lines(_ROW, weights)
+    cosine_parts, sine_parts = on_cache_lines(_TOGETHER * _ROW, weights), on_cache_lines(_TOGETHER * _ROW, weights)
+    one = np.float32(1)
+    for begin in range(0, n_range, _COLUMNS):
+        end = min(begin + _COLUMNS, n_range)
+        # What stands beside the last range bins is 0 as well.
+        grid[:], sums[:], even[:], odd[:] = 0, 0, 0, 0
+        for channel in range(channel_begin, channel_end):
             for last in (False, True):
                 # First along the second factor, whose places are neighbours, then along the first.
                 factor, step = (n_1, n_2) if last else (n_2, 1)
                 cosines, sines = (cosines_1, sines_1) if last else (cosines_2, sines_2)
-                odd_terms = (factor - 1) // 2
-                even[(factor // 2 + 1) * row : cosines.shape[1] * row] = 0
-                odd[odd_terms * row : sines.shape[1] * row] = 0
+                pairs, half = (factor - 1) // 2, factor // 2
+                even[pairs * _ROW : cosines.shape[1] * _ROW] = 0
+                odd[pairs * _ROW : cosines.shape[1] * _ROW] = 0
                 for line in range(cycles // factor):
                     first = line if last else line * n_2
-                    _fold(grid, row, first, step, factor, even, odd)
-                    for pair in range(0, factor // 2 + 1, 2):
-                        _combine(cosines, pair, row, even, cosine_part)
-                        _combine(sines, pair, row, odd, sine_part)
-                        for frequency in range(pair, min(pair + 2, factor // 2 + 1)):
-                            # The sine of a frequency without a mirror image is 0: what would be put there goes to a row behind.
-                            low, high = first + frequency * step, first + (factor - frequency) * step
-                            if not 1 <= frequency <= odd_terms:
-                                high = cycles
-                            part = slice((frequency - pair) * row, (frequency - pair + 1) * row)
-                            cosine, sine = cosine_part[part], sine_part[part]
+                    # A term at half of an even factor is its own mirror image.
+                    at_half = first + half * step if factor % 2 == 0 else cycles
+                    own, middle = _row(grid, first), _row(grid, at_half)
+                    if not last:
+                        _read(spectra[cycle_at[first], channel, begin:end], weights[cycle_at[first]], own)
+                        if at_half < cycles:
+                            _read(spectra[cycle_at[at_half], channel, begin:end], weights[cycle_at[at_half]], middle)
+                    _unfold(own, middle, _row(alone, 0), _row(alone, 1))
+                    for k in range(pairs):
+                        low, high = first + (k + 1) * step, first + (factor - k - 1) * step
+                        if last:
+                            _fold(_row(grid, low), _row(grid, high), _row(even, k), _row(odd, k))
+                        else:
+                            low, high = cycle_at[low], cycle_at[high]
+                            near, far = spectra[low, channel, begin:end], spectra[high, channel, begin:end]
+                            _read_folded(near, weights[low], far, weights[high], _row(even, k), _row(odd, k))
+                    # Frequencies without a mirror image: 0, and half of an even factor.
+                    _put(_row(alone, 0), total)
+                    _add_signed(even, pairs, one, total)
+                    if last:
+                        _add_squares(total, _powers(sums, first))
+                    else:
+                        _put(total, own)
+                    if at_half < cycles:
+                        _put(_row(alone, half % 2), total)
+                        _add_signed(even, pairs, -one, total)
+                        if last:
+                            _add_squares(total, _powers(sums, at_half))
+                        else:
+                            _put(total, middle)
+                    for group in range(0, pairs, _TOGETHER):
+                        for k in range(_TOGETHER):
+                            _put(_row(alone, (group + k + 1) % 2), _row(cosine_parts, k))
+                        sine_parts[:] = 0
+                        _add_products(cosines, group, even, cosine_parts)
+                        _add_products(sines, group, odd, sine_parts)
+                        for k in range(min(_TOGETHER, pairs - group)):
+                            low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
+                            cosine, sine = _row(cosine_parts, k), _row(sine_parts, k)
                             if last:
-                                near, far = slice(low * columns, (low + 1) * columns), slice(high * columns, (high + 1) * columns)
-                                _add_squares(cosine, sine, sums[near], sums[far])
+                                _add_unfolded_squares(cosine, sine, _powers(sums, low), _powers(sums, high))
                             else:
-                                near, far = slice(low * row, (low + 1) * row), slice(high * row, (high + 1) * row)
-                                _put(cosine, sine, grid[near], grid[far])
+                                _unfold(cosine, sine, _row(grid, low), _row(grid, high))
         for place in range(cycles):
-            for c in range(end - begin):
-                power[bin_at[place], begin + c] += sums[place * columns + c]
+            own, out = _powers(sums, place), power[bin_at[place], begin:end]
+            for c in range(len(out)):
+                out[c] += own[c]

@@ -37,10 +37,23 @@ def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, 
     before = rng.uniform(0, 1, (n_cycles, n_range)).astype(np.float32)
     power, dft = before.copy(), slow_time_dft(n_cycles)
     assert dft is not None
-    add_doppler_power(spectra, weights, dft, power)
+    add_doppler_power(spectra, range(channels), weights, dft, power)
     expected = plain(spectra, weights)
     # Rounding of float32 sums of some hundred terms, beside the largest.
     np.testing.assert_allclose(power - before, expected, rtol=0, atol=3e-6 * expected.max())
+
+
+@pytest.mark.parametrize("factor", range(2, 41))
+def test_it_serves_every_factor(factor: int) -> None:
+    n_cycles = factor * (37 if factor != 37 else 36)  # 37 stays whole, and so does the other
+    dft = slow_time_dft(n_cycles)
+    assert dft is not None
+    rng = np.random.default_rng(factor)
+    spectra = rng.standard_normal((n_cycles, 1, 3, 2), dtype=np.float32).view(np.complex64)[..., 0]
+    weights, power = np.ones(n_cycles, dtype=np.float32), np.zeros((n_cycles, 3), dtype=np.float32)
+    add_doppler_power(spectra, range(1), weights, dft, power)
+    expected = plain(spectra, weights)
+    np.testing.assert_allclose(power, expected, rtol=0, atol=3e-6 * expected.max())
 
 
 @pytest.mark.parametrize("n_cycles", [133, 666])
@@ -50,7 +63,7 @@ def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
     n = np.arange(n_cycles)
     tones = np.exp(2j * np.pi * np.outer(n, n) / n_cycles).astype(np.complex64)[:, None]
     power = np.zeros((n_cycles, n_cycles), dtype=np.float32)
-    add_doppler_power(tones, np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power)
+    add_doppler_power(tones, range(1), np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power)
     np.testing.assert_allclose(power, np.eye(n_cycles), atol=1e-6)
 
 
@@ -59,13 +72,13 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
     spectra[7, 0, 3] = np.nan
     power, dft = np.zeros((133, 70), dtype=np.float32), slow_time_dft(133)
     assert dft is not None
-    add_doppler_power(spectra, np.ones(133, dtype=np.float32), dft, power)
+    add_doppler_power(spectra, range(1), np.ones(133, dtype=np.float32), dft, power)
     assert np.isnan(power[:, 3]).all()
     assert np.isfinite(np.delete(power, 3, axis=1)).all()
 
 
 def test_its_multiply_adds_are_counted() -> None:
-    dft = slow_time_dft(6)
+    dft = slow_time_dft(35)
     assert dft is not None
-    # Three sums of two terms, for two frequencies each, and two of three, folded to two even terms and an odd one; of both parts.
-    assert dft.multiply_adds == 2 * (3 * 2 * 2 + 2 * (2 * 2 + 1))
+    # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and five of seven; of both parts.
+    assert dft.multiply_adds == 2 * (7 * (2 * 2 + 2 * 2) + 5 * (3 * 3 + 3 * 3))
