@@ -62,5 +62,5 @@ class Echoes:
         for field, shape in expected.items():
             if getattr(self, field).shape != shape:
                 raise ValueError(f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it must be {shape}")
-        if len(np.unique(self.frequency)) < self.frequency.size:
+        if len(set(self.frequency.tolist())) < self.frequency.size:
             raise ValueError("Echoes.frequency names a node twice; the nodes of a polynomial must differ")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import lru_cache
-from typing import TypeVar
+from typing import Any, TypeVar
 
 THREADS_VARIABLE = "RTRADAR_THREADS"
 """Environment variable that limits the threads of this process, where it shares the cores with others of its kind."""
@@ -22,7 +23,13 @@ def thread_limit() -> int | None:
 
 def thread_count() -> int:
     """Threads that `in_threads` has: as many as this process may use."""
-    return thread_limit() or os.cpu_count() or 1
+    return thread_limit() or _cores()
+
+
+@lru_cache(maxsize=1)
+def _cores() -> int:
+    # The system reads a file to tell.
+    return os.cpu_count() or 1
 
 
 def environment_of(threads: int) -> dict[str, str]:
@@ -34,16 +41,31 @@ def environment_of(threads: int) -> dict[str, str]:
 def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
     """Results in the order of the items; NumPy, the FFT and compiled loops release the interpreter lock, so threads do pay.
 
-    ``work`` must not call this itself: it would wait for threads that wait for it.
+    The caller works too: to sleep and be woken takes as long as many an item.
     """
-    if len(items) < 2:
-        return [work(item) for item in items]
-    return list(_pool().map(work, items))
+    results: list[Any] = [None] * len(items)
+    left = iter(enumerate(items))
+
+    def take() -> None:
+        # The interpreter lock is held while the next is taken.
+        for place, item in left:
+            results[place] = work(item)
+
+    helpers = [_pool().submit(take) for _ in range(min(len(items), thread_count()) - 1)]
+    try:
+        take()
+    finally:
+        deque(left, maxlen=0)  # where one failed, nobody begins another
+        wait([helper for helper in helpers if not helper.cancel()])
+    for helper in helpers:
+        if not helper.cancelled():
+            helper.result()
+    return results
 
 
 @lru_cache(maxsize=1)
 def _pool() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(thread_count(), thread_name_prefix="rtradar")
+    return ThreadPoolExecutor(max(1, thread_count() - 1), thread_name_prefix="rtradar")
 
 
 # Threads do not follow into a forked process: there they are started anew.

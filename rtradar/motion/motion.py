@@ -164,9 +164,9 @@ class Motion:
         quaternions = np.empty((len(instants), len(self.joints), 4))
         stretches = np.floor((instants - self.first_frame_s) * self.rate_hz / _STRETCH_FRAMES).astype(np.int64)
         skeleton = np.ascontiguousarray(self.offsets, dtype=np.float64), np.asarray(self.parents, dtype=np.int64)
-        for stretch in np.unique(stretches):
+        for stretch in sorted(set(stretches.tolist())):
             here = np.flatnonzero(stretches == stretch)
-            root, rotation = self._splines(int(stretch))
+            root, rotation = self._splines(stretch)
             cubics = root.c, rotation.c.reshape(*rotation.c.shape[:2], -1)
             pose(instants, here, root.x, *cubics, *skeleton, positions, quaternions.reshape(len(instants), -1))
         return positions, quaternions

@@ -101,7 +101,7 @@ def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
                     range_tx = math.sqrt((t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2))
                     range_rx = math.sqrt((r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2))
                     # Square root of the cross-section, pi (abc)^2 / h^4: that of `rtradar.rcs.ellipsoid` without its angles.
-                    root = root_volume * squared / support
+                    root = root_volume * squared * (scale * scale)
                     # Straight through there is no bisector, and no reflection.
                     there = squared >= _NO_BISECTOR
                     lanes[3, k] = range_tx + range_rx if there else norm_tx + norm

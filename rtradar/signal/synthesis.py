@@ -30,7 +30,7 @@ _MOST_POWERS = 3
 """Of the sample number, in float32: those of more than a parabola cancel too much."""
 
 _INSTANTS = 16
-"""At so many instants of a block the speed of echoes is looked at."""
+"""At so many instants of a block, or twice as many, the speed of echoes is looked at."""
 
 
 def in_band(echoes: Echoes, radar: Radar) -> NDArray[np.bool_]:
@@ -130,6 +130,8 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
 
 def _powers_of_sample_number(frequency: NDArray[np.float64], radar: Radar, origin: float) -> NDArray[np.float64]:
     """Weights (power, node) of an amplitude's values at the nodes in its polynomial in n / samples less an origin."""
+    if len(frequency) == 1:
+        return np.ones((1, 1))
     nodes = (frequency - radar.start_frequency_hz) / radar.bandwidth_hz - origin
     return np.asarray(np.linalg.inv(np.vander(nodes, increasing=True)), dtype=np.float64)
 
@@ -139,17 +141,19 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     same = np.flatnonzero(echoes.tx == echoes.tx[0]) if len(times) else np.zeros(0, dtype=np.int64)
     if len(same) < 2:
         return
-    # Neighbours, for what is fast soon leaves the band.
-    first = np.unique(np.linspace(0, len(same) - 2, _INSTANTS).astype(np.int64))
-    before, after = same[first], same[first + 1]
+    # Neighbours, for what is fast soon leaves the band; the last two among them.
+    step = max(1, (len(same) - 1) // _INSTANTS)
+    before, after = same[-2::-step], same[:0:-step]
     # The ends of the line of receivers: those in between see no other speed.
     ends = slice(None, None, max(1, echoes.length.shape[1] - 1))
     lengths = [echoes.length[chirps, ends] for chirps in (before, after)]
-    heard = np.ones(lengths[0].shape, dtype=bool)
-    for chirps, length in zip((before, after), lengths, strict=True):
-        heard &= (echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar)
     rate = np.abs(lengths[1] - lengths[0]) / (times[after] - times[before])[:, None, None]
-    bins = float(np.where(heard, rate, 0.0).max(initial=0.0)) / 2 * radar.chirp_duration_s / radar.range_bin_m
+    bins_of_rate = radar.chirp_duration_s / (2 * radar.range_bin_m)
+    if rate.max(initial=0.0) * bins_of_rate <= MAX_BINS_IN_CHIRP:
+        return
+    for chirps, length in zip((before, after), lengths, strict=True):
+        rate[~((echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar))] = 0.0
+    bins = float(rate.max()) * bins_of_rate
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(
             f"an echo moves {bins:.2f} range bins inside one chirp, more than {MAX_BINS_IN_CHIRP}: it is taken to stand "

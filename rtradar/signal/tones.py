@@ -31,6 +31,7 @@ _GRID = 4096
 """Steps from sample to sample of which the first powers are kept in a table, 1 / 4096 turn apart."""
 
 
+@lru_cache(maxsize=2)
 def series(kind: type[np.floating]) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
     """Coefficients of sine and cosine, over the odd and the even powers of the angle, in the precision they are to be used in."""
     signed = [(-1) ** n for n in range(_TERMS)]
