@@ -55,18 +55,20 @@ def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @taken_in(fastmath=FAST)
-def _see(antenna, distance, excess, faces, planes, normals, chosen, seen, view):  # type: ignore[no-untyped-def]
+def _see(antenna, distance, excess, corners, facing, chosen, seen, view):  # type: ignore[no-untyped-def]
     """Rows of ``view`` for the chosen facets: mean path, two deviations from it, n.s, and the share that is seen."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    first_of, second_of, third_of = corners[0], corners[1], corners[2]
+    n0, n1, n2, plane = facing[0], facing[1], facing[2], facing[3]
+    means, first_less, second_less, along, shares = view[0], view[1], view[2], view[3], view[4]
     for i in range(len(chosen)):
-        f = chosen[i]
-        first, second, third = excess[faces[f, 0]], excess[faces[f, 1]], excess[faces[f, 2]]
+        first, second, third = excess[first_of[i]], excess[second_of[i]], excess[third_of[i]]
         mean = (first + second + third) / 3
-        height = normals[f, 0] * antenna[0] + normals[f, 1] * antenna[1] + normals[f, 2] * antenna[2] - planes[f]
-        view[0, i] = mean
-        view[1, i] = first - mean
-        view[2, i] = second - mean
-        view[3, i] = height / (distance + mean)
-        view[4, i] = seen[f]
+        means[i], first_less[i], second_less[i] = mean, first - mean, second - mean
+        shares[i] = seen[chosen[i]]
+    # Apart from what is picked here and there, in vector lanes.
+    for i in range(len(chosen)):
+        along[i] = (n0[i] * a + n1[i] * b + n2[i] * c - plane[i]) / (distance + means[i])
 
 
 @taken_in(fastmath=FAST)
@@ -108,15 +110,22 @@ def _integrate(  # type: ignore[no-untyped-def]
         for f in range(n_facets):
             i = faces[f, 0]
             planes[f] = normals[own, f, 0] * x[i] + normals[own, f, 1] * y[i] + normals[own, f, 2] * z[i]
-        room = np.empty(n_facets, dtype=np.int64)
+        room = np.empty(n_facets, dtype=np.uint32)
         count = _may_be_lit(antennas[task], planes, normals[own], bend[own], both, math.sqrt(size), seen, row[task], room)
         chosen = room[:count]
+        # Side by side, and without a sign: what may be counted from an array's end keeps a loop from vector lanes.
+        corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
+        for i in range(count):
+            f = chosen[i]
+            for axis in range(3):
+                corners[axis, i], facing[axis, i] = faces[f, axis], normals[own, f, axis]
+            facing[3, i] = planes[f]
         excess, far = np.empty(n_vertices), np.empty(count_antennas)
         view = np.empty((count_antennas, 5, count))
         for antenna in range(count_antennas):
             place = antennas[task, antenna]
             far[antenna] = _excess(place, x, y, z, excess)
-            _see(place, far[antenna], excess, faces, planes, normals[own], chosen, seen[row[task, antenna]], view[antenna])
+            _see(place, far[antenna], excess, corners, facing, chosen, seen[row[task, antenna]], view[antenna])
         own_areas, own_bend = np.empty(count), np.empty(count)
         for i in range(count):
             own_areas[i], own_bend[i] = areas[own, chosen[i]], bend[own, chosen[i]]

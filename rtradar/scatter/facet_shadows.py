@@ -16,46 +16,61 @@ from numpy.typing import NDArray
 from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.facets import Facets
 from rtradar.scatter.triangle_share import positive_share
-from rtradar.trace.clearance import clearance
+from rtradar.trace.clearance import beside_ball, into_ball
 from rtradar.trace.facet_visibility import FacetTracer
 
 
 @taken_in()
-def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, around, out):  # type: ignore[no-untyped-def]
+def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, around, poses, clear, of, out):  # type: ignore[no-untyped-def]
     """Shares of the facets of one part for one antenna; whether any of it is hidden."""
-    corner, value, hiders = np.empty(3), np.empty(3), np.empty(3, dtype=np.int64)
     hidden = False
     for vertex in range(len(hider)):
         if hider[vertex] < 0:
             continue
         if not hidden:
-            out[:] = 1.0
+            for f in range(len(out)):
+                out[f] = 1.0
+            for i in range(len(of)):
+                of[i] = -1
+            for other in range(len(poses)):
+                poses[other, 3, 0] = math.nan  # not known yet
             hidden = True
-        for f in around[vertex]:
+        for column in range(around.shape[1]):
+            f = around[vertex, column]
             if f < 0:
                 break
-            corners, first, count = faces[f], -1, 0
-            for k in range(3):
-                hiders[k] = hider[corners[k]]
-                if hiders[k] >= 0:
-                    first = corners[k] if count == 0 else first
-                    count += 1
+            c0, c1, c2 = faces[f, 0], faces[f, 1], faces[f, 2]
+            h0, h1, h2 = hider[c0], hider[c1], hider[c2]
             # Once a facet: from the first of its corners that is hidden.
-            if first != vertex:
+            if vertex != (c0 if h0 >= 0 else c1 if h1 >= 0 else c2):
                 continue
-            if count == 3:
+            if h0 >= 0 and h1 >= 0 and h2 >= 0:
                 out[f] = 0.0
                 continue
-            for k in range(3):
-                for i in range(3):
-                    corner[i] = centres[part, i]
-                    for j in range(3):
-                        corner[i] += frames[part, i, j] * vertices[corners[k], j]
-                value[k] = math.inf
-                for other in hiders:
-                    if other >= 0:
-                        value[k] = min(value[k], clearance(antenna, corner, centres[other], frames[other], semi_axes[other]))
-            out[f] = positive_share(value[0], value[1], value[2])
+            v0, v1, v2 = math.inf, math.inf, math.inf
+            for n in range(3):
+                other = h0 if n == 0 else h1 if n == 1 else h2
+                if other < 0 or (n > 0 and other == h0) or (n > 1 and other == h1):
+                    continue
+                if math.isnan(poses[other, 3, 0]):
+                    own = poses[other]
+                    into_ball(part, other, antenna, centres, frames, semi_axes, own[:3], own[3], own[4])
+                # Facets that meet at a vertex ask for the same way one after the other.
+                for k in range(3):
+                    corner = c0 if k == 0 else c1 if k == 1 else c2
+                    if of[corner] != other:
+                        x, y, z = vertices[corner, 0], vertices[corner, 1], vertices[corner, 2]
+                        start_square, along, span = 0.0, 0.0, 0.0
+                        for i in range(3):
+                            start = poses[other, 4, i]
+                            way = poses[other, i, 0] * x + poses[other, i, 1] * y + poses[other, i, 2] * z
+                            way += poses[other, 3, i] - start
+                            start_square += start * start
+                            along += start * way
+                            span += way * way
+                        clear[corner], of[corner] = beside_ball(start_square, along, span), other
+                v0, v1, v2 = min(v0, clear[c0]), min(v1, clear[c1]), min(v2, clear[c2])
+            out[f] = positive_share(v0, v1, v2)
     return hidden
 
 
@@ -64,11 +79,15 @@ def _all_shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices
     """Fill the rows from the second on; the first is that of parts in full view. How many are filled."""
     out[0] = 1.0
     count = 1
+    # Of every part that may hide another: from that one's axes to those in which it is the unit ball, and the antenna in these.
+    poses = np.empty((len(centres), 5, 3))
+    # What is known of the way to each vertex, and of which part.
+    clear, of = np.empty(vertices.shape[1]), np.empty(vertices.shape[1], dtype=np.int64)
     for a in range(len(antennas)):
         for n in range(len(parts)):
-            part = parts[n]
+            part, hider, own = parts[n], hidden_by[a, n], vertices[parts[n]]
             row[a, n] = 0
-            if _shares(hidden_by[a, n], antennas[a], part, centres, frames, semi_axes, vertices[part], faces, around, out[count]):
+            if _shares(hider, antennas[a], part, centres, frames, semi_axes, own, faces, around, poses, clear, of, out[count]):
                 row[a, n] = count
                 count += 1
     return count
@@ -108,6 +127,8 @@ class FacetShadows:
     def __init__(self, tracer: FacetTracer, facets: Facets, semi_axes: NDArray[np.float64]) -> None:
         self._tracer, self._facets, self._semi_axes = tracer, facets, np.ascontiguousarray(semi_axes, dtype=np.float64)
         # A facet is lit while its middle faces away by less than its bend; its corners by no more than thrice that.
+        # Coordinate by coordinate, as the tracer takes them.
+        self._places = np.ascontiguousarray(np.swapaxes(facets.vertices, 1, 2))
         self._around = _facets_around(facets.faces, facets.vertices.shape[1])
         self._margin = 3 * float(facets.bend.max())
 
@@ -132,7 +153,7 @@ class FacetShadows:
         row = np.zeros((len(antennas), len(parts)), dtype=np.int64)
         if len(centres) == 1:
             return Shares(np.ones((1, len(self._facets.faces)), dtype=np.float32), row)
-        hidden_by = self._tracer.occluders(centres, frames, antennas, parts, self._facets.vertices, self._margin)
+        hidden_by = self._tracer.occluders(centres, frames, antennas, parts, self._places, self._margin)
         share = np.empty((1 + row.size, len(self._facets.faces)), dtype=np.float32)
         count = _all_shares(
             hidden_by,

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.compiled import compiled, taken_in
+from rtradar.trace.clearance import into_ball
 from rtradar.trace.outlines import VIEWS, may_hide, outlines
 from rtradar.trace.unit_sphere import UnitSphere
 
@@ -53,48 +54,28 @@ def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: i
     return count
 
 
-@taken_in()
-def _before(part, other, antenna, centres, frames, semi_axes, turn, shift, start):  # type: ignore[no-untyped-def]
-    """From the axes of a part to those of another in which it is the unit ball; and the antenna in these."""
-    for i in range(3):
-        shift[i], start[i] = 0.0, 0.0
-        for j in range(3):
-            shift[i] += frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
-            start[i] += frames[other, j, i] * (antenna[j] - centres[other, j]) / semi_axes[other, i]
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += frames[other, k, i] * frames[part, k, j] / semi_axes[other, i]
-
-
-@taken_in()
-def _facing(local, vertices, axes, margin, chosen, begin):  # type: ignore[no-untyped-def]
-    """Vertices that face an antenna, or not away by more than the margin; their count.
+@taken_in(fastmath={"contract"})
+def _facing(local, x, y, z, axes, margin, faces, begin):  # type: ignore[no-untyped-def]
+    """Whether a vertex ``faces`` an antenna, or not away by more than the margin.
 
     A vertex that faces away is seen through its own part: only what is met before the share ``begin`` of the way, where
     that is met, counts as hiding it.
     """
-    count = 0
     s0, s1, s2 = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
-    outside = s0 * local[0] ** 2 + s1 * local[1] ** 2 + s2 * local[2] ** 2 - 1
-    for vertex in range(len(vertices)):
-        x, y, z = vertices[vertex, 0], vertices[vertex, 1], vertices[vertex, 2]
-        n0, n1, n2 = s0 * x, s1 * y, s2 * z
-        a0, a1, a2 = local[0] - x, local[1] - y, local[2] - z
+    l0, l1, l2 = local[0], local[1], local[2]
+    outside = s0 * l0**2 + s1 * l1**2 + s2 * l2**2 - 1
+    for vertex in range(len(x)):
+        n0, n1, n2 = s0 * x[vertex], s1 * y[vertex], s2 * z[vertex]
+        a0, a1, a2 = l0 - x[vertex], l1 - y[vertex], l2 - z[vertex]
         along = n0 * a0 + n1 * a1 + n2 * a2
-        begin[count] = 1.0
-        if along < 0:
-            size = (n0 * n0 + n1 * n1 + n2 * n2) * (a0 * a0 + a1 * a1 + a2 * a2)
-            if along * along > margin * margin * size:
-                continue
-            span = s0 * a0 * a0 + s1 * a1 * a1 + s2 * a2 * a2
-            back = s0 * local[0] * a0 + s1 * local[1] * a1 + s2 * local[2] * a2
-            # Vertices stand out a little: from behind the edge some are seen past their own part.
-            chord = back * back - span * outside
-            if chord > 0:
-                begin[count] = (back - math.sqrt(chord)) / span
-        chosen[count] = vertex
-        count += 1
-    return count
+        size = (n0 * n0 + n1 * n1 + n2 * n2) * (a0 * a0 + a1 * a1 + a2 * a2)
+        span = s0 * a0 * a0 + s1 * a1 * a1 + s2 * a2 * a2
+        back = s0 * l0 * a0 + s1 * l1 * a1 + s2 * l2 * a2
+        # Vertices stand out a little: from behind the edge some are seen past their own part.
+        chord = back * back - span * outside
+        met = (back - math.sqrt(max(chord, 0.0))) / span
+        faces[vertex] = 0.0 if along < 0 and along * along > margin * margin * size else 1.0
+        begin[vertex] = met if along < 0 and chord > 0 else 1.0
 
 
 @taken_in()
@@ -115,11 +96,11 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
     Of each ray: where it starts, which way it goes and how far, in axes in which what it may meet is the unit ball (7,);
     the place in ``hidden`` that it answers for, and what hides it if the ray meets anything (2,).
     """
-    every, n_vertices = len(centres), vertices.shape[1]
+    every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start, local, way = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     low, high, near, far = np.empty((every, VIEWS)), np.empty((every, VIEWS)), np.empty(every), np.empty(every)
     chosen, hiders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
-    begin, places = np.empty(n_vertices), np.empty((3, n_vertices))
+    faces, begins, begin, places = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices), np.empty((3, n_vertices))
     rays, whose, count = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64), 0
     entry, first, nearest = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     wider = np.empty((every, 3))
@@ -141,16 +122,21 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                 local[i] = 0.0
                 for j in range(3):
                     local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
-            facing = _facing(local, vertices[part], semi_axes[part], margin, chosen, begin)
             # Hider by hider and coordinate by coordinate: these loops run in vector lanes.
-            x, y, z = places[0, :facing], places[1, :facing], places[2, :facing]
+            all_x, all_y, all_z = vertices[part, 0], vertices[part, 1], vertices[part, 2]
+            _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
+            x, y, z, facing = places[0], places[1], places[2], np.uint64(0)
+            for vertex in range(n_vertices):
+                # The next one takes its place where this one is not wanted: no branch.
+                chosen[facing], begin[facing] = vertex, begins[vertex]
+                x[facing], y[facing], z[facing] = all_x[vertex], all_y[vertex], all_z[vertex]
+                facing += np.uint64(faces[vertex])
+            x, y, z = x[:facing], y[:facing], z[:facing]
             for i in range(facing):
-                vertex = chosen[i]
-                x[i], y[i], z[i] = vertices[part, vertex, 0], vertices[part, vertex, 1], vertices[part, vertex, 2]
                 entry[i], first[i] = math.inf, -1.0
             before, slot = count, (a * len(parts) + n) * n_vertices
             for k in range(found):
-                _before(part, hiders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
+                into_ball(part, hiders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
                 if _pass(x, y, z, start, turn, shift, float(hiders[k]), entry, first, nearest) == 0:
                     continue
                 for i in range(facing):
@@ -218,7 +204,7 @@ class FacetTracer:
             World [m].
         parts : (n,) int64
             Which parts are asked about; all parts may hide them.
-        vertices : (part, vertex, 3) float64
+        vertices : (part, 3, vertex) float64
             Of every part of the body, on its ellipsoid, in its own axes [m].
         margin : float
             Vertices that face away by more than this sine are not asked about.
@@ -228,7 +214,7 @@ class FacetTracer:
         (antenna, n, vertex) int16
             Another part that hides it, nearer to the antenna than its own part on the same line; else -1.
         """
-        hidden = np.full((len(antennas), len(parts), vertices.shape[1]), -1, dtype=np.int16)
+        hidden = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
         rays, (slot, hider) = _choose(
             np.ascontiguousarray(antennas, dtype=np.float64),
             np.ascontiguousarray(parts, dtype=np.int64),

@@ -283,7 +283,7 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
         centres, frames = rng.uniform(-0.4, 0.4, (6, 3)), Rotation.random(6, random_state=rng).as_matrix()
         antennas = np.array([-4.0, 0, 0]) + rng.normal(size=(3, 3)) * 0.3
         parts = np.array([4, 1, 2])
-        hidden = tracer.occluders(centres, frames, antennas, parts, vertices, 0.0)
+        hidden = tracer.occluders(centres, frames, antennas, parts, np.swapaxes(vertices, 1, 2).copy(), 0.0)
         for a, antenna in enumerate(antennas):
             for n, part in enumerate(parts):
                 world = vertices[part] @ frames[part].T + centres[part]
