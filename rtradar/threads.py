@@ -41,25 +41,27 @@ def environment_of(threads: int) -> dict[str, str]:
 def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
     """Results in the order of the items; NumPy, the FFT and compiled loops release the interpreter lock, so threads do pay.
 
-    The caller works too: to sleep and be woken takes as long as many an item.
+    The caller works too: to sleep and be woken takes as long as many an item. Of errors that of the first item is raised.
     """
     results: list[Any] = [None] * len(items)
+    failed: dict[int, BaseException] = {}
     left = iter(enumerate(items))
 
     def take() -> None:
         # The interpreter lock is held while the next is taken.
         for place, item in left:
-            results[place] = work(item)
+            try:
+                results[place] = work(item)
+            except BaseException as error:
+                failed[place] = error
+                deque(left, maxlen=0)  # nobody begins another
 
     helpers = [_pool().submit(take) for _ in range(min(len(items), thread_count()) - 1)]
-    try:
-        take()
-    finally:
-        deque(left, maxlen=0)  # where one failed, nobody begins another
-        wait([helper for helper in helpers if not helper.cancel()])
-    for helper in helpers:
-        if not helper.cancelled():
-            helper.result()
+    take()
+    # Who has not woken by now has nothing left to do.
+    wait([helper for helper in helpers if not helper.cancel()])
+    if failed:
+        raise failed[min(failed)]
     return results
 
 

@@ -8,7 +8,7 @@ import sys
 
 import pytest
 
-from rtradar.threads import THREADS_VARIABLE, environment_of, in_threads, thread_limit
+from rtradar.threads import THREADS_VARIABLE, environment_of, in_threads, thread_count, thread_limit
 
 COUNT = """
 import numba, rtradar.threads
@@ -30,6 +30,24 @@ def test_an_error_in_a_thread_is_raised() -> None:
 
     with pytest.raises(ValueError, match="item 0"):
         in_threads(fail, range(2))
+
+
+def test_after_an_error_no_other_item_is_begun() -> None:
+    begun = []
+
+    def fail(item: int) -> None:
+        begun.append(item)
+        raise ValueError(f"item {item}")
+
+    with pytest.raises(ValueError, match=r"item 0"):
+        in_threads(fail, range(1000))
+    assert sorted(begun) == list(range(len(begun)))
+    assert len(begun) <= thread_count()
+
+
+def test_work_may_itself_be_shared_among_threads() -> None:
+    found = in_threads(lambda item: sum(in_threads(lambda other: item * other, range(8))), range(8))
+    assert found == [28 * item for item in range(8)]
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
