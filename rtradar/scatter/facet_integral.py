@@ -110,9 +110,9 @@ def _integrate(  # type: ignore[no-untyped-def]
         for f in range(n_facets):
             i = faces[f, 0]
             planes[f] = normals[own, f, 0] * x[i] + normals[own, f, 1] * y[i] + normals[own, f, 2] * z[i]
-        room = np.empty(n_facets, dtype=np.uint32)
-        count = _may_be_lit(antennas[task], planes, normals[own], bend[own], both, math.sqrt(size), seen, row[task], room)
-        chosen = room[:count]
+        lit = np.empty(n_facets, dtype=np.uint32)
+        count = _may_be_lit(antennas[task], planes, normals[own], bend[own], both, math.sqrt(size), seen, row[task], lit)
+        chosen = lit[:count]
         # Side by side, and without a sign: what may be counted from an array's end keeps a loop from vector lanes.
         corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
         for i in range(count):
@@ -129,12 +129,12 @@ def _integrate(  # type: ignore[no-untyped-def]
         own_areas, own_bend = np.empty(count), np.empty(count)
         for i in range(count):
             own_areas[i], own_bend[i] = areas[own, chosen[i]], bend[own, chosen[i]]
-        mean, u, v, strength = np.empty(count), np.empty(count), np.empty(count), np.empty(count)
+        mean, u, v, strength, room = np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count + 1)
         for pair in range(pairs.shape[0]):
             t, r = pairs[pair, 0], pairs[pair, 1]
             offset = carrier[task, pair] - far[t] - far[r]
             _light(view[t], view[r], own_areas, own_bend, both, far[t], far[r], offset, spreading, mean, u, v, strength)
-            largest = largest_spread(u, v)
+            largest = largest_spread(u, v, room)
             for node in range(k.shape[1]):
                 wave = k[task, node]
                 if largest * wave**2 <= SERIES:

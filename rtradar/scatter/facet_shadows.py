@@ -21,32 +21,31 @@ from rtradar.trace.facet_visibility import FacetTracer
 
 
 @taken_in()
-def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, around, poses, clear, of, out):  # type: ignore[no-untyped-def]
-    """Shares of the facets of one part for one antenna; whether any of it is hidden."""
-    hidden = False
+def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, corners, poses, clear, of, hidden, counts, out):  # type: ignore[no-untyped-def]
+    """Shares of the facets of one part for one antenna; whether any of it is hidden.
+
+    ``clear`` and ``of`` (vertex,) are room for what is known of the way to a vertex, and of which hider; ``hidden (vertex,)`` and
+    ``counts (facet,)``, for which vertices are hidden, and how many of a facet's.
+    """
+    any_hidden = 0
     for vertex in range(len(hider)):
-        if hider[vertex] < 0:
-            continue
-        if not hidden:
-            for f in range(len(out)):
-                out[f] = 1.0
-            for i in range(len(of)):
-                of[i] = -1
-            for other in range(len(poses)):
-                poses[other, 3, 0] = math.nan  # not known yet
-            hidden = True
-        for column in range(around.shape[1]):
-            f = around[vertex, column]
-            if f < 0:
-                break
-            c0, c1, c2 = faces[f, 0], faces[f, 1], faces[f, 2]
+        hidden[vertex] = hider[vertex] >= 0
+        any_hidden |= hidden[vertex]
+    if not any_hidden:
+        return False
+    for vertex in range(len(of)):
+        of[vertex] = -1
+    for other in range(len(poses)):
+        poses[other, 3, 0] = math.nan  # not known yet
+    first, second, third = corners[0], corners[1], corners[2]
+    for f in range(len(first)):
+        counts[f] = hidden[first[f]] + hidden[second[f]] + hidden[third[f]]
+    for f in range(len(first)):
+        out[f] = 1.0 if counts[f] == 0 else 0.0
+    for f in range(len(first)):
+        if counts[f] == 1 or counts[f] == 2:
+            c0, c1, c2 = first[f], second[f], third[f]
             h0, h1, h2 = hider[c0], hider[c1], hider[c2]
-            # Once a facet: from the first of its corners that is hidden.
-            if vertex != (c0 if h0 >= 0 else c1 if h1 >= 0 else c2):
-                continue
-            if h0 >= 0 and h1 >= 0 and h2 >= 0:
-                out[f] = 0.0
-                continue
             v0, v1, v2 = math.inf, math.inf, math.inf
             for n in range(3):
                 other = h0 if n == 0 else h1 if n == 1 else h2
@@ -71,37 +70,27 @@ def _shares(hider, antenna, part, centres, frames, semi_axes, vertices, faces, a
                         clear[corner], of[corner] = beside_ball(start_square, along, span), other
                 v0, v1, v2 = min(v0, clear[c0]), min(v1, clear[c1]), min(v2, clear[c2])
             out[f] = positive_share(v0, v1, v2)
-    return hidden
+    return True
 
 
 @compiled()
-def _all_shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices, faces, around, row, out):  # type: ignore[no-untyped-def]
+def _all_shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices, corners, row, out):  # type: ignore[no-untyped-def]
     """Fill the rows from the second on; the first is that of parts in full view. How many are filled."""
     out[0] = 1.0
     count = 1
     # Of every part that may hide another: from that one's axes to those in which it is the unit ball, and the antenna in these.
     poses = np.empty((len(centres), 5, 3))
-    # What is known of the way to each vertex, and of which part.
     clear, of = np.empty(vertices.shape[1]), np.empty(vertices.shape[1], dtype=np.int64)
+    hidden, counts = np.empty(vertices.shape[1], dtype=np.int32), np.empty(corners.shape[1], dtype=np.int32)
     for a in range(len(antennas)):
         for n in range(len(parts)):
             part, hider, own = parts[n], hidden_by[a, n], vertices[parts[n]]
             row[a, n] = 0
-            if _shares(hider, antennas[a], part, centres, frames, semi_axes, own, faces, around, poses, clear, of, out[count]):
+            given = antennas[a], part, centres, frames, semi_axes, own, corners, poses, clear, of, hidden, counts
+            if _shares(hider, *given, out[count]):
                 row[a, n] = count
                 count += 1
     return count
-
-
-def _facets_around(faces: NDArray[np.int32], n_vertices: int) -> NDArray[np.int32]:
-    """Facets that meet at each vertex (vertex, most), filled up with -1."""
-    corners = faces.ravel()
-    order = np.argsort(corners, kind="stable")
-    counts = np.bincount(corners, minlength=n_vertices)
-    column = np.arange(len(corners)) - np.repeat(np.cumsum(counts) - counts, counts)
-    around = np.full((n_vertices, int(counts.max())), -1, dtype=np.int32)
-    around[corners[order], column] = order // 3
-    return around
 
 
 class Shares(NamedTuple):
@@ -126,10 +115,11 @@ class FacetShadows:
 
     def __init__(self, tracer: FacetTracer, facets: Facets, semi_axes: NDArray[np.float64]) -> None:
         self._tracer, self._facets, self._semi_axes = tracer, facets, np.ascontiguousarray(semi_axes, dtype=np.float64)
-        # A facet is lit while its middle faces away by less than its bend; its corners by no more than thrice that.
         # Coordinate by coordinate, as the tracer takes them.
         self._places = np.ascontiguousarray(np.swapaxes(facets.vertices, 1, 2))
-        self._around = _facets_around(facets.faces, facets.vertices.shape[1])
+        # Without a sign: what may be counted from an array's end keeps a loop from vector lanes.
+        self._corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
+        # A facet is lit while its middle faces away by less than its bend; its corners by no more than thrice that.
         self._margin = 3 * float(facets.bend.max())
 
     def shares(
@@ -163,8 +153,7 @@ class FacetShadows:
             np.ascontiguousarray(frames),
             self._semi_axes,
             self._facets.vertices,
-            self._facets.faces,
-            self._around,
+            self._corners,
             row,
             share,
         )

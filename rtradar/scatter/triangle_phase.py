@@ -94,11 +94,16 @@ def sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
     return complex(real, imaginary)
 
 
-@taken_in(fastmath=FAST | {"nnan"})
-def largest_spread(u, v):  # type: ignore[no-untyped-def]
-    """The largest p, for k = 1. Apart, for only without regard to NaN does a maximum run in vector lanes."""
-    largest = 0.0
+@taken_in(fastmath=FAST)
+def largest_spread(u, v, room):  # type: ignore[no-untyped-def]
+    """The largest p, for k = 1; ``room`` is longer by one.
+
+    Numbers from 0 on are in the order of their bits, and the largest of integers is found in vector lanes.
+    """
     for i in range(len(u)):
-        p = u[i] * u[i] + u[i] * v[i] + v[i] * v[i]
-        largest = p if p > largest else largest
-    return largest
+        room[i] = max(u[i] * u[i] + u[i] * v[i] + v[i] * v[i], 0.0)
+    bits, largest = room.view(np.int64), 0
+    for i in range(len(u)):
+        largest = max(largest, bits[i])
+    bits[len(u)] = largest
+    return room[len(u)]
