@@ -1,6 +1,10 @@
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from math import gcd
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -54,6 +58,23 @@ def test_it_serves_every_factor(factor: int) -> None:
     add_doppler_power(spectra, range(1), weights, dft, power)
     expected = plain(spectra, weights)
     np.testing.assert_allclose(power, expected, rtol=0, atol=3e-6 * expected.max())
+
+
+BOUNDS = """
+import numpy as np
+from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
+for n_cycles in (2 * 37, 38 * 37, 39 * 37, 40 * 37):
+    spectra, power = np.ones((n_cycles, 1, 3), dtype=np.complex64), np.zeros((n_cycles, 3), dtype=np.float32)
+    add_doppler_power(spectra, range(1), np.ones(n_cycles, dtype=np.float32), slow_time_dft(n_cycles), power)
+"""
+
+
+@pytest.mark.slow
+def test_the_longest_tables_have_room(tmp_path: Path) -> None:
+    # What is read beyond an array is times 0 here, and most often a number: only checked code is sure to tell.
+    environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", BOUNDS], env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("n_cycles", [133, 666])
