@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,7 @@ def write_report(
         heading=str(parameters.get("motion", "Recording")),
         subtitle=", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))),
         top=top,
-        body=_FIGURE + _clouds(data) + _pictures(pictures) + _tables(summary, radar),
+        body=chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
         data=data,
         scripts=("plots.js", "figure.js", "report.js"),
     )
@@ -113,11 +114,12 @@ def _clouds(data: Mapping[str, Any]) -> str:
     return f'<div class="clouds">{"".join(parts)}</div>\n'
 
 
-def _pictures(pictures: Mapping[str, Path]) -> str:
-    if not pictures:
-        return ""
-    shown = "\n".join(picture(title, Path(path)) for title, path in pictures.items())
-    return f'<section id="maps"><h2>Maps</h2><div class="pictures">{shown}</div></section>\n'
+def _pictures(pictures: Mapping[str, Path]) -> Iterator[str]:
+    if pictures:
+        yield '<section id="maps"><h2>Maps</h2><div class="pictures">'
+        for title, path in pictures.items():
+            yield picture(title, Path(path)) + "\n"
+        yield "</div></section>\n"
 
 
 def _tables(summary: Mapping[str, Any], radar: Radar) -> str:

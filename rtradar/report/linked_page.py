@@ -80,7 +80,7 @@ def write_view(path: str | Path, linked: Linked, *, name: str = "view", colour: 
         heading=linked.heading,
         subtitle=linked.subtitle,
         top=_controls(colour),
-        body=_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),
+        body=(_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),),
         data=linked_data(linked) | {"name": name},
         scripts=("plots.js", "figure.js", "linked.js"),
     )

@@ -41,8 +41,10 @@ $body</main>
 </html>
 """)
 
-# Places of the two large pieces; no text on a page holds a zero byte.
-_DATA, _LIBRARY = "\0data\0", "\0library\0"
+# Place of a large piece; no text on a page holds a zero byte.
+_LATER = "\0"
+
+_LIBRARY = ("plotly", "package_data/plotly.min.js")
 
 
 def player(more: str = "") -> str:
@@ -61,7 +63,7 @@ def write_page(
     heading: str,
     subtitle: str,
     top: str,
-    body: str,
+    body: Iterable[str],
     data: object,
     scripts: Sequence[str],
 ) -> None:
@@ -73,8 +75,10 @@ def write_page(
         HTML file.
     kind, heading, subtitle : str
         Plain text; escaped here.
-    top, body : str
+    top : str
         HTML.
+    body : iterable of str
+        HTML in pieces, which are written one by one: a page of many pictures takes the memory of one.
     data : object
         For JSON; scripts find it in the element ``report-data``.
     scripts : sequence of str
@@ -85,10 +89,10 @@ def write_page(
     InputError
         Where the file cannot be written; one that was there is left as it was.
     """
-    from plotly.offline import get_plotlyjs  # slow to import
-
-    library = get_plotlyjs()
-    script = "(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n"
+    package, name_in_it = _LIBRARY
+    # As bytes: the text of its 5 MB takes 10 MB, for it has letters beyond Latin.
+    library = files(package).joinpath(name_in_it).read_bytes()
+    script = ("(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n").encode()
     page = _PAGE.substitute(
         policy=_policy((library, script)),
         title=escape(f"{heading} - rtradar"),
@@ -97,26 +101,27 @@ def write_page(
         subtitle=escape(subtitle),
         style=_asset("page.css"),
         top=top,
-        body=body,
-        data=_DATA,
-        library=_LIBRARY,
-        script=script,
+        body=_LATER,
+        data=_LATER,
+        library=_LATER,
+        script=_LATER,
     )
-    # The two large pieces go in one after the other: a page put together first would take the memory of several.
-    head, rest = page.split(_DATA)
-    middle, tail = rest.split(_LIBRARY)
+    before, *after = (piece.encode() for piece in page.split(_LATER))
+    large = ((piece.encode() for piece in body), (_json(data).encode(),), (library,), (script,))
     with atomic_file(path) as file:
-        for piece in (head, _json(data), middle, library, tail):
-            file.write(piece.encode())
+        file.write(before)
+        for pieces, text in zip(large, after, strict=True):
+            file.writelines(pieces)
+            file.write(text)
 
 
 def _asset(name: str) -> str:
     return files("rtradar.report").joinpath(name).read_text(encoding="utf-8")
 
 
-def _policy(scripts: Iterable[str]) -> str:
+def _policy(scripts: Iterable[bytes]) -> str:
     """Content security policy: these scripts and no other, embedded pictures, and nothing from anywhere else."""
-    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in scripts)
+    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts)
     # Plotly writes style rules of its own, and makes pictures for download as blobs.
     sources = f"script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
     return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
