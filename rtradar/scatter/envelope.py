@@ -62,15 +62,20 @@ class Envelope:
         How many parts there are.
     tolerance : float
         Second difference of a part's echo over the root of the whole body's power that halves an interval.
+    end : int
+        Anchor from which on nothing moves.
     """
 
-    def __init__(self, sample: Callable[[float, NDArray[np.int64], float | None], Sample], parts: int, tolerance: float) -> None:
-        self._sample, self._parts, self._tolerance = sample, np.arange(parts), tolerance
+    def __init__(
+        self, sample: Callable[[float, NDArray[np.int64], float | None], Sample], parts: int, tolerance: float, end: int
+    ) -> None:
+        self._sample, self._parts, self._tolerance, self._end = sample, np.arange(parts), tolerance, end
         self._anchors: FirstCome[int, Sample] = FirstCome(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def anchor(self, index: int) -> Sample:
         """All parts at one anchor."""
+        index = min(index, self._end)
         return self._anchors.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> Course:
@@ -114,12 +119,18 @@ class Envelope:
         if right - left < 2 or len(parts) == 0:
             return
         middle = (left + right) // 2
-        found = self._sample(index + middle / PIECES, parts, whole)
+        found = self._between(index, middle, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
         bend = _bend(ratio[left][:, :, parts], found.ratio, ratio[right][:, :, parts], found.strength)
         for ends in ((left, middle), (middle, right)):
             self._divide(index, ratio, known, *ends, parts[bend > self._tolerance * whole], whole)
+
+    def _between(self, index: int, piece: int, parts: NDArray[np.int64], whole: float) -> Sample:
+        if index < self._end:
+            return self._sample(index + piece / PIECES, parts, whole)
+        still = self.anchor(index)
+        return Sample(still.ratio[:, :, parts], still.strength[:, parts])
 
 
 def _bend(

@@ -122,7 +122,8 @@ class PhysicalOptics:
         self._spread = spread_nodes(radar, _COARSE, _FINE)
         self._unevenness = unevenness
         self._step = max(1, round(anchor_s / radar.chirp_interval_s))
-        self._envelope = Envelope(self._sample, len(body.part_names), tolerance)
+        end = math.ceil(body.duration_s / (self._step * radar.chirp_interval_s))
+        self._envelope = Envelope(self._sample, len(body.part_names), tolerance, end)
 
     def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
         """Envelope at the fine nodes: computed there where it differs over the array, else spread from the coarse ones."""

@@ -181,7 +181,9 @@ def test_coarse_nodes_spread_to_fine_ones() -> None:
 # -- the envelope -----------------------------------------------------------------------------------------------------
 
 
-def envelope_of(law: Callable[[float], complex], tolerance: float = 0.05) -> tuple[Envelope, list[float]]:
+def envelope_of(
+    law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100
+) -> tuple[Envelope, list[float]]:
     """An envelope of two parts: one follows the law, the other stays at 1; and the places where it was asked."""
     asked: list[float] = []
 
@@ -190,7 +192,7 @@ def envelope_of(law: Callable[[float], complex], tolerance: float = 0.05) -> tup
         ratio = np.array([law(place), 1.0 + 0j])[parts]
         return Sample(np.tile(ratio, (3, 2, 1)), np.ones((2, len(parts))))
 
-    return Envelope(sample, 2, tolerance), asked
+    return Envelope(sample, 2, tolerance, end), asked
 
 
 def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex128]:
@@ -231,6 +233,19 @@ def test_where_it_bends_anchors_come_closer_and_the_error_falls() -> None:
     assert {4 + 3 / PIECES, 4 + 4 / PIECES} <= set(asked)
     assert errors[0] > 0.3
     assert errors[1] < 0.05
+
+
+def test_after_the_end_nothing_is_computed_again() -> None:
+    def law(t: float) -> complex:
+        return complex(np.exp(2j * min(t, 5.0)))
+
+    share = np.linspace(0, 1, 9, endpoint=False)
+    ended, asked = envelope_of(law, end=5)
+    plain, more_asked = envelope_of(law)
+    for index in range(7):
+        np.testing.assert_array_equal(between(ended, index, share), between(plain, index, share))
+    assert max(asked) == 5 < max(more_asked)
+    assert len(asked) == len(set(asked))
 
 
 @given(st.integers(0, 2**32 - 1))
