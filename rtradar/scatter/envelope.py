@@ -9,7 +9,7 @@ what it returns comes from far beside its mirror point. Between anchors runs a c
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.first_come import FirstCome
+from rtradar.trace.side_by_side import in_tracing_threads
 
 PIECES = 8
 """Parts of the interval between two anchors where it is divided the most: 1.25 ms of 10 ms."""
@@ -25,7 +26,9 @@ _KEPT_ANCHORS = 2048
 """Anchors remembered, so that the pass that measures power and the pass that makes the signal trace once (some 50 MB)."""
 
 _PASSING = 32
-"""Of later ones: a block of chirps and what lies around it."""
+"""Of later ones: those that are prepared together, and what lies around them."""
+
+_INTERVALS_KEPT = 24
 
 
 class Sample(NamedTuple):
@@ -73,6 +76,22 @@ class Envelope:
         self._anchors: FirstCome[int, Sample] = FirstCome(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
+    def prepare_anchors(self, indices: Iterable[int]) -> None:
+        """Find these anchors, some 16 at the most, with all cores: each by itself has too little to share among them."""
+        missing = [index for index in sorted({min(index, self._end) for index in indices}) if index not in self._anchors]
+        found = in_tracing_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
+        for index, sample in zip(missing, found, strict=True):
+            self._anchors.get(index, lambda sample=sample: sample)  # type: ignore[misc]
+
+    def prepare_courses(self, indices: Iterable[int]) -> None:
+        """The same for these courses, and what their slopes take."""
+        around = {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
+        missing = sorted(around - self._intervals.keys())
+        self.prepare_anchors(index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0)
+        found = in_tracing_threads(lambda n: self._divided(missing[n]), range(len(missing)))
+        for index, interval in zip(missing, found, strict=True):
+            self._keep(index, interval)
+
     def anchor(self, index: int) -> Sample:
         """All parts at one anchor."""
         index = min(index, self._end)
@@ -87,8 +106,16 @@ class Envelope:
         return Course(here.ratio, slope, here.known)
 
     def _interval(self, index: int) -> _Interval:
-        if index in self._intervals:
-            return self._intervals[index]
+        if index not in self._intervals:
+            self._keep(index, self._divided(index))
+        return self._intervals[index]
+
+    def _keep(self, index: int, interval: _Interval) -> None:
+        self._intervals[index] = interval
+        if len(self._intervals) > _INTERVALS_KEPT:
+            self._intervals.popitem(last=False)
+
+    def _divided(self, index: int) -> _Interval:
         first, last = self.anchor(index), self.anchor(index + 1)
         ratio = np.full((PIECES + 1, *first.ratio.shape), np.nan + 0j)
         ratio[0], ratio[PIECES] = first.ratio, last.ratio
@@ -100,10 +127,7 @@ class Envelope:
         whole = max(whole_echo(first), whole_echo(last))
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
         self._divide(index, ratio, known, 0, PIECES, bent, whole)
-        self._intervals[index] = _Interval(ratio, known)
-        if len(self._intervals) > 16:
-            self._intervals.popitem(last=False)
-        return self._intervals[index]
+        return _Interval(ratio, known)
 
     def _divide(
         self,

@@ -29,6 +29,9 @@ class FirstCome(Generic[_Key, _Value]):
         self._staying: dict[_Key, _Value] = {}
         self._later: OrderedDict[_Key, _Value] = OrderedDict()
 
+    def __contains__(self, key: object) -> bool:
+        return key in self._staying or key in self._later
+
     def get(self, key: _Key, find: Callable[[], _Value]) -> _Value:
         """What is known for a key, or found now."""
         if key in self._staying:

@@ -24,6 +24,9 @@ _COARSE, _FINE = (2, 1), (6, 2)
 
 _MOST_FREQUENCIES = 9
 
+_TOGETHER = 16
+"""Intervals between anchors that are worked on at once."""
+
 
 @compiled()
 def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):  # type: ignore[no-untyped-def]
@@ -174,16 +177,20 @@ class PhysicalOptics:
         parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals = chirps // self._step
-        for interval in np.unique(intervals):
-            inside = np.flatnonzero(intervals == interval)
-            share = chirps[inside] / self._step - interval
-            if (share == 0).all():
-                # Power is measured at anchors, where nothing is asked of what comes after.
-                over_array = self._fine.weights[at.tx_index[inside]] @ self._envelope.anchor(int(interval)).ratio[:, None]
+        # Power is measured at anchors, where nothing is asked of what comes after.
+        between = set(intervals[chirps % self._step != 0].tolist())
+        visited = sorted(set(intervals.tolist()))
+        for together in (visited[n : n + _TOGETHER] for n in range(0, len(visited), _TOGETHER)):
+            self._envelope.prepare_anchors(together)
+            self._envelope.prepare_courses(between.intersection(together))
+            for interval in together:
+                inside = np.flatnonzero(intervals == interval)
+                if interval in between:
+                    share, course = chirps[inside] / self._step - interval, self._envelope.course(interval)
+                    _fill(inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude)
+                    continue
+                over_array = self._fine.weights[at.tx_index[inside]] @ self._envelope.anchor(interval).ratio[:, None]
                 amplitude[:, inside] = over_array * strength[inside]
-                continue
-            course = self._envelope.course(int(interval))
-            _fill(inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude)
         return Echoes(
             length=length,
             amplitude=amplitude,

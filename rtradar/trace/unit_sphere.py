@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import rays_of
+from rtradar.trace.side_by_side import ONE_AT_A_TIME
 
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
@@ -48,5 +49,6 @@ class UnitSphere:
         padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
         padded[:, :count] = rays
         padded[3, count:] = 1  # from the middle, no way at all
-        ray = rays_of(mi, padded[:3].T, padded[3:6].T, padded[6])
-        return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())[:count]
+        with ONE_AT_A_TIME:
+            ray = rays_of(mi, padded[:3].T, padded[3:6].T, padded[6])
+            return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())[:count]

@@ -9,15 +9,18 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.scatter import build_rung
+from rtradar.threads import THREADS_VARIABLE
 from rtradar.trace.backend import Backend
 
 RADAR = rt.Radar.preset("paper-12ghz")
 
 
 @pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
-def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str) -> None:
+def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str, monkeypatch: pytest.MonkeyPatch) -> None:
     if backend.kind == "scalar":
         pytest.skip("the scalar backend has no kernels")
+    # Dr.Jit remembers the kernels of those threads alone in which that was asked for.
+    monkeypatch.setenv(THREADS_VARIABLE, "1")
     import drjit as dr
 
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0, duration_s=0.7), heading_deg=70.0))

@@ -181,9 +181,7 @@ def test_coarse_nodes_spread_to_fine_ones() -> None:
 # -- the envelope -----------------------------------------------------------------------------------------------------
 
 
-def envelope_of(
-    law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100
-) -> tuple[Envelope, list[float]]:
+def envelope_of(law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100) -> tuple[Envelope, list[float]]:
     """An envelope of two parts: one follows the law, the other stays at 1; and the places where it was asked."""
     asked: list[float] = []
 
