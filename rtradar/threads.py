@@ -59,7 +59,13 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
     helpers = [_pool().submit(take) for _ in range(min(len(items), thread_count()) - 1)]
     take()
     # Who has not woken by now has nothing left to do.
-    wait([helper for helper in helpers if not helper.cancel()])
+    awake = [helper for helper in helpers if not helper.cancel()]
+    try:
+        wait(awake)
+    except BaseException:  # an interrupt: nobody works on behind the back of who has left
+        deque(left, maxlen=0)
+        wait(awake)
+        raise
     if failed:
         raise failed[min(failed)]
     return results

@@ -5,9 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
+import time
+from collections.abc import Callable
 
 import pytest
 
+from rtradar import threads
 from rtradar.threads import THREADS_VARIABLE, environment_of, in_threads, thread_count, thread_limit
 
 COUNT = """
@@ -43,6 +47,30 @@ def test_after_an_error_no_other_item_is_begun() -> None:
         in_threads(fail, range(1000))
     assert sorted(begun) == list(range(len(begun)))
     assert len(begun) <= thread_count()
+
+
+def test_after_an_interrupt_nobody_works_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(THREADS_VARIABLE, "2")
+    threads._pool.cache_clear()
+    caller, begun, waiting = threading.get_ident(), [], threading.Event()
+
+    def work(item: int) -> None:
+        if threading.get_ident() == caller:
+            waiting.wait(60)  # until the other has an item
+            return
+        waiting.set()
+        time.sleep(0.05)
+        begun.append(item)
+
+    def interrupted(helpers: object, real: Callable[[object], object] = threads.wait) -> None:
+        monkeypatch.setattr(threads, "wait", real)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(threads, "wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        in_threads(work, range(2))
+    assert len(begun) == 1
+    threads._pool.cache_clear()
 
 
 def test_work_may_itself_be_shared_among_threads() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import threading
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,6 +19,7 @@ _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
 
 _STRETCH_FRAMES, _STRETCH_MARGIN, _STRETCHES_KEPT = 256, 32, 2
+_splines_lock = threading.Lock()  # not of each motion, which has to go to other processes
 """Frames that one spline serves, and those on either side that it is made from as well. A cubic spline forgets 73 % of what
 is farther with every frame: beyond 32 frames nothing is left in float64."""
 
@@ -173,16 +175,17 @@ class Motion:
 
     def _splines(self, stretch: int) -> tuple[PPoly, PPoly]:
         """Splines of the root and of the rotations for one stretch of frames: those of a long recording take much memory."""
-        found = self._kept_splines.get(stretch)
-        if found is None:
-            first = max(0, stretch * _STRETCH_FRAMES - _STRETCH_MARGIN)
-            frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
-            times = self.first_frame_s + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
-            found = PchipInterpolator(times, self.root_positions[frames]), CubicSpline(times, self.rotations[frames])
-            while len(self._kept_splines) >= _STRETCHES_KEPT:
-                self._kept_splines.pop(next(iter(self._kept_splines)))
-            self._kept_splines[stretch] = found
-        return found
+        with _splines_lock:
+            found = self._kept_splines.get(stretch)
+            if found is None:
+                first = max(0, stretch * _STRETCH_FRAMES - _STRETCH_MARGIN)
+                frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
+                times = self.first_frame_s + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
+                found = PchipInterpolator(times, self.root_positions[frames]), CubicSpline(times, self.rotations[frames])
+                while len(self._kept_splines) >= _STRETCHES_KEPT:
+                    self._kept_splines.pop(next(iter(self._kept_splines)))
+                self._kept_splines[stretch] = found
+            return found
 
     @cached_property
     def _kept_splines(self) -> dict[int, tuple[PPoly, PPoly]]:

@@ -41,8 +41,8 @@ $body</main>
 </html>
 """)
 
-# Place of a large piece; no text on a page holds a zero byte.
-_LATER = "\0"
+# Place of a large piece; no text on a page holds this.
+_LATER = "\0later\0"
 
 _LIBRARY = ("plotly", "package_data/plotly.min.js")
 

@@ -28,7 +28,11 @@ _KEPT_ANCHORS = 2048
 _PASSING = 32
 """Of later ones: those that are prepared together, and what lies around them."""
 
-_INTERVALS_KEPT = 24
+TOGETHER = 16
+"""Neighbouring intervals that may be prepared at once."""
+
+_INTERVALS_KEPT = TOGETHER + 8
+"""More than these and one on either side."""
 
 
 class Sample(NamedTuple):
@@ -60,7 +64,7 @@ class Envelope:
     ----------
     sample : callable
         ``sample(place, parts, whole)``: the `Sample` of these parts (n,) at a place in time, counted in anchors from the
-        start; ``whole`` is `whole_echo` near by, or None where all parts are asked for.
+        start; ``whole`` is `whole_echo` near by, or None where all parts are asked for. Several threads call it at once.
     parts : int
         How many parts there are.
     tolerance : float
@@ -77,18 +81,19 @@ class Envelope:
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def prepare_anchors(self, indices: Iterable[int]) -> None:
-        """Find these anchors, some 16 at the most, with all cores: each by itself has too little to share among them."""
+        """Find these anchors, of `TOGETHER` intervals at the most, with all cores: one by itself has too little to share."""
         missing = [index for index in sorted({min(index, self._end) for index in indices}) if index not in self._anchors]
         found = in_tracing_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
         for index, sample in zip(missing, found, strict=True):
             self._anchors.get(index, lambda sample=sample: sample)  # type: ignore[misc]
 
     def prepare_courses(self, indices: Iterable[int]) -> None:
-        """The same for these courses, and what their slopes take."""
+        """The same for the courses of these intervals."""
         around = {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
         missing = sorted(around - self._intervals.keys())
         self.prepare_anchors(index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0)
-        found = in_tracing_threads(lambda n: self._divided(missing[n]), range(len(missing)))
+        ends = [self._ends(index) for index in missing]
+        found = in_tracing_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
         for index, interval in zip(missing, found, strict=True):
             self._keep(index, interval)
 
@@ -107,7 +112,7 @@ class Envelope:
 
     def _interval(self, index: int) -> _Interval:
         if index not in self._intervals:
-            self._keep(index, self._divided(index))
+            self._keep(index, self._divided(index, *self._ends(index)))
         return self._intervals[index]
 
     def _keep(self, index: int, interval: _Interval) -> None:
@@ -115,18 +120,26 @@ class Envelope:
         if len(self._intervals) > _INTERVALS_KEPT:
             self._intervals.popitem(last=False)
 
-    def _divided(self, index: int) -> _Interval:
-        first, last = self.anchor(index), self.anchor(index + 1)
+    def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
+        """The anchor before an interval, if there is one, those at its ends, and the one after it."""
+        before = self.anchor(index - 1) if index > 0 else None
+        return before, self.anchor(index), self.anchor(index + 1), self.anchor(index + 2)
+
+    def _divided(self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample) -> _Interval:
         ratio = np.full((PIECES + 1, *first.ratio.shape), np.nan + 0j)
         ratio[0], ratio[PIECES] = first.ratio, last.ratio
         known = np.zeros((PIECES + 1, len(self._parts)), dtype=bool)
         known[[0, PIECES]] = True
-        bends = [_bend(self.anchor(index).ratio, last.ratio, self.anchor(index + 2).ratio, last.strength)]
-        if index > 0:
-            bends.append(_bend(self.anchor(index - 1).ratio, first.ratio, last.ratio, first.strength))
+        bends = [_bend(first.ratio, last.ratio, after.ratio, last.strength)]
+        if before is not None:
+            bends.append(_bend(before.ratio, first.ratio, last.ratio, first.strength))
         whole = max(whole_echo(first), whole_echo(last))
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
-        self._divide(index, ratio, known, 0, PIECES, bent, whole)
+        if index < self._end:
+            self._divide(index, ratio, known, 0, PIECES, bent, whole)
+        else:
+            # Half-way it is as at the beginning, and does not bend there.
+            ratio[PIECES // 2][:, :, bent], known[PIECES // 2, bent] = first.ratio[:, :, bent], True
         return _Interval(ratio, known)
 
     def _divide(
@@ -143,18 +156,12 @@ class Envelope:
         if right - left < 2 or len(parts) == 0:
             return
         middle = (left + right) // 2
-        found = self._between(index, middle, parts, whole)
+        found = self._sample(index + middle / PIECES, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
         bend = _bend(ratio[left][:, :, parts], found.ratio, ratio[right][:, :, parts], found.strength)
         for ends in ((left, middle), (middle, right)):
             self._divide(index, ratio, known, *ends, parts[bend > self._tolerance * whole], whole)
-
-    def _between(self, index: int, piece: int, parts: NDArray[np.int64], whole: float) -> Sample:
-        if index < self._end:
-            return self._sample(index + piece / PIECES, parts, whole)
-        still = self.anchor(index)
-        return Sample(still.ratio[:, :, parts], still.strength[:, parts])
 
 
 def _bend(

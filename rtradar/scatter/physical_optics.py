@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import groupby
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +15,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.envelope import PIECES, Envelope, Sample, hermite, stretch, whole_echo
+from rtradar.scatter.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch, whole_echo
 from rtradar.scatter.facet_body import FacetBody
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.poses import chirp_poses
@@ -23,9 +24,6 @@ _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: of parts whose echo is alike all over it, and of the others."""
 
 _MOST_FREQUENCIES = 9
-
-_TOGETHER = 16
-"""Intervals between anchors that are worked on at once."""
 
 
 @compiled()
@@ -179,8 +177,8 @@ class PhysicalOptics:
         intervals = chirps // self._step
         # Power is measured at anchors, where nothing is asked of what comes after.
         between = set(intervals[chirps % self._step != 0].tolist())
-        visited = sorted(set(intervals.tolist()))
-        for together in (visited[n : n + _TOGETHER] for n in range(0, len(visited), _TOGETHER)):
+        for _, group in groupby(sorted(set(intervals.tolist())), key=lambda interval: interval // TOGETHER):
+            together = list(group)
             self._envelope.prepare_anchors(together)
             self._envelope.prepare_courses(between.intersection(together))
             for interval in together:

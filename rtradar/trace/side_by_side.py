@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TypeVar
 
-from rtradar.threads import in_threads
+from rtradar.threads import in_threads, thread_count
 
 ONE_AT_A_TIME = threading.Lock()
-"""Held while Dr.Jit traces: its kernels are of the process."""
+"""Held by whoever traces in such work: a few rays at a time keep Dr.Jit busy for less than it takes to share it."""
 
 _Result = TypeVar("_Result")
 
@@ -21,7 +21,7 @@ def in_tracing_threads(work: Callable[[int], _Result], items: range) -> list[_Re
 
     After every few rays its threads wait for more without sleeping, on cores on which ours have other work.
     """
-    if len(items) < 2:
+    if len(items) < 2 or thread_count() < 2:
         return [work(item) for item in items]
     with _one_thread():
         return in_threads(work, items)

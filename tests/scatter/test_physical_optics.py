@@ -16,7 +16,7 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.array_nodes import array_nodes, spread_nodes
-from rtradar.scatter.envelope import PIECES, Envelope, Sample, hermite, stretch
+from rtradar.scatter.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch
 from rtradar.scatter.facet_scattering import facet_scattering
 from rtradar.scatter.physical_optics import PhysicalOptics
 from rtradar.scatter.reference import Reference
@@ -244,6 +244,23 @@ def test_after_the_end_nothing_is_computed_again() -> None:
         np.testing.assert_array_equal(between(ended, index, share), between(plain, index, share))
     assert max(asked) == 5 < max(more_asked)
     assert len(asked) == len(set(asked))
+
+
+@pytest.mark.parametrize("step", [1, 3, 5])
+def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
+    def law(t: float) -> complex:
+        return complex(np.exp(3j * np.sin(t)))  # bends in every interval
+
+    share = np.linspace(0, 1, 9, endpoint=False)
+    prepared, asked = envelope_of(law, end=20)
+    plain, _ = envelope_of(law, end=20)
+    for first in range(0, 32, TOGETHER):
+        courses = range(first, first + TOGETHER, step)
+        prepared.prepare_courses(courses)
+        for index in courses:
+            np.testing.assert_array_equal(between(prepared, index, share), between(plain, index, share))
+    assert len(asked) == len(set(asked)) > 21
+    assert any(place != round(place) for place in asked)
 
 
 @given(st.integers(0, 2**32 - 1))
