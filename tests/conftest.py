@@ -12,6 +12,7 @@ import hypothesis
 import pytest
 
 import rtradar as rt
+from rtradar import threads
 from rtradar.trace.backend import Backend, available, select, use
 
 # The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
@@ -41,6 +42,15 @@ def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
     gc.collect()
     dr.sync_thread()
     dr.flush_malloc_cache()
+
+
+@pytest.fixture
+def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Threads of `rtradar.threads`, however many cores there are."""
+    monkeypatch.setenv(threads.THREADS_VARIABLE, "4")
+    threads._pool.cache_clear()
+    yield
+    threads._pool.cache_clear()
 
 
 @pytest.fixture(scope="session")

@@ -49,9 +49,8 @@ def test_after_an_error_no_other_item_is_begun() -> None:
     assert len(begun) <= thread_count()
 
 
+@pytest.mark.usefixtures("four_threads")
 def test_after_an_interrupt_nobody_works_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(THREADS_VARIABLE, "2")
-    threads._pool.cache_clear()
     caller, begun, waiting = threading.get_ident(), [], threading.Event()
 
     def work(item: int) -> None:
@@ -70,7 +69,6 @@ def test_after_an_interrupt_nobody_works_on(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(KeyboardInterrupt):
         in_threads(work, range(2))
     assert len(begun) == 1
-    threads._pool.cache_clear()
 
 
 def test_work_may_itself_be_shared_among_threads() -> None:

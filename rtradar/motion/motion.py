@@ -19,9 +19,10 @@ _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
 
 _STRETCH_FRAMES, _STRETCH_MARGIN, _STRETCHES_KEPT = 256, 32, 2
-_splines_lock = threading.Lock()  # not of each motion, which has to go to other processes
 """Frames that one spline serves, and those on either side that it is made from as well. A cubic spline forgets 73 % of what
 is farther with every frame: beyond 32 frames nothing is left in float64."""
+
+_splines_lock = threading.Lock()  # not of each motion, which has to go to other processes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -44,8 +44,6 @@ $body</main>
 # Place of a large piece; no text on a page holds this.
 _LATER = "\0later\0"
 
-_LIBRARY = ("plotly", "package_data/plotly.min.js")
-
 
 def player(more: str = "") -> str:
     """HTML of the buttons that move a figure through time, and ``more`` beside them."""
@@ -89,9 +87,8 @@ def write_page(
     InputError
         Where the file cannot be written; one that was there is left as it was.
     """
-    package, name_in_it = _LIBRARY
-    # As bytes: the text of its 5 MB takes 10 MB, for it has letters beyond Latin.
-    library = files(package).joinpath(name_in_it).read_bytes()
+    # As bytes: the text that plotly's own function gives takes twice as many, for it has letters beyond Latin.
+    library = files("plotly").joinpath("package_data/plotly.min.js").read_bytes()
     script = ("(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n").encode()
     page = _PAGE.substitute(
         policy=_policy((library, script)),

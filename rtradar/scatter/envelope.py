@@ -85,17 +85,20 @@ class Envelope:
         missing = [index for index in sorted({min(index, self._end) for index in indices}) if index not in self._anchors]
         found = in_tracing_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
         for index, sample in zip(missing, found, strict=True):
-            self._anchors.get(index, lambda sample=sample: sample)  # type: ignore[misc]
+            self._anchors.keep(index, sample)
 
     def prepare_courses(self, indices: Iterable[int]) -> None:
         """The same for the courses of these intervals."""
-        around = {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
-        missing = sorted(around - self._intervals.keys())
+        around = sorted({index + step for index in indices for step in (-1, 0, 1) if index + step >= 0})
+        missing = [index for index in around if index not in self._intervals]
         self.prepare_anchors(index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0)
         ends = [self._ends(index) for index in missing]
         found = in_tracing_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
-        for index, interval in zip(missing, found, strict=True):
-            self._keep(index, interval)
+        self._intervals.update(zip(missing, found, strict=True))
+        for index in around:
+            self._intervals.move_to_end(index)
+        while len(self._intervals) > _INTERVALS_KEPT:
+            self._intervals.popitem(last=False)
 
     def anchor(self, index: int) -> Sample:
         """All parts at one anchor."""
@@ -104,21 +107,12 @@ class Envelope:
 
     def course(self, index: int) -> Course:
         """From one anchor to the next: a cubic from place to place, its slopes those of the parabola through three."""
-        here, after = self._interval(index), self._interval(index + 1)
-        before = self._interval(index - 1) if index > 0 else here
+        self.prepare_courses([index])
+        here, after = self._intervals[index], self._intervals[index + 1]
+        before = self._intervals[index - 1] if index > 0 else here
         slope = np.empty_like(here.ratio)
         _find_slopes(index > 0, before.ratio, before.known, here.ratio, here.known, after.ratio, after.known, slope)
         return Course(here.ratio, slope, here.known)
-
-    def _interval(self, index: int) -> _Interval:
-        if index not in self._intervals:
-            self._keep(index, self._divided(index, *self._ends(index)))
-        return self._intervals[index]
-
-    def _keep(self, index: int, interval: _Interval) -> None:
-        self._intervals[index] = interval
-        if len(self._intervals) > _INTERVALS_KEPT:
-            self._intervals.popitem(last=False)
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
         """The anchor before an interval, if there is one, those at its ends, and the one after it."""

@@ -40,10 +40,14 @@ class FirstCome(Generic[_Key, _Value]):
             self._later.move_to_end(key)
             return self._later[key]
         value = find()
+        self.keep(key, value)
+        return value
+
+    def keep(self, key: _Key, value: _Value) -> None:
+        """Remember what was found for a key that is not known."""
         if len(self._staying) < self._most:
             self._staying[key] = value
         else:
             self._later[key] = value
             if len(self._later) > self._passing:
                 self._later.popitem(last=False)
-        return value

@@ -179,7 +179,7 @@ class PhysicalOptics:
         between = set(intervals[chirps % self._step != 0].tolist())
         for _, group in groupby(sorted(set(intervals.tolist())), key=lambda interval: interval // TOGETHER):
             together = list(group)
-            self._envelope.prepare_anchors(together)
+            self._envelope.prepare_anchors(interval for interval in together if interval not in between)
             self._envelope.prepare_courses(between.intersection(together))
             for interval in together:
                 inside = np.flatnonzero(intervals == interval)

@@ -91,7 +91,7 @@ class Noise:
 
 def _stream(seed: int, cycle: int) -> NDArray[np.uint64]:
     """State (4,) of the random bits of a cycle."""
-    # From a sequence of seeds that is one already, NumPy makes it in half the time.
+    # Of plain numbers NumPy would make a sequence of seeds first, the long way.
     return np.asarray(np.random.SFC64(np.random.SeedSequence([seed, cycle])).state["state"]["state"])
 
 

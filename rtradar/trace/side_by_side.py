@@ -11,7 +11,7 @@ from typing import TypeVar
 from rtradar.threads import in_threads, thread_count
 
 ONE_AT_A_TIME = threading.Lock()
-"""Held by whoever traces in such work: a few rays at a time keep Dr.Jit busy for less than it takes to share it."""
+"""Held by whoever traces in such work, and while Dr.Jit's threads are changed."""
 
 _Result = TypeVar("_Result")
 
@@ -27,7 +27,6 @@ def in_tracing_threads(work: Callable[[int], _Result], items: range) -> list[_Re
         return in_threads(work, items)
 
 
-_lock = threading.Lock()
 _before: list[int] = []
 """Threads of Dr.Jit at each entry; who leaves last gives back what the first one found."""
 
@@ -39,11 +38,11 @@ def _one_thread() -> Iterator[None]:
         return
     import drjit as dr
 
-    with _lock:
+    with ONE_AT_A_TIME:
         _before.append(dr.thread_count())
         dr.set_thread_count(1)
     try:
         yield
     finally:
-        with _lock:
+        with ONE_AT_A_TIME:
             dr.set_thread_count(_before.pop())

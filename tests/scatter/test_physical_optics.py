@@ -263,6 +263,17 @@ def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
     assert any(place != round(place) for place in asked)
 
 
+def test_courses_may_be_asked_for_backwards() -> None:
+    def law(t: float) -> complex:
+        return complex(np.exp(0.3j * t))
+
+    share = np.linspace(0, 1, 5, endpoint=False)
+    envelope, _ = envelope_of(law, tolerance=0.1)
+    for index in [*range(40, 0, -1), 40, 20, 1]:
+        # As above: a cubic through slopes by neighbours.
+        np.testing.assert_allclose(between(envelope, index, share)[:, 0], [law(index + s) for s in share], atol=1.5e-3)
+
+
 @given(st.integers(0, 2**32 - 1))
 def test_an_envelope_has_one_value_and_one_slope_at_an_anchor(seed: int) -> None:
     phases = np.random.default_rng(seed).uniform(0, 3, 40)

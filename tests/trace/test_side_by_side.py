@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar import threads
 from rtradar.body import Body
 from rtradar.scatter import build_rung
 from rtradar.threads import THREADS_VARIABLE
@@ -44,14 +42,6 @@ def test_a_kernel_serves_all_threads(backend: Backend) -> None:
     other.start()
     other.join()
     assert [entry["cache_hit"] for entry in kernels] == [1]
-
-
-@pytest.fixture
-def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    monkeypatch.setenv(THREADS_VARIABLE, "4")
-    threads._pool.cache_clear()
-    yield
-    threads._pool.cache_clear()
 
 
 @pytest.mark.usefixtures("four_threads")
