@@ -14,6 +14,7 @@ from typing import Any
 
 from rtradar.errors import BackendError
 from rtradar.files import write_json
+from rtradar.process import gpu_for_ffts
 from rtradar.trace.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.llvm import candidates
 from rtradar.trace.verdict import judge
@@ -42,6 +43,8 @@ class DoctorReport:
         Each libLLVM in the order of trial: path, origin, version, finding, chosen.
     backends : dict
         ``good``, or what is wrong, for llvm, scalar and cuda.
+    gpu_ffts : str
+        The GPU that FFTs may be done on, or why there is none.
     chosen : str or None
         Mitsuba's variant that ``--variant auto`` takes; None where nothing works.
     advice : list of str
@@ -56,6 +59,7 @@ class DoctorReport:
     packages: dict[str, str | None]
     llvm: list[Row]
     backends: dict[Kind, str]
+    gpu_ffts: str
     chosen: str | None
     advice: list[str]
 
@@ -115,6 +119,7 @@ def examine() -> DoctorReport:
             for library, verdict in zip(libraries, verdicts, strict=True)
         ],
         backends=backends,
+        gpu_ffts=gpu_for_ffts()[1],
         chosen=chosen,
         advice=advice,
     )
@@ -143,6 +148,7 @@ def report_text(found: DoctorReport) -> str:
             f"  {'->' if VARIANTS[kind] == found.chosen else '  '} {kind:<8} {finding}"
             for kind, finding in found.backends.items()
         ),
+        f"GPU FFTs  {found.gpu_ffts}",
         *(f"To do     {line}" for line in found.advice),
         f"Verdict   ready, on {found.chosen}" if found.chosen else "Verdict   no backend works: rays cannot be traced",
     ]

@@ -17,7 +17,7 @@ from rtradar.files import not_to_be_parted
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import range_spectrum
+from rtradar.process import FftDevices, range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import Rung
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -53,6 +53,8 @@ class Capture:
         Whole cycles of the capture.
     windows : (window,) int64
         First cycle of each processing window.
+    fft_devices : FftDevices
+        Where FFTs are done.
     title : str
         For pictures and progress.
     stages : Stages
@@ -70,6 +72,7 @@ class Capture:
     noise: Noise
     n_chirps: int
     windows: NDArray[np.int64]
+    fft_devices: FftDevices
     title: str
     stages: Stages
     warmup_s: float
@@ -110,7 +113,7 @@ class Capture:
                     begin = first * len(received) // len(samples)
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
-                return range_spectrum(separate(received, radar, first), radar)
+                return range_spectrum(separate(received, radar, first), radar, device=self.fft_devices.range)
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

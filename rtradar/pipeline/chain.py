@@ -174,7 +174,15 @@ def run(
     give_back_memory()  # what compiling and the pass over the whole recording took
     with all_or_nothing(Path(out), PICTURES + ROOM_PICTURES) as folder:
         products = Products(
-            folder / "maps.h5", radar, detect=detect, seed=seed, stages=stages, title=title, removal=removal, received=received
+            folder / "maps.h5",
+            radar,
+            detect=detect,
+            seed=seed,
+            stages=stages,
+            title=title,
+            removal=removal,
+            received=received,
+            doppler_device=capture.fft_devices.doppler,
         )
         try:
             kept = if_array(folder / "if.zarr", capture) if save_if else None

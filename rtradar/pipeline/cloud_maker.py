@@ -65,6 +65,8 @@ class CloudMaker:
         Where the time goes.
     removal : ClutterRemoval
         Applied before Doppler.
+    doppler_device : str
+        Where power over Doppler is computed, as `power_map` names it.
 
     Attributes
     ----------
@@ -72,8 +74,11 @@ class CloudMaker:
         Chirps to take at once, so that memory stays low.
     """
 
-    def __init__(self, radar: Radar, *, detect: Detector, seed: int, stages: Stages, removal: ClutterRemoval) -> None:
+    def __init__(
+        self, radar: Radar, *, detect: Detector, seed: int, stages: Stages, removal: ClutterRemoval, doppler_device: str = "cpu"
+    ) -> None:
         self._radar, self._detect, self._stages, self._removal = radar, detect, stages, removal
+        self._doppler_device = doppler_device
         self._sliding = SlidingWindows(radar)
         self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
@@ -97,7 +102,7 @@ class CloudMaker:
             with stages.time("clutter removal"):
                 cube = self._removal.window(window)
             with stages.time("doppler"):
-                power = power_map(cube, radar)
+                power = power_map(cube, radar, device=self._doppler_device)
             with stages.time("cfar"):
                 mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])

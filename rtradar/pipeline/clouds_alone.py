@@ -36,7 +36,8 @@ def clouds_of(
     Returns
     -------
     clouds : Clouds
-        The same as those of `run` with these parameters.
+        The same as those of `run` with these parameters where there is no GPU: one is not used, so that they are the same to the
+        byte on every machine's CPU.
     warmup_s : float
         Seconds that went into what a process does once, such as compiling.
 
@@ -59,7 +60,7 @@ def clouds_of(
         snr_db=snr_db,
         pfa=pfa,
         seed=seed,
-        variant="auto",
+        variant="cpu",  # workers share the cores, and a sample is the same to the byte whatever else its machine has
         spreading=True,
         noise_power_m2=None,
         dials=None,

@@ -18,6 +18,7 @@ from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.survey import survey
 from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
+from rtradar.process import FftDevices, fastest_fft_devices
 from rtradar.radar import Radar
 from rtradar.scatter import Rung, build_rung
 from rtradar.scatter.antenna_gain import is_shaped
@@ -96,6 +97,8 @@ def prepare(
         # Not every rung has mirror points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
     warm_up_processing(echoes, radar)
+    # By name, a backend stands for where all is computed.
+    fft_devices = fastest_fft_devices(radar) if variant in ("auto", "cuda") else FftDevices()
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
@@ -135,6 +138,7 @@ def prepare(
         noise=noise,
         n_chirps=n_chirps,
         windows=windows,
+        fft_devices=fft_devices,
         title=f"{motion.name}, {radar.name}, {fidelity}" + (f", {scene.name}" if walled else ""),
         stages=stages,
         warmup_s=warmup_s,

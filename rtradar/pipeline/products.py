@@ -44,6 +44,8 @@ class Products:
         Applied before Doppler, and to all that is made of the spectra but for the mean, which knows windows only.
     received : ReceivedWindow, optional
         A window whose map is kept as it was before the removal.
+    doppler_device : str
+        Where power over Doppler is computed, as `power_map` names it.
 
     Attributes
     ----------
@@ -62,9 +64,11 @@ class Products:
         title: str,
         removal: ClutterRemoval,
         received: ReceivedWindow | None = None,
+        doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
-        self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal)
+        self._doppler_device = doppler_device
+        self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal, doppler_device=doppler_device)
         self._spectrogram = SlidingSpectrogram(radar)
         self.piece = self._clouds.piece
         axes = {
@@ -106,7 +110,7 @@ class Products:
     def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
         radar = self._radar
         with self._stages.time("received"):
-            power = power_map(cube, radar)
+            power = power_map(cube, radar, device=self._doppler_device)
             mask = self._detect(power)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:

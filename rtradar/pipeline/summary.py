@@ -42,6 +42,7 @@ def summary_of(
         "versions": {"python": platform.python_version(), **_versions()},
         "fidelity": parameters["fidelity"],
         "variant": capture.rung.variant,
+        "fft_devices": capture.fft_devices._asdict(),
         **spent,
         "windows": len(capture.windows),
         "chirps": capture.n_chirps,

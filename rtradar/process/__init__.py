@@ -8,6 +8,7 @@ from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
+from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, gpu_for_ffts
 from rtradar.process.power_maps import power_map, range_time
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
@@ -23,6 +24,7 @@ __all__ = [
     "ClutterMap",
     "ClutterRemoval",
     "Detector",
+    "FftDevices",
     "RangeDoppler",
     "SlidingSpectrogram",
     "SlidingWindows",
@@ -36,6 +38,8 @@ __all__ = [
     "cell_spectra",
     "clutter_map_scale",
     "clutter_removal",
+    "fastest_fft_devices",
+    "gpu_for_ffts",
     "measures_angle",
     "os_cfar",
     "os_scale",

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.compiled import compiled
 from rtradar.errors import InputError
+from rtradar.process import torch_transforms
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
@@ -68,7 +69,12 @@ def range_time(
 
 
 def power_map(
-    spectra: NDArray[np.complexfloating], radar: Radar, *, channel: int | None = None, doppler_window: ArrayLike | None = None
+    spectra: NDArray[np.complexfloating],
+    radar: Radar,
+    *,
+    channel: int | None = None,
+    doppler_window: ArrayLike | None = None,
+    device: str = "cpu",
 ) -> NDArray[np.floating]:
     """Range-Doppler power of one window: the squared magnitudes of all channels summed, or of one channel.
 
@@ -82,6 +88,8 @@ def power_map(
         Only this channel, tx * n_rx + rx; all of them when left out.
     doppler_window : (cycle,) float, optional
         Instead of the periodic Hann window.
+    device : str
+        ``cpu`` for transforms of our own and SciPy's; any other is torch's, named as torch names it, and of float32.
 
     Returns
     -------
@@ -104,35 +112,49 @@ def power_map(
     if channel is not None and not 0 <= channel < radar.n_channels:
         raise InputError(f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
     n_cycles, _, _, n_range = cube.shape
-    kind = complex_kind(cube)
-    real = np.float32 if kind == np.complex64 else np.float64
-    scale: NDArray[Any] = weights(doppler_window, n_cycles, "doppler_window").astype(real)
-    dft = slow_time_dft(n_cycles) if kind == np.complex64 else None
+    scale = weights(doppler_window, n_cycles, "doppler_window")
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
+    divided = channel is None and radar.multiplexing == "ddm"
+    # Under DDM the rows of all Tx are the same sum; those of the first are not turned.
+    chosen = range(radar.n_rx if divided else radar.n_channels) if channel is None else range(channel, channel + 1)
+    power: NDArray[np.floating]
+    if device == "cpu":
+        power = _doppler_power(channels, chosen, scale, radar.n_rx)
+    else:
+        power = torch_transforms.doppler_power(channels[:, chosen.start : chosen.stop], scale.astype(np.float32), device)
+    if divided:
+        power = without_copies(power, radar, radar.n_rx)
+    return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
-    def power_of(chosen: range) -> NDArray[np.floating]:
+
+def _doppler_power(
+    channels: NDArray[np.complexfloating], chosen: range, window: NDArray[np.float64], together: int
+) -> NDArray[np.floating]:
+    """Power (doppler, range) of chosen ``channels (cycle, channel, range)``, ``together`` of them in turn in one thread."""
+    n_cycles, _, n_range = channels.shape
+    kind = complex_kind(channels)
+    real = np.float32 if kind == np.complex64 else np.float64
+    scale: NDArray[Any] = window.astype(real)
+    dft = slow_time_dft(n_cycles) if kind == np.complex64 else None
+
+    def power_of(first: int) -> NDArray[np.floating]:
+        own = range(first, min(first + together, chosen.stop))
         total = np.zeros((n_cycles, n_range), dtype=real)
         if dft is not None:
-            add_doppler_power(channels, chosen, scale, dft, total)
+            add_doppler_power(channels, own, scale, dft, total)
             return total
-        for own in chosen:
+        for channel in own:
             # One channel at a time fits the cache of a core.
             weighted = np.empty((n_cycles, n_range), dtype=kind)
-            _weigh(channels[:, own], scale, weighted)
+            _weigh(channels[:, channel], scale, weighted)
             _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
         return total
 
-    if channel is not None:
-        power = power_of(range(channel, channel + 1))
-    elif radar.multiplexing == "ddm":
-        # The rows of all Tx are the same sum; those of the first are not turned.
-        power = without_copies(power_of(range(radar.n_rx)), radar, radar.n_rx)
-    else:
-        # The order of the sum is fixed, so the map does not depend on the number of threads.
-        power = np.zeros((n_cycles, n_range), dtype=real)
-        for part in in_threads(lambda tx: power_of(range(tx * radar.n_rx, (tx + 1) * radar.n_rx)), range(radar.n_tx)):
-            power += part
-    return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
+    # The order of the sum is fixed, so the map does not depend on the number of threads.
+    first, *others = in_threads(power_of, chosen[::together])
+    for power in others:
+        first += power
+    return first
 
 
 @compiled(fastmath={"contract"})

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.compiled import compiled
 from rtradar.errors import InputError
+from rtradar.process import torch_transforms
 from rtradar.process.tapers import weights
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
@@ -96,7 +97,7 @@ def range_doppler(
     return RangeDoppler(np.ascontiguousarray(values), radar.range_m, radar.velocity_mps(n_cycles))
 
 
-def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = None) -> NDArray[np.complex64]:
+def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = None, device: str = "cpu") -> NDArray[np.complex64]:
     """Range spectrum of each chirp, the part of the work that overlapping windows share.
 
     Parameters
@@ -107,6 +108,8 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
         Gives the shape.
     window : (sample,) float, optional
         Instead of the periodic Hann window.
+    device : str
+        ``cpu`` for SciPy's FFTs; any other is torch's, and named as torch names it.
 
     Returns
     -------
@@ -120,6 +123,8 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
     """
     samples = _checked_if(x, radar)
     scale = weights(window, samples.shape[2], "window").astype(np.float32)
+    if device != "cpu":
+        return torch_transforms.range_spectra(samples, scale, device)
     spectra = np.empty(samples.shape, dtype=np.complex64)
 
     def transform(first: int) -> None:

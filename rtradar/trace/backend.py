@@ -10,11 +10,13 @@ import os
 import sys
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib.util import find_spec
 from types import ModuleType
 from typing import Literal
 
 from rtradar.errors import BackendError, InputError
+from rtradar.gpu import has_nvidia_gpu
 from rtradar.threads import thread_limit
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
 from rtradar.trace.verdict import Verdict, judge
@@ -62,8 +64,9 @@ def select(variant: str = "auto") -> Backend:
 
     Parameters
     ----------
-    variant : {"auto", "llvm", "scalar", "cuda"}
-        ``auto`` takes llvm with the first libLLVM that works, and else scalar.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        ``cpu`` takes llvm with the first libLLVM that works, and else scalar; ``auto`` cuda, where there is a GPU that was just
+        found to be faster, and else the same.
 
     Raises
     ------
@@ -75,9 +78,9 @@ def select(variant: str = "auto") -> Backend:
     Warns
     -----
     BackendWarning
-        Where ``auto`` has to take scalar.
+        Where ``auto`` or ``cpu`` has to take scalar.
     """
-    if variant != "auto" and variant not in VARIANTS:
+    if variant not in ("auto", "cpu", *VARIANTS):
         raise InputError(f"variant '{variant}' is unknown; allowed: auto, {', '.join(VARIANTS)}")
     for package in ("mitsuba", "drjit"):
         if find_spec(package) is None:
@@ -94,6 +97,8 @@ def select(variant: str = "auto") -> Backend:
         return Backend("cuda", VARIANTS["cuda"], path, version)
     if variant == "scalar":
         return Backend("scalar", VARIANTS["scalar"], path, version)
+    if variant == "auto" and has_nvidia_gpu() and _gpu_is_faster(library):
+        return Backend("cuda", VARIANTS["cuda"], path, version)
     if library is not None:
         return Backend("llvm", VARIANTS["llvm"], path, version)
     if variant == "llvm":
@@ -174,6 +179,16 @@ def _first_good() -> tuple[Library | None, Verdict | None, str]:
         named = f", named by {ENVIRONMENT_VARIABLE}" if library.origin == "environment" else ""
         refused.append(f"{library.path}{named}, {verdict.finding}")
     return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {cure()}"
+
+
+@lru_cache(maxsize=1)
+def _gpu_is_faster(library: Library | None) -> bool:
+    """Whether the GPU works, and tells of rays sooner than what would trace them instead; asked once in a process."""
+    on_gpu = judge(VARIANTS["cuda"], library, timed=True)
+    if on_gpu.query_s is None:
+        return False
+    on_cpu = judge(VARIANTS["llvm" if library else "scalar"], library, timed=True)
+    return on_cpu.query_s is None or on_gpu.query_s < on_cpu.query_s
 
 
 def _loaded_before(loaded: str | None) -> str:

@@ -10,7 +10,7 @@ import platform
 import signal
 import subprocess
 import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -35,10 +35,13 @@ class Verdict:
         ``good``, or in a few words what went wrong.
     version : str or None
         Of the libLLVM in use; None where there is none or it does not tell.
+    query_s : float or None
+        How long it takes to ask about some rays [s], the same for all variants; None where that was not asked.
     """
 
     finding: str
     version: str | None = None
+    query_s: float | None = None
 
     @property
     def good(self) -> bool:
@@ -46,7 +49,7 @@ class Verdict:
         return self.finding == "good"
 
 
-def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: bool = False) -> Verdict:
     """Whether ``variant`` works, with that libLLVM loaded.
 
     The answer of an earlier process is taken from the disk where neither the library nor Dr.Jit nor Mitsuba has changed
@@ -60,21 +63,23 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
         The libLLVM for Dr.Jit; None leaves the choice to Dr.Jit.
     fresh : bool
         Probe even where the answer is on the disk.
+    timed : bool
+        See how fast it is, which is not kept either: it depends on what else the machine does.
     """
-    key = None if variant.startswith("cuda") else _key(variant, library)
+    key = None if timed or variant.startswith("cuda") else _key(variant, library)
     kept = {} if key is None else _read_cache()
     if key in kept and not fresh:
         return Verdict(**kept[key])
     try:
-        verdict, ended = _probe(variant, library)
+        verdict, ended = _probe(variant, library, timed)
     except subprocess.TimeoutExpired:
         return Verdict(f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None)
     if key is not None and ended not in _STOPPED:
-        _write_cache({**_read_cache(), key: asdict(verdict)})
+        _write_cache({**_read_cache(), key: {"finding": verdict.finding, "version": verdict.version}})
     return verdict
 
 
-def _probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
+def _probe(variant: str, library: Library | None, timed: bool) -> tuple[Verdict, int]:
     """What it found, and the status with which it ended."""
     with temporary_folder() as kernels:
         # An empty kernel cache: the verdict must come from compiling, not from what another libLLVM compiled.
@@ -82,7 +87,7 @@ def _probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
         if library is not None:
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
-        command = [sys.executable, "-P", str(Path(__file__).with_name("probe.py")), variant]
+        command = [sys.executable, "-P", str(Path(__file__).with_name("probe.py")), variant, *(["--timed"] if timed else [])]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S)
     said: dict[str, Any] = {}
     for line in done.stdout.splitlines():
@@ -91,7 +96,7 @@ def _probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
     told = said.get("llvm_version", [-1])
     version = ".".join(map(str, told)) if told[0] > 0 else (library.version if library else None)
     if done.returncode == 0 and said.get("works"):
-        return Verdict("good", version), 0
+        return Verdict("good", version, said.get("query_s")), 0
     return Verdict(_what_went_wrong(done, said), version), done.returncode
 
 

@@ -6,7 +6,8 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -31,21 +32,32 @@ Machine = Callable[..., None]
 
 
 @pytest.fixture
-def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
+def machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine]:
     """Let the machine have these libraries, and a GPU or none; nothing is probed, and Dr.Jit is as if never imported."""
 
-    def set_up(*libraries: Library, gpu: bool = False, loaded: str | None = None) -> None:
-        def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+    def set_up(
+        *libraries: Library, gpu: bool = False, loaded: str | None = None, query_s: dict[str, float] | None = None
+    ) -> None:
+        taken_s = query_s or {}
+
+        def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: bool = False) -> Verdict:
+            time_s = taken_s.get(variant) if timed else None
             if variant == "cuda_ad_rgb":
-                return Verdict("good" if gpu else "no CUDA driver or no GPU")
+                return Verdict("good", None, time_s) if gpu else Verdict("no CUDA driver or no GPU")
+            if variant == "scalar_rgb":
+                return Verdict("good", None, time_s)
             assert library is not None
-            return FINDINGS[library.path]
+            return replace(FINDINGS[library.path], query_s=time_s)
+
+        backends._gpu_is_faster.cache_clear()
+        monkeypatch.setattr(backends, "has_nvidia_gpu", lambda: gpu)
 
         monkeypatch.setattr(backends, "candidates", lambda: list(libraries))
         monkeypatch.setattr(backends, "judge", judge)
         monkeypatch.setattr(backends, "loaded_llvm_version", lambda: loaded)
 
-    return set_up
+    yield set_up
+    backends._gpu_is_faster.cache_clear()
 
 
 def test_auto_passes_over_a_bad_library_to_the_next_good_one(machine: Machine) -> None:
@@ -89,7 +101,38 @@ def test_cuda_only_where_its_probe_succeeds(machine: Machine) -> None:
         select("cuda")
     machine(WHEEL, gpu=True)
     assert select("cuda") == Backend("cuda", "cuda_ad_rgb", WHEEL.path, "23.1.4")
-    assert select("auto").kind == "llvm"
+
+
+@pytest.mark.parametrize(
+    ("cuda_s", "cpu_s", "taken"),
+    [(1e-4, 1e-3, "cuda"), (2e-3, 1e-3, "llvm"), (1e-3, 1e-3, "llvm"), (None, 1e-3, "llvm"), (1e-4, None, "cuda")],
+)
+def test_auto_takes_a_gpu_only_where_it_was_found_to_be_faster(
+    machine: Machine, cuda_s: float | None, cpu_s: float | None, taken: str
+) -> None:
+    machine(WHEEL, gpu=True, query_s={"cuda_ad_rgb": cuda_s, "llvm_ad_rgb": cpu_s})
+    assert select("auto").kind == taken
+    assert select("auto").llvm_path == WHEEL.path
+    assert select("cpu").kind == "llvm"
+
+
+def test_without_a_library_a_gpu_is_held_against_scalar(machine: Machine) -> None:
+    machine(gpu=True, query_s={"cuda_ad_rgb": 1e-3, "scalar_rgb": 1e-2})
+    assert select("auto") == Backend("cuda", "cuda_ad_rgb", None, None)
+    with pytest.warns(BackendWarning, match="scalar_rgb serves"):
+        assert select("cpu").kind == "scalar"
+    machine(gpu=True, query_s={"cuda_ad_rgb": 1e-1, "scalar_rgb": 1e-2})
+    with pytest.warns(BackendWarning, match="scalar_rgb serves"):
+        assert select("auto").kind == "scalar"
+
+
+def test_what_works_tells_how_fast_it_is() -> None:
+    library = backends._first_good()[0]
+    for kind in backends.available():
+        found = verdict.judge(backends.VARIANTS[kind], library, timed=True)
+        assert found.good, found
+        assert found.query_s is not None
+        assert 0 < found.query_s < 10
 
 
 def test_available_lists_what_works(machine: Machine) -> None:
@@ -170,7 +213,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> list[str]:
     probes: list[str] = []
 
-    def probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
+    def probe(variant: str, library: Library | None, timed: bool) -> tuple[Verdict, int]:
         probes.append(variant)
         return Verdict(finding), ended
 
