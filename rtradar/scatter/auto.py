@@ -18,6 +18,7 @@ from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTIC
 from rtradar.scatter.fresnel import sweep_nodes
 from rtradar.scatter.fresnel_anchors import ZoneShares
 from rtradar.scatter.mirror import mirror
+from rtradar.scatter.mirror_starts import MirrorStarts
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.physical_optics import PhysicalOptics
 from rtradar.scatter.plan import choose
@@ -61,7 +62,7 @@ class Auto:
     ----------
     radar : Radar
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend; nothing is loaded as long as nothing has to be traced.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
@@ -97,6 +98,7 @@ class Auto:
         # A decibel down is a smaller share than one up.
         self._power_share = 1 - 10 ** (-tolerance_db / 10)
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
+        self._starts = MirrorStarts(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
         self._planned: dict[int, Planned] = {}
         self.variant: str | None = None
@@ -222,13 +224,15 @@ class Auto:
         if way == ANALYTIC:
             length, values = far_field_echo(*poses, spreading=self._spreading)
         else:
-            length, values, _ = mirror(*poses, polarization=self._radar.polarization, spreading=self._spreading)
+            start = self._starts.at(chirps, parts)
+            length, values, _ = mirror(*poses, start=start, polarization=self._radar.polarization, spreading=self._spreading)
+            own = np.flatnonzero(cut[parts])
+            if way == SPECULAR and len(own):
+                values[..., own] *= self._mirror_points.at(chirps, parts[own])[0]
         values = values[None]
-        if way == SPECULAR and cut[parts].any():
-            values = values * self._mirror_points.at(chirps)[0][..., parts]
-        elif way == FRESNEL and cut[parts].any():
+        if way == FRESNEL and cut[parts].any():
             frequency = sweep_nodes(self._radar)
-            values = values * self._zones.at(chirps)[..., parts].conj()
+            values = values * self._zones.at(chirps, parts).conj()
         return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
 
     @cached_property

@@ -17,6 +17,7 @@ from rtradar.scatter.fresnel_anchors import ZoneShares
 from rtradar.scatter.fresnel_meridians import zone_rays
 from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.mirror import mirror
+from rtradar.scatter.mirror_starts import MirrorStarts
 from rtradar.scatter.poses import chirp_poses
 from rtradar.scatter.traced_hiders import TracedHiders, hiding_parts
 from rtradar.trace.backend import select, use
@@ -38,7 +39,7 @@ class Fresnel:
     ----------
     radar : Radar
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
@@ -59,14 +60,15 @@ class Fresnel:
         backend = select(variant)
         self.variant: str | None = backend.kind
         self._frequency = sweep_nodes(radar)
+        self._starts = MirrorStarts(radar, body)
         hiders = TracedHiders(radar, body, BodyTracer(use(backend), body.semi_axes), shadow_rays)
         self.shares = ZoneShares(radar, body, self._frequency, hiders)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        shares = self.shares.at(chirps)
-        length, amplitude, _ = mirror(*at[1:], polarization=self._radar.polarization, spreading=self._spreading)
+        start, shares = self._starts.at(chirps), self.shares.at(chirps)
+        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
         parts = length.shape[2]
         return Echoes(
             length=length,
@@ -110,7 +112,7 @@ def fresnel_scattering(
         [Hz].
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     shadow_rays : int
         As of `Fresnel`.

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +23,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.array_nodes import array_nodes
 from rtradar.scatter.first_come import FirstCome
+from rtradar.scatter.fresnel_interval import FresnelInterval
 from rtradar.scatter.fresnel_zone import zone_shares
 from rtradar.scatter.poses import anchor_step
 from rtradar.scatter.traced_hiders import RX_NODES, TX_NODES, middle_zones
@@ -40,24 +40,6 @@ _FINE, _FINE_FREQUENCY_HZ = 8, 14e9
 
 _BEND = 0.02
 """Second difference over 10 ms that asks for finer anchors: a cubic misses an eighth of it or less."""
-
-
-class Interval(NamedTuple):
-    """Shares over 10 ms: ``fine (part,)`` bool, ``ends (2, frequency, pair, part)`` complex.
-
-    ``between (node, frequency, pair, fine part)`` complex: of the parts that are fine alone, for the others would be many.
-    """
-
-    fine: NDArray[np.bool_]
-    ends: NDArray[np.complex128]
-    between: NDArray[np.complex128]
-
-    def nodes(self) -> NDArray[np.complex128]:
-        """All nodes (node, frequency, pair, part); of a part that is not fine the first and the last count."""
-        nodes = np.repeat(self.ends[:1], len(self.between) + 2, axis=0)
-        nodes[-1] = self.ends[1]
-        nodes[1:-1, :, :, self.fine] = self.between
-        return nodes
 
 
 class ZoneShares:
@@ -83,49 +65,59 @@ class ZoneShares:
         self._step = anchor_step(radar)
         self._fine = min(round(_FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5), self._step)
         self._anchors: FirstCome[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = FirstCome(_KEPT_ANCHORS, _PASSING)
-        self._intervals: OrderedDict[int, Interval] = OrderedDict()
+        self._intervals: OrderedDict[int, FresnelInterval] = OrderedDict()
 
-    def at(self, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
-        """Shares V at these chirps, numbered from the start of the capture: (frequency, chirp, rx, part) complex128."""
+    def at(self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None) -> NDArray[np.complex128]:
+        """Shares V at these chirps, numbered from the start of the capture.
+
+        Parameters
+        ----------
+        chirps : (chirp,) int64
+        parts : (part,) int64, optional
+            Which are wanted; all if left out.
+
+        Returns
+        -------
+        (frequency, chirp, rx, part) complex128
+        """
         chirps = np.asarray(chirps, dtype=np.int64)
-        out = np.empty((len(self._wavenumber), len(chirps), self._radar.n_rx, len(self._body.part_names)), dtype=np.complex128)
+        if parts is None:
+            parts = np.arange(len(self._body.part_names))
+        out = np.empty((len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts)), dtype=np.complex128)
         spread = self._nodes.weights[self._radar.tx_of_chirp(chirps)]
         number = chirps // self._step
         for interval in np.unique(number):
             inside = np.flatnonzero(number == interval)
             where = (chirps[inside] / self._step - interval) * self._fine
             if where.any():
-                fine, nodes, slopes = self._cubics(int(interval))
+                fine, nodes, slopes = self._cubics(int(interval), parts)
             else:
                 # At an anchor alone neighbours do not matter.
-                nodes = np.stack([self._anchor(int(interval))[1]] * 2)
+                nodes = np.stack([self._anchor(int(interval))[1][..., parts]] * 2)
                 fine, slopes = np.zeros(nodes.shape[-1], dtype=bool), np.zeros_like(nodes)
             _blend(nodes, slopes, fine, where, spread[inside], inside, out)
         return out
 
-    def shares(self, times: NDArray[np.float64], hiders: NDArray[np.bool_]) -> NDArray[np.complex128]:
-        """Shares (time, frequency, pair, part) at these times (time,) [s] behind ``hiders (part, part)``."""
+    def _shares(
+        self, times: NDArray[np.float64], pose: NDArray[np.int64], part: NDArray[np.int64], hiders: NDArray[np.bool_]
+    ) -> NDArray[np.complex128]:
+        """Shares (share, frequency, pair), each of a part at one of the times (time,) [s], behind ``hiders (part, part)``."""
         centres, frames, semi_axes = self._body.at(times)
-        out = np.ones((len(times), len(self._wavenumber), len(self._nodes.pairs), len(semi_axes)), dtype=np.complex128)
-        hidden = np.flatnonzero(hiders.any(axis=1))
-        if len(hidden):
-            tx, rx, points, k = middle_zones(self._radar, centres, frames, semi_axes)
-            pose, part = np.repeat(np.arange(len(times)), len(hidden)), np.tile(hidden, len(times))
-            shares = zone_shares(
-                tx[part],
-                rx[part],
-                points[part, pose],
-                part,
-                pose,
-                (centres, frames, semi_axes),
-                np.broadcast_to(self._nodes.antennas, (len(part), *self._nodes.antennas.shape)),
-                self._nodes.pairs,
-                hiders[part],
-                np.broadcast_to(self._wavenumber, (len(part), len(self._wavenumber))),
-                k[part],
-            )
-            out[pose, :, :, part] = shares
-        return out
+        used, place = np.unique(part, return_inverse=True)
+        tx, rx, points, k = middle_zones(self._radar, centres[:, used], frames[:, used], semi_axes[used])
+        return zone_shares(
+            tx[place],
+            rx[place],
+            points[place, pose],
+            part,
+            pose,
+            (centres, frames, semi_axes),
+            np.broadcast_to(self._nodes.antennas, (len(part), *self._nodes.antennas.shape)),
+            self._nodes.pairs,
+            hiders[part],
+            np.broadcast_to(self._wavenumber, (len(part), len(self._wavenumber))),
+            k[place],
+        )
 
     def _time(self, chirp: float) -> float:
         # Past the end of the recording the body rests in its last pose; before the capture nothing moved.
@@ -138,39 +130,53 @@ class ZoneShares:
         def find() -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
             time = self._time(number * self._step)
             hiders = self._hiders(time)
-            return hiders, self.shares(np.array([time]), hiders)[0]
+            shares = np.ones((len(self._wavenumber), len(self._nodes.pairs), len(hiders)), dtype=np.complex128)
+            hidden = np.flatnonzero(hiders.any(axis=1))
+            if len(hidden):
+                pose = np.zeros(len(hidden), dtype=np.int64)
+                shares[..., hidden] = np.moveaxis(self._shares(np.array([time]), pose, hidden, hiders), 0, -1)
+            return hiders, shares
 
         return self._anchors.get(number, find)
 
-    def _interval(self, number: int) -> Interval:
-        if number in self._intervals:
-            self._intervals.move_to_end(number)
-            return self._intervals[number]
-        anchors = [self._anchor(number + i) for i in (-1, 0, 1, 2)]
-        around = np.stack([shares for _, shares in anchors])
-        bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
-        fine = (bend > _BEND) if self._fine > 1 and number >= 0 else np.zeros(bend.shape, dtype=bool)
-        between = np.ones((self._fine - 1, *around.shape[1:-1], int(fine.sum())), dtype=np.complex128)
-        if fine.any():
-            times = np.array([self._time((number + i / self._fine) * self._step) for i in range(1, self._fine)])
-            between[:] = self.shares(times, (anchors[1][0] | anchors[2][0]) & fine[:, None])[..., fine]
-        self._intervals[number] = Interval(fine, around[1:3].copy(), between)
-        if len(self._intervals) > _PASSING:
-            self._intervals.popitem(last=False)
-        return self._intervals[number]
+    def _interval(self, number: int, nodes: slice, parts: NDArray[np.int64]) -> FresnelInterval:
+        """An interval of which these nodes in between are known, of these parts."""
+        interval = self._intervals.get(number)
+        if interval is None:
+            anchors = [self._anchor(number + i) for i in (-1, 0, 1, 2)]
+            around = np.stack([shares for _, shares in anchors])
+            bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
+            fine = (bend > _BEND) if self._fine > 1 and number >= 0 else np.zeros(bend.shape, dtype=bool)
+            interval = FresnelInterval(fine, around[1:3].copy(), anchors[1][0] | anchors[2][0], self._fine - 1)
+            self._intervals[number] = interval
+            if len(self._intervals) > _PASSING:
+                self._intervals.popitem(last=False)
+        self._intervals.move_to_end(number)
+        node, part = interval.missing(nodes, parts)
+        if len(node):
+            used, pose = np.unique(node, return_inverse=True)
+            times = np.array([self._time((number + (i + 1) / self._fine) * self._step) for i in used])
+            interval.keep(node, part, self._shares(times, pose, part, interval.hiders))
+        return interval
 
-    def _cubics(self, number: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:
+    def _cubics(
+        self, number: int, parts: NDArray[np.int64]
+    ) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:
         """Of an interval: which parts are fine, nodes and slopes (node, frequency, pair, part), a fine spacing the unit."""
-        before, here, after = (self._interval(number + i) for i in (-1, 0, 1))
-        left, nodes, right = before.nodes(), here.nodes(), after.nodes()
+        # Of its neighbours no more than the node beside it.
+        before, here, after = (
+            self._interval(number + i, inner, parts)
+            for i, inner in ((-1, slice(self._fine - 2, None)), (0, slice(None)), (1, slice(0, 1)))
+        )
+        nodes = here.nodes(parts)
         slopes = np.empty_like(nodes)
         slopes[1:-1] = (nodes[2:] - nodes[:-2]) / 2
-        for at, first, second, fine in ((0, left, nodes, (before.fine, here.fine)), (-1, nodes, right, (here.fine, after.fine))):
-            wide_left, wide_right = (np.where(one, 1, self._fine) for one in fine)
-            rise_left = (first[-1] - np.where(fine[0], first[-2], first[0])) / wide_left
-            rise_right = (np.where(fine[1], second[1], second[-1]) - second[0]) / wide_right
-            slopes[at] = (rise_left * wide_right + rise_right * wide_left) / (wide_left + wide_right)
-        return here.fine, nodes, slopes
+        for end, left, right in ((0, before, here), (-1, here, after)):
+            wide_left, wide_right = (np.where(one.fine[parts], 1, self._fine) for one in (left, right))
+            rise_left = (nodes[end] - left.beside(-1, parts)) / wide_left
+            rise_right = (right.beside(0, parts) - nodes[end]) / wide_right
+            slopes[end] = (rise_left * wide_right + rise_right * wide_left) / (wide_left + wide_right)
+        return here.fine[parts], nodes, slopes
 
 
 @compiled()

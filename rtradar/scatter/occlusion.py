@@ -130,13 +130,17 @@ class MirrorVisibility:
         self._kept.put(chirp, anchor)
         return anchor
 
-    def at(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(
+        self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Visibility and starting points at these chirps.
 
         Parameters
         ----------
         chirps : (chirp,) int64
             Numbered from the start of the capture.
+        parts : (part,) int64, optional
+            Which are wanted; all if left out.
 
         Returns
         -------
@@ -146,20 +150,23 @@ class MirrorVisibility:
             Mirror point of one pair at the anchor before, in the part's axes [m].
         """
         chirps = np.asarray(chirps, dtype=np.int64)
-        parts = len(self._body.part_names)
-        weight = np.empty((len(chirps), self._radar.n_rx, parts))
-        start = np.empty((len(chirps), parts, 3))
+        if parts is None:
+            parts = np.arange(len(self._body.part_names))
+        weight = np.empty((len(chirps), self._radar.n_rx, len(parts)))
+        start = np.empty((len(chirps), len(parts), 3))
         tx = self._radar.tx_of_chirp(chirps)
         intervals = chirps // self._step
         for interval in np.unique(intervals):
             first, last = int(interval) * self._step, int(interval + 1) * self._step
             inside = np.flatnonzero(intervals == interval)
             if (chirps[inside] == first).all():
-                weight[inside], start[inside] = self._anchor(first).visible[tx[inside]], self._anchor(first).start
+                here = self._anchor(first)
+                weight[inside], start[inside] = here.visible[..., parts][tx[inside]], here.start[parts]
                 continue
             share = (chirps[inside] - first) / self._step
             share = (share**2 * (3 - 2 * share))[:, None, None]
             before, after = self._anchor(first), self._anchor(last)
-            weight[inside] = (1 - share) * before.visible[tx[inside]] + share * after.visible[tx[inside]]
-            start[inside] = before.start
+            seen, seen_next = (anchor.visible[..., parts][tx[inside]] for anchor in (before, after))
+            weight[inside] = (1 - share) * seen + share * seen_next
+            start[inside] = before.start[parts]
         return weight, start

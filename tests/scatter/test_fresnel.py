@@ -1,6 +1,7 @@
 """The share of Fresnel zones in view: against the closed form of a straight edge, and in the rung."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scatter import fresnel_anchors
 from rtradar.scatter.fresnel import Fresnel, fresnel_scattering, sweep_nodes
 from rtradar.scatter.fresnel_meridians import RIM, zone_rays
 from rtradar.scatter.fresnel_zone import zone_shares
@@ -159,6 +161,32 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
         afresh = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
         # An anchor alone goes without its neighbours: the same but for the last digit.
         np.testing.assert_allclose(afresh.echoes(block).amplitude, whole[:, block - 70], rtol=1e-13)
+
+
+def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+    radar, body = small_radar(tx_y=2, rx_y=2), Curtain(speed=1.0)
+    chirps = np.arange(85, 115)
+    whole = Fresnel(radar, body, variant=backend.kind).shares.at(chirps)  # type: ignore[arg-type]
+    found: list[np.ndarray[Any, Any]] = []
+    share = fresnel_anchors.zone_shares
+
+    def counted(*given: Any) -> Any:
+        found.append(given[3])
+        return share(*given)
+
+    monkeypatch.setattr(fresnel_anchors, "zone_shares", counted)
+    shares = Fresnel(radar, body, variant=backend.kind).shares  # type: ignore[arg-type]
+    np.testing.assert_array_equal(shares.at(chirps, np.array([1])), whole[..., [1]])
+    anchors = len(found)
+    np.testing.assert_array_equal(shares.at(chirps, np.array([1])), whole[..., [1]])
+    assert len(found) == anchors  # nothing twice
+    np.testing.assert_array_equal(shares.at(chirps, np.array([1, 0])), whole[..., [1, 0]])
+    between = np.concatenate(found[anchors:])
+    assert (between == 0).all()
+    # The edge passes part 0 in these intervals: all their nodes, and beside them one on either side at most.
+    inner = shares._fine - 1
+    assert 0 < len(between) <= 4 * inner + 2
+    assert len(between) % inner in (0, 1, 2)
 
 
 def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:

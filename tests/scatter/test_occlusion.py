@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
 from rtradar.scatter import build_rung, occlusion
+from rtradar.scatter.mirror import mirror
+from rtradar.scatter.mirror_starts import MirrorStarts
 from rtradar.scatter.occlusion import MirrorVisibility, trace_anchor, unobstructed
-from rtradar.scatter.poses import ChirpPoses, anchor_step
+from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses
 from rtradar.trace.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -153,3 +155,29 @@ def test_anchors_are_the_same_where_only_a_few_are_remembered(backend: Backend, 
     np.testing.assert_array_equal(np.concatenate(pieces), whole)
     # The first two stayed; each of the others is traced once more.
     assert len(traced) == 12 + 10
+
+
+def test_some_parts_are_as_among_all(backend: Backend) -> None:
+    radar, body = small_radar(), Curtain(speed=0.5)
+    seen = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
+    for chirps in (np.arange(100, 160), np.array([100])):
+        weight, start = seen.at(chirps)
+        for parts in ([1], [1, 0], []):
+            some, of_some = seen.at(chirps, np.array(parts, dtype=np.int64))
+            np.testing.assert_array_equal(some, weight[..., parts])
+            np.testing.assert_array_equal(of_some, start[:, parts])
+
+
+def test_starts_are_mirror_points_of_the_anchor_before_and_lead_to_the_same_points() -> None:
+    radar, body = small_radar(), Curtain(speed=0.5)
+    chirps = np.array([100, 104, 109, 110, 133])
+    starts = MirrorStarts(radar, body)  # type: ignore[arg-type]
+    found = starts.at(chirps)
+    at = chirp_poses(radar, body, np.array([100, 100, 100, 110, 130]))  # type: ignore[arg-type]
+    points = mirror(*at[1:], points=True)[2][:, 0]
+    np.testing.assert_allclose(found, points - at.centres, atol=1e-9)  # its axes are the world's; 1e-7 of the semi-axis squared
+    np.testing.assert_array_equal(starts.at(chirps, np.array([1])), found[:, [1]])
+    here = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
+    cold, warm = mirror(*here[1:]), mirror(*here[1:], start=found)
+    np.testing.assert_allclose(warm[0], cold[0], rtol=1e-14)
+    np.testing.assert_allclose(warm[1], cold[1], rtol=1e-7)  # where the search ends
