@@ -89,7 +89,10 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
     run.add_argument("--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)")
     run.add_argument("--seed", type=whole, default=0, metavar="N", help="of synthetic motion, noise and sampling (default: 0)")
     run.add_argument(
-        "--variant", choices=("auto", "llvm", "scalar", "cuda"), default="auto", help="Mitsuba's backend (default: auto)"
+        "--variant",
+        choices=("auto", "cpu", "llvm", "scalar", "cuda"),
+        default="auto",
+        help="where to compute, and Mitsuba's backend; cpu: llvm or else scalar, auto: a GPU where it is faster (default: auto)",
     )
     run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")

@@ -107,8 +107,9 @@ def run(
         False-alarm rate asked of the detector in each cell.
     seed : int
         Of noise and of the cloud's sampling.
-    variant : {"auto", "llvm", "scalar", "cuda"}
-        Mitsuba's backend, for rungs that trace.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend, for rungs that trace; ``cpu`` is llvm, or scalar where that does not work. ``auto`` takes a GPU, for
+        rays and for FFTs, where it was just measured to be faster, ``cuda`` takes it for rays in any case.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2); off as in the paper.
     save_if : bool

@@ -75,7 +75,7 @@ class RoomIf:
     clutter : Clutter
     body : Body, optional
         None: nobody is there, and the room is exactly still.
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     """
 

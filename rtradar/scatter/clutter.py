@@ -68,7 +68,7 @@ class Clutter:
     radar : Radar
         Where it stands in the scene: `Scene.place` puts it there.
     scene : Scene
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Must be True where there is anything to reflect: a mirror without spreading has no meaning.

@@ -54,7 +54,7 @@ class ClutterShadow:
     ----------
     clutter : Clutter
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
 
     Attributes

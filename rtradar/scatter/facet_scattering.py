@@ -53,7 +53,7 @@ def facet_scattering(
         [Hz].
     polarization : {"v", "h"}
         Co-polar, v along world z.
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     facets : int, optional
         Least number per ellipsoid; None: enough for 0.1 dB, up to ka = 400. A mesh brings its own.

@@ -47,7 +47,7 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
         One of `RUNGS`.
     radar : Radar
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, for rungs that trace.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).

@@ -50,7 +50,7 @@ class Multipath:
         Where it stands in the scene, see `Scene.place`.
     body : Body
     scene : Scene
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, which says what furniture and body hide; `analytic` hides nothing and needs none.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).

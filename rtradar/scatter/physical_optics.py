@@ -70,7 +70,7 @@ class PhysicalOptics:
     ----------
     radar : Radar
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).

@@ -48,7 +48,7 @@ def rays_scattering(
         [Hz].
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     rays_per_wavelength : float
         The edge of a tube's facet is the shortest wavelength over this.

@@ -23,7 +23,7 @@ class Specular:
     ----------
     radar : Radar
     body : Body
-    variant : {"auto", "llvm", "scalar", "cuda"}
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).

@@ -81,7 +81,7 @@ def select(variant: str = "auto") -> Backend:
         Where ``auto`` or ``cpu`` has to take scalar.
     """
     if variant not in ("auto", "cpu", *VARIANTS):
-        raise InputError(f"variant '{variant}' is unknown; allowed: auto, {', '.join(VARIANTS)}")
+        raise InputError(f"variant '{variant}' is unknown; allowed: auto, cpu, {', '.join(VARIANTS)}")
     for package in ("mitsuba", "drjit"):
         if find_spec(package) is None:
             raise BackendError(f"the package {package} is not installed; install it: pip install mitsuba")

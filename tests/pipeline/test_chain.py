@@ -129,7 +129,7 @@ def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
         ({"fidelity": "perfect"}, "allowed: analytic-paper, analytic, specular"),
         ({"duration_s": 0.01}, "no whole frame"),
         ({"start_s": 5.0}, "5"),
-        ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, llvm, scalar, cuda"),
+        ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, cpu, llvm, scalar, cuda"),
     ],
 )
 def test_bad_values_are_refused_and_leave_nothing(tmp_path: Path, options: dict[str, Any], says: str) -> None:

@@ -143,7 +143,7 @@ def test_available_lists_what_works(machine: Machine) -> None:
 
 
 def test_unknown_variant() -> None:
-    with pytest.raises(InputError, match="'metal' is unknown; allowed: auto, llvm, scalar, cuda"):
+    with pytest.raises(InputError, match="'metal' is unknown; allowed: auto, cpu, llvm, scalar, cuda"):
         select("metal")
 
 
