@@ -14,7 +14,7 @@ from typing import Any
 
 from rtradar.errors import BackendError
 from rtradar.files import write_json
-from rtradar.process import gpu_for_ffts
+from rtradar.gpu import gpu_for_ffts
 from rtradar.trace.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.llvm import candidates
 from rtradar.trace.verdict import judge

@@ -17,7 +17,7 @@ LIBRARIES = [Library("/lib/libLLVM-15.so.1", "environment"), Library("/venv/libL
 
 
 def _machine(monkeypatch: pytest.MonkeyPatch, libraries: list[Library], *, scalar: str = "good") -> None:
-    def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: bool = False) -> Verdict:
+    def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
         if variant.startswith("llvm"):
             assert library is not None
             return Verdict("good", "23.1.4") if "23" in library.path else Verdict("aborts the process", "15.0.6")

@@ -114,7 +114,8 @@ class Runner:
         with temporary_folder(inside=self._folder) as out:
             written = out / "said.json"
             command = [sys.executable, "-m", "rtradar", "run", MOTION, "--duration", str(case.duration_s), "--radar", case.radar]
-            command += ["--fidelity", case.fidelity, "--out", str(out / "run"), "--json", str(written)]
+            # Its floors are of the CPU.
+            command += ["--fidelity", case.fidelity, "--variant", "cpu", "--out", str(out / "run"), "--json", str(written)]
             with _on_one_core(case.one_core):
                 began = time.perf_counter()
                 done = subprocess.run(command, env=self._environment(case.fidelity), capture_output=True, text=True, check=False)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +18,7 @@ from rtradar.files import not_to_be_parted
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import FftDevices, range_spectrum
+from rtradar.process import FftDevices, range_spectrum, with_cpu_in_reserve
 from rtradar.radar import Radar
 from rtradar.scatter import Rung
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -113,7 +114,8 @@ class Capture:
                     begin = first * len(received) // len(samples)
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
-                return range_spectrum(separate(received, radar, first), radar, device=self.fft_devices.range)
+                apart = separate(received, radar, first)
+                return with_cpu_in_reserve(partial(range_spectrum, apart, radar), self.fft_devices.range)
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from rtradar.process import (
     cell_spectra,
     measures_angle,
     power_map,
+    with_cpu_in_reserve,
 )
 from rtradar.radar import Radar
 
@@ -102,7 +104,7 @@ class CloudMaker:
             with stages.time("clutter removal"):
                 cube = self._removal.window(window)
             with stages.time("doppler"):
-                power = power_map(cube, radar, device=self._doppler_device)
+                power = with_cpu_in_reserve(partial(power_map, cube, radar), self._doppler_device)
             with stages.time("cfar"):
                 mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])

@@ -97,8 +97,9 @@ def prepare(
         # Not every rung has mirror points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
     warm_up_processing(echoes, radar)
-    # By name, a backend stands for where all is computed.
-    fft_devices = fastest_fft_devices(radar) if variant in ("auto", "cuda") else FftDevices()
+    # Who names a backend of the CPU wants the work done there.
+    on_gpu = variant in ("auto", "cuda")
+    fft_devices = fastest_fft_devices(radar, n_chirps, len(windows)) if on_gpu else FftDevices()
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)

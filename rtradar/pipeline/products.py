@@ -67,7 +67,6 @@ class Products:
         doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
-        self._doppler_device = doppler_device
         self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal, doppler_device=doppler_device)
         self._spectrogram = SlidingSpectrogram(radar)
         self.piece = self._clouds.piece
@@ -110,7 +109,7 @@ class Products:
     def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
         radar = self._radar
         with self._stages.time("received"):
-            power = power_map(cube, radar, device=self._doppler_device)
+            power = power_map(cube, radar)
             mask = self._detect(power)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:

@@ -16,7 +16,7 @@ from rtradar.pipeline.cloud_maker import Clouds
 from rtradar.pipeline.timing import Stages, peak_memory_mb
 from rtradar.scatter import Accountable
 
-_VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh")
+_VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch")
 
 
 def cost(stages: Stages, wall_s: float, warmup_s: float, capture_s: float) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
-from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, gpu_for_ffts
+from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_in_reserve
 from rtradar.process.power_maps import power_map, range_time
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
@@ -39,7 +39,6 @@ __all__ = [
     "clutter_map_scale",
     "clutter_removal",
     "fastest_fft_devices",
-    "gpu_for_ffts",
     "measures_angle",
     "os_cfar",
     "os_scale",
@@ -52,4 +51,5 @@ __all__ = [
     "register_detector",
     "spectrogram",
     "window_cycles",
+    "with_cpu_in_reserve",
 ]

@@ -94,9 +94,9 @@ def power_map(
     Returns
     -------
     (range, velocity) float32 or float64
-        Power, in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian noise a cell follows the
-        Gamma law of as many looks as there are channels in the sum. Under DDM an echo's copies are taken out, but of a single
-        channel.
+        Power, in the precision of ``spectra`` where the device is ``cpu``; velocity as in `RangeDoppler`. With complex Gaussian
+        noise a cell follows the Gamma law of as many looks as there are channels in the sum. Under DDM an echo's copies are
+        taken out, but of a single channel.
 
     Raises
     ------

@@ -226,9 +226,8 @@ class Auto:
         else:
             start = self._starts.at(chirps, parts)
             length, values, _ = mirror(*poses, start=start, polarization=self._radar.polarization, spreading=self._spreading)
-            own = np.flatnonzero(cut[parts])
-            if way == SPECULAR and len(own):
-                values[..., own] *= self._mirror_points.at(chirps, parts[own])[0]
+            if way == SPECULAR and cut[parts].any():
+                values *= self._mirror_points.at(chirps, parts)[0]
         values = values[None]
         if way == FRESNEL and cut[parts].any():
             frequency = sweep_nodes(self._radar)

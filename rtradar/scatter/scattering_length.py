@@ -67,7 +67,7 @@ def scattering_length(
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
     **dials
-        Of the rung: ``variant`` ("auto", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
+        Of the rung: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
         ``facets`` of ``physical-optics`` and ``reference``, ``rays_per_wavelength`` and ``bounces`` of ``rays``.
 
     Returns

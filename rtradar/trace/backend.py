@@ -19,7 +19,7 @@ from rtradar.errors import BackendError, InputError
 from rtradar.gpu import has_nvidia_gpu
 from rtradar.threads import thread_limit
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
-from rtradar.trace.verdict import Verdict, judge
+from rtradar.trace.verdict import Verdict, judge, query_s
 
 Kind = Literal["llvm", "scalar", "cuda"]
 
@@ -65,8 +65,8 @@ def select(variant: str = "auto") -> Backend:
     Parameters
     ----------
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        ``cpu`` takes llvm with the first libLLVM that works, and else scalar; ``auto`` cuda, where there is a GPU that was just
-        found to be faster, and else the same.
+        ``cpu`` takes llvm with the first libLLVM that works, and else scalar; ``auto`` cuda, where there is a GPU that
+        was found to be faster, and else the same.
 
     Raises
     ------
@@ -184,11 +184,12 @@ def _first_good() -> tuple[Library | None, Verdict | None, str]:
 @lru_cache(maxsize=1)
 def _gpu_is_faster(library: Library | None) -> bool:
     """Whether the GPU works, and tells of rays sooner than what would trace them instead; asked once in a process."""
-    on_gpu = judge(VARIANTS["cuda"], library, timed=True)
-    if on_gpu.query_s is None:
+    on_gpu_s = query_s(VARIANTS["cuda"], library)
+    if on_gpu_s is None:
         return False
-    on_cpu = judge(VARIANTS["llvm" if library else "scalar"], library, timed=True)
-    return on_cpu.query_s is None or on_gpu.query_s < on_cpu.query_s
+    on_cpu_s = query_s(VARIANTS["llvm" if library else "scalar"], library)
+    # What was measured may be of long ago.
+    return (on_cpu_s is None or on_gpu_s < on_cpu_s) and judge(VARIANTS["cuda"], library).good
 
 
 def _loaded_before(loaded: str | None) -> str:

@@ -5,12 +5,13 @@ line of JSON before the kernel (the version of the libLLVM that Dr.Jit took), on
 """
 
 import json
+import os
 import sys
 import time
 from typing import Any
 
-RAYS = 16_384
-"""At once, where speed is asked for: `specular` and `physical-optics` send 4096, `fresnel` some 20 000, `rays` more."""
+RAYS = 4096
+"""At once, where speed is asked for: as many as `specular` and `physical-optics` send; `fresnel` and `rays` send more."""
 
 BANDS = 64
 """About the axis of a sphere, of which the rays meet some."""
@@ -25,6 +26,8 @@ def main(variant: str, timed: bool) -> None:
 
     print(json.dumps({"llvm_version": list(dr.detail.llvm_version())}), flush=True)
     mi.set_variant(variant)
+    if "RTRADAR_THREADS" in os.environ and variant.startswith("llvm"):
+        dr.set_thread_count(int(os.environ["RTRADAR_THREADS"]))
     mesh = mi.Mesh("triangle", 3, 1)
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 0, 1, 0]

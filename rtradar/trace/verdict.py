@@ -16,10 +16,15 @@ from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.files import atomic_file, temporary_folder
+from rtradar.gpu import gpu_name
+from rtradar.threads import thread_count
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, Library
 
 TIMEOUT_S = 120.0
 """A probe takes half a second; a cold disk, or a GPU that compiles its kernels for the first time, takes longer."""
+
+QUERY_TIMEOUT_S = 30.0
+"""Where it serves to choose the faster; who takes longer to begin is not chosen."""
 
 _STOPPED = {-number for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))}
 """Somebody ended the probe, with the program that waits for it perhaps: that says nothing of the library."""
@@ -49,7 +54,7 @@ class Verdict:
         return self.finding == "good"
 
 
-def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: bool = False) -> Verdict:
+def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
     """Whether ``variant`` works, with that libLLVM loaded.
 
     The answer of an earlier process is taken from the disk where neither the library nor Dr.Jit nor Mitsuba has changed
@@ -63,15 +68,13 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: 
         The libLLVM for Dr.Jit; None leaves the choice to Dr.Jit.
     fresh : bool
         Probe even where the answer is on the disk.
-    timed : bool
-        See how fast it is, which is not kept either: it depends on what else the machine does.
     """
-    key = None if timed or variant.startswith("cuda") else _key(variant, library)
+    key = None if variant.startswith("cuda") else _key(variant, library)
     kept = {} if key is None else _read_cache()
     if key in kept and not fresh:
         return Verdict(**kept[key])
     try:
-        verdict, ended = _probe(variant, library, timed)
+        verdict, ended = _probe(variant, library)
     except subprocess.TimeoutExpired:
         return Verdict(f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None)
     if key is not None and ended not in _STOPPED:
@@ -79,7 +82,39 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: 
     return verdict
 
 
-def _probe(variant: str, library: Library | None, timed: bool) -> tuple[Verdict, int]:
+def query_s(variant: str, library: Library | None) -> float | None:
+    """How long ``variant`` takes to tell of some rays, the same for all variants.
+
+    It is measured once and kept on the disk, until a package, the library, the GPU, its driver or the number of threads changes:
+    so runs do not differ in what they compute on.
+
+    Parameters
+    ----------
+    variant : str
+        Mitsuba's name of it.
+    library : Library or None
+        The libLLVM for Dr.Jit.
+
+    Returns
+    -------
+    float or None
+        [s]; None where it does not work, or takes too long to tell.
+    """
+    known = _key(variant, library)
+    key = f"{known}; {gpu_name()}; {thread_count()} threads; seconds of a query"
+    kept = _read_cache()
+    if known is not None and key in kept:
+        return kept[key]["query_s"]
+    try:
+        verdict, ended = _probe(variant, library, timed=True)
+    except subprocess.TimeoutExpired:
+        verdict, ended = Verdict("hangs"), 0
+    if known is not None and ended not in _STOPPED:
+        _write_cache({**_read_cache(), key: {"query_s": verdict.query_s}})
+    return verdict.query_s
+
+
+def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[Verdict, int]:
     """What it found, and the status with which it ended."""
     with temporary_folder() as kernels:
         # An empty kernel cache: the verdict must come from compiling, not from what another libLLVM compiled.
@@ -88,7 +123,8 @@ def _probe(variant: str, library: Library | None, timed: bool) -> tuple[Verdict,
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
         command = [sys.executable, "-P", str(Path(__file__).with_name("probe.py")), variant, *(["--timed"] if timed else [])]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", timeout=TIMEOUT_S)
+        limit_s = QUERY_TIMEOUT_S if timed else TIMEOUT_S
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", timeout=limit_s)
     said: dict[str, Any] = {}
     for line in done.stdout.splitlines():
         if line.startswith("{"):

@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import subprocess
 import sys
+import time
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -17,7 +20,7 @@ import rtradar as rt
 from rtradar.errors import ValidityWarning
 from rtradar.motion import synthetic_motion
 from rtradar.pipeline import prepare as preparing
-from rtradar.process import FftDevices, fastest_fft_devices, fft_devices, power_map, range_spectrum
+from rtradar.process import FftDevices, fastest_fft_devices, fft_devices, power_map, range_spectrum, torch_transforms
 
 torch = pytest.importorskip("torch", reason="torch comes with the extra 'learn'")
 
@@ -38,10 +41,19 @@ def agree(found: np.ndarray, expected: np.ndarray) -> None:
 
 
 @pytest.fixture
-def as_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let torch's CPU be found as a GPU; what was measured before is forgotten."""
+def as_gpu(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Let torch's CPU be found as a GPU, and seconds be worth its while; what was measured before is forgotten."""
+    monkeypatch.setattr(fft_devices, "has_nvidia_gpu", lambda: True)
     monkeypatch.setattr(fft_devices, "gpu_for_ffts", lambda: (BY_TORCH, "torch's CPU"))
-    fft_devices._measured.cache_clear()
+    measured = fft_devices._seconds
+    measured.cache_clear()
+    yield
+    measured.cache_clear()
+
+
+def takes(monkeypatch: pytest.MonkeyPatch, seconds: dict[str, tuple[float, float]]) -> None:
+    """Let FFTs over fast time and over slow time take so long on each device."""
+    monkeypatch.setattr(fft_devices, "_seconds", lambda radar, device: fft_devices._Seconds(*seconds[device]))
 
 
 @pytest.mark.parametrize(
@@ -70,20 +82,48 @@ def test_power_maps(multiplexing: str, cycles: int, channel: int | None) -> None
 def test_a_whole_run_gives_the_same_maps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05)
     motion = synthetic_motion("walk", seed=1, duration_s=0.5)
+    by_torch: list[str] = []
+    for name in ("range_spectra", "doppler_power"):
+        transform = getattr(torch_transforms, name)
+
+        def counted(*given: Any, name: str = name, transform: Any = transform) -> Any:
+            by_torch.append(name)
+            return transform(*given)
+
+        monkeypatch.setattr(torch_transforms, name, counted)
     maps = {}
     for device in ("cpu", BY_TORCH):
-        monkeypatch.setattr(preparing, "fastest_fft_devices", lambda radar, device=device: FftDevices(device, device))
+        by_torch.clear()
+        monkeypatch.setattr(preparing, "fastest_fft_devices", lambda *_, device=device: FftDevices(device, device))
         found = rt.run(motion, radar, out=tmp_path / device, fidelity="analytic", clutter_removal="mean")
         assert found.summary["fft_devices"] == {"range": device, "doppler": device}
+        assert by_torch.count("doppler_power") == (0 if device == "cpu" else found.summary["windows"])
+        assert ("range_spectra" in by_torch) == (device != "cpu")
         with h5py.File(tmp_path / device / "maps.h5") as file:
             maps[device] = {name: file[name][()] for name in ("range_time", "range_doppler", "range_doppler_received")}
     for name, expected in maps["cpu"].items():
         agree(maps[BY_TORCH][name], expected)
 
 
+def test_a_run_goes_on_where_a_gpu_fails_meanwhile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05)
+    motion = synthetic_motion("walk", seed=1, duration_s=0.3)
+    whole = rt.run(motion, radar, out=tmp_path / "cpu", fidelity="analytic", variant="cpu")
+
+    def fails(*_: object) -> None:
+        raise torch.cuda.OutOfMemoryError("CUDA out of memory.\nMore lines.")
+
+    for name in ("range_spectra", "doppler_power"):
+        monkeypatch.setattr(torch_transforms, name, fails)
+    monkeypatch.setattr(preparing, "fastest_fft_devices", lambda *_: FftDevices(BY_TORCH, BY_TORCH))
+    with pytest.warns(ValidityWarning, match=r"fails at FFTs \(CUDA out of memory\.\); the CPU does them"):
+        found = rt.run(motion, radar, out=tmp_path / "gpu", fidelity="analytic")
+    np.testing.assert_array_equal(found.points, whole.points)
+
+
 @pytest.mark.parametrize("variant", ["llvm", "scalar", "cpu"])
 def test_a_backend_of_the_cpu_by_name_keeps_ffts_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, variant: str) -> None:
-    monkeypatch.setattr(preparing, "fastest_fft_devices", lambda radar: pytest.fail("nothing is to be measured"))
+    monkeypatch.setattr(preparing, "fastest_fft_devices", lambda *_: pytest.fail("nothing is to be measured"))
     radar = rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05)
     motion = synthetic_motion("walk", seed=1, duration_s=0.2)
     found = rt.run(motion, radar, out=tmp_path, fidelity="analytic", variant=variant)
@@ -91,86 +131,81 @@ def test_a_backend_of_the_cpu_by_name_keeps_ffts_there(tmp_path: Path, monkeypat
 
 
 @pytest.mark.usefixtures("as_gpu")
-@pytest.mark.parametrize(("gpu_s", "chosen"), [(0.5, BY_TORCH), (1.0, "cpu"), (2.0, "cpu")])
-def test_the_faster_is_chosen(monkeypatch: pytest.MonkeyPatch, gpu_s: float, chosen: str) -> None:
-    monkeypatch.setattr(fft_devices, "_best_s", lambda transform, device: 1.0 if device == "cpu" else gpu_s)
-    assert fastest_fft_devices(SMALL) == FftDevices(chosen, chosen)
+@pytest.mark.parametrize(
+    ("on_gpu", "chosen"),
+    [
+        ((0.5, 0.5), (BY_TORCH, BY_TORCH)),
+        ((0.5, 2.0), (BY_TORCH, "cpu")),
+        ((2.0, 0.5), ("cpu", BY_TORCH)),
+        ((1.0, 1.0), ("cpu", "cpu")),
+    ],
+)
+def test_the_faster_is_chosen_for_either_kind(
+    monkeypatch: pytest.MonkeyPatch, on_gpu: tuple[float, float], chosen: tuple[str, str]
+) -> None:
+    takes(monkeypatch, {"cpu": (1.0, 1.0), BY_TORCH: on_gpu})
+    assert fastest_fft_devices(SMALL, 10_000, 10) == chosen
 
 
 @pytest.mark.usefixtures("as_gpu")
-def test_both_kinds_are_measured_apart(monkeypatch: pytest.MonkeyPatch) -> None:
-    times = iter([1.0, 2.0, 2.0, 1.0])  # by torch, then ours; of range, then of Doppler
-    monkeypatch.setattr(fft_devices, "_best_s", lambda transform, device: next(times))
-    assert fastest_fft_devices(SMALL) == FftDevices(BY_TORCH, "cpu")
-    assert fastest_fft_devices(SMALL) == FftDevices(BY_TORCH, "cpu")  # measured once: no further times are asked for
+def test_what_takes_the_cpu_seconds_is_not_worth_a_gpu(monkeypatch: pytest.MonkeyPatch) -> None:
+    takes(monkeypatch, {"cpu": (0.01, 0.02), BY_TORCH: (0.001, 0.001)})
+    chirps = 512 * 400  # 4 s
+    assert fastest_fft_devices(SMALL, chirps, 301) == (BY_TORCH, BY_TORCH)
+    monkeypatch.setattr(fft_devices, "gpu_for_ffts", lambda: pytest.fail("torch takes seconds to import"))
+    assert fastest_fft_devices(SMALL, chirps, 299) == ("cpu", "cpu")
 
 
 @pytest.mark.usefixtures("as_gpu")
-def test_what_is_measured_is_the_time_of_the_transform() -> None:
-    assert set(fastest_fft_devices(SMALL)) <= {"cpu", BY_TORCH}
-    assert fft_devices._best_s(lambda device: np.zeros(1), "cpu") < fft_devices._best_s(lambda device: _slow(), "cpu")
+def test_times_are_those_of_the_transforms_and_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fft_devices, "power_map", lambda *_, device: time.sleep(0.05))
+    found = fft_devices._seconds(SMALL, "cpu")
+    assert 0 < found.range < 0.05 <= found.doppler
+    monkeypatch.setattr(fft_devices, "power_map", lambda *_, device: pytest.fail("it was measured"))
+    assert fft_devices._seconds(SMALL, "cpu") == found
 
 
-def _slow() -> np.ndarray:
-    return np.sort(np.random.default_rng(0).standard_normal(100_000))
+@pytest.mark.usefixtures("as_gpu")
+@pytest.mark.parametrize(("factor", "said"), [(1.001, r"differ by 1\.0e-03 of the peak"), (np.nan, "differ by nan of the peak")])
+@pytest.mark.parametrize("kind", ["range_spectra", "doppler_power"])
+def test_a_gpu_that_gives_something_else_is_not_used(
+    monkeypatch: pytest.MonkeyPatch, kind: str, factor: float, said: str
+) -> None:
+    transform = getattr(torch_transforms, kind)
+    monkeypatch.setattr(torch_transforms, kind, lambda *given: transform(*given) * np.float32(factor))
+    with pytest.warns(ValidityWarning, match=said):
+        assert fastest_fft_devices(SMALL, 10**12, 0) == FftDevices()
 
 
 @pytest.mark.usefixtures("as_gpu")
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("error", "said"),
     [
-        (
-            lambda x, radar, device: range_spectrum(x, radar) * (1.001 if device != "cpu" else 1),
-            r"differ by 1\.0e-03 of the peak",
-        ),
-        (lambda x, radar, device: range_spectrum(x, radar) * (np.nan if device != "cpu" else 1), "differ by nan of the peak"),
+        (torch.cuda.OutOfMemoryError("CUDA out of memory.\nMore lines."), r"fails at FFTs \(CUDA out of memory\.\); the CPU"),
+        (AssertionError(), r"fails at FFTs \(AssertionError\); the CPU"),
     ],
 )
-def test_a_gpu_that_gives_something_else_is_not_used(monkeypatch: pytest.MonkeyPatch, wrong, said: str) -> None:  # type: ignore[no-untyped-def]
-    monkeypatch.setattr(fft_devices, "range_spectrum", wrong)
+def test_a_gpu_that_fails_is_not_used(monkeypatch: pytest.MonkeyPatch, error: Exception, said: str) -> None:
+    def fails(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(torch_transforms, "doppler_power", fails)
     with pytest.warns(ValidityWarning, match=said):
-        assert fastest_fft_devices(SMALL) == FftDevices()
+        assert fastest_fft_devices(SMALL, 10**12, 0) == FftDevices()
 
 
 @pytest.mark.usefixtures("as_gpu")
-def test_a_gpu_that_fails_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fails(*_: object) -> None:
-        raise torch.cuda.OutOfMemoryError("CUDA out of memory. Tried to allocate 1 GiB.\nMore lines.")
-
-    monkeypatch.setattr(fft_devices.range_spectrum.__globals__["torch_transforms"], "range_spectra", fails)
-    with pytest.warns(ValidityWarning, match=r"fails at FFTs \(CUDA out of memory\. Tried to allocate 1 GiB\.\); the CPU"):
-        assert fastest_fft_devices(SMALL) == FftDevices()
-
-
-@pytest.mark.parametrize(("driver", "installed", "said"), [(False, True, "no NVIDIA driver"), (True, False, "no torch; install")])
-def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch, driver: bool, installed: bool, said: str) -> None:
-    monkeypatch.setattr(fft_devices, "has_nvidia_gpu", lambda: driver)
-    monkeypatch.setattr(fft_devices, "find_spec", lambda name: object() if installed else None)
-    device, words = fft_devices.gpu_for_ffts()
-    assert device is None
-    assert said in words
-
-
-def test_a_torch_without_cuda_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fft_devices, "has_nvidia_gpu", lambda: True)
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
-    assert fft_devices.gpu_for_ffts() == (
-        None,
-        f"a GPU, which torch {torch.__version__} cannot use; install a CUDA build of torch",
+def test_divided_doppler_is_compared_before_its_copies_are_taken_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    radar = rt.Radar(
+        tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=32, frame_duration_s=20e-3, multiplexing="ddm", channels="all"
     )
-    assert fastest_fft_devices(SMALL) == FftDevices()
-
-
-def test_a_gpu_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fft_devices, "has_nvidia_gpu", lambda: True)
-    monkeypatch.setattr(torch.cuda, "is_available", lambda: True)
-    monkeypatch.setattr(torch.cuda, "get_device_name", lambda: "Some GPU")
-    assert fft_devices.gpu_for_ffts() == ("cuda", "Some GPU, wherever it is found to be faster")
+    takes(monkeypatch, {"cpu": (1.0, 1.0), BY_TORCH: (0.5, 0.5)})
+    assert fastest_fft_devices(radar, 10**6, 0) == (BY_TORCH, BY_TORCH)
 
 
 def test_without_a_gpu_torch_is_not_imported() -> None:
     code = (
         "import sys; from rtradar.process import fft_devices; fft_devices.has_nvidia_gpu = lambda: False; import rtradar; "
-        "fft_devices.fastest_fft_devices(rtradar.Radar()); print('torch' in sys.modules)"
+        "fft_devices.fastest_fft_devices(rtradar.Radar(), 10**12, 10**9); print('torch' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "False"

@@ -7,7 +7,6 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -36,20 +35,22 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Iterator[Machine]:
     """Let the machine have these libraries, and a GPU or none; nothing is probed, and Dr.Jit is as if never imported."""
 
     def set_up(
-        *libraries: Library, gpu: bool = False, loaded: str | None = None, query_s: dict[str, float] | None = None
+        *libraries: Library,
+        gpu: bool = False,
+        broken: bool = False,
+        loaded: str | None = None,
+        query_s: dict[str, float | None] | None = None,
     ) -> None:
         taken_s = query_s or {}
 
-        def judge(variant: str, library: Library | None, *, fresh: bool = False, timed: bool = False) -> Verdict:
-            time_s = taken_s.get(variant) if timed else None
+        def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
             if variant == "cuda_ad_rgb":
-                return Verdict("good", None, time_s) if gpu else Verdict("no CUDA driver or no GPU")
-            if variant == "scalar_rgb":
-                return Verdict("good", None, time_s)
+                return Verdict("good" if gpu and not broken else "no CUDA driver or no GPU")
             assert library is not None
-            return replace(FINDINGS[library.path], query_s=time_s)
+            return FINDINGS[library.path]
 
         backends._gpu_is_faster.cache_clear()
+        monkeypatch.setattr(backends, "query_s", lambda variant, library: taken_s.get(variant))
         monkeypatch.setattr(backends, "has_nvidia_gpu", lambda: gpu)
 
         monkeypatch.setattr(backends, "candidates", lambda: list(libraries))
@@ -126,13 +127,41 @@ def test_without_a_library_a_gpu_is_held_against_scalar(machine: Machine) -> Non
         assert select("auto").kind == "scalar"
 
 
-def test_what_works_tells_how_fast_it_is() -> None:
+def test_a_gpu_that_was_faster_and_works_no_more_is_not_taken(machine: Machine) -> None:
+    machine(WHEEL, gpu=True, broken=True, query_s={"cuda_ad_rgb": 1e-4, "llvm_ad_rgb": 1e-3})
+    assert select("auto").kind == "llvm"
+
+
+def test_what_works_tells_how_fast_it_is_and_is_asked_once(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     library = backends._first_good()[0]
-    for kind in backends.available():
-        found = verdict.judge(backends.VARIANTS[kind], library, timed=True)
-        assert found.good, found
-        assert found.query_s is not None
-        assert 0 < found.query_s < 10
+    kinds = backends.available()
+    found = [verdict.query_s(backends.VARIANTS[kind], library) for kind in kinds]
+    assert all(time_s is not None and 0 < time_s < 10 for time_s in found)
+    monkeypatch.setattr(verdict, "_probe", lambda *_, **__: pytest.fail("it is on the disk"))
+    assert [verdict.query_s(backends.VARIANTS[kind], library) for kind in kinds] == found
+
+
+def test_how_fast_it_is_is_asked_anew_on_another_gpu_or_with_other_threads(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probes = _counted(monkeypatch, "good")
+    for name, threads in (("A", 2), ("A", 2), ("B", 2), ("B", 4), ("A", 2)):
+        monkeypatch.setattr(verdict, "gpu_name", lambda name=name: name)
+        monkeypatch.setattr(verdict, "thread_count", lambda threads=threads: threads)
+        verdict.query_s("cuda_ad_rgb", None)
+    assert len(probes) == 3
+
+
+def test_a_gpu_that_hangs_is_waited_for_once(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    probes = []
+
+    def hangs(variant: str, library: Library | None, timed: bool = False) -> tuple[Verdict, int]:
+        probes.append(variant)
+        raise subprocess.TimeoutExpired(variant, verdict.QUERY_TIMEOUT_S)
+
+    monkeypatch.setattr(verdict, "_probe", hangs)
+    assert [verdict.query_s("cuda_ad_rgb", None) for _ in range(2)] == [None, None]
+    assert len(probes) == 1
 
 
 def test_available_lists_what_works(machine: Machine) -> None:
@@ -213,7 +242,7 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> list[str]:
     probes: list[str] = []
 
-    def probe(variant: str, library: Library | None, timed: bool) -> tuple[Verdict, int]:
+    def probe(variant: str, library: Library | None, timed: bool = False) -> tuple[Verdict, int]:
         probes.append(variant)
         return Verdict(finding), ended
 
@@ -302,7 +331,7 @@ def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
 import warnings
 from rtradar.trace.backend import loaded_llvm_version, select, use
 warnings.simplefilter("ignore")
-backend = select("auto")
+backend = select("cpu")
 mi = use(backend)
 import drjit as dr
 assert backend.llvm_version in (None, loaded_llvm_version()), loaded_llvm_version()
