@@ -7,6 +7,8 @@ both applied about fixed axes in the order they are listed (``rx ry rz``: R = Rz
 from __future__ import annotations
 
 import re
+from collections.abc import Generator
+from contextlib import closing
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +19,8 @@ from rtradar.errors import InputError
 from rtradar.motion.asf import Skeleton
 from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.motion import Motion
-from rtradar.motion.textfile import check_size, fail, numbers, read_lines
+from rtradar.motion.textfile import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
+from rtradar.spool import Spool
 
 _FRAME_NUMBER = re.compile("-?[0-9]{1,9}")
 _RATE_HZ = 120.0
@@ -37,11 +40,31 @@ def load_amc(path: Path, skeleton: Skeleton) -> Motion:
     InputError
         Naming file, line and bone.
     """
-    values, degrees = _read_frames(path, skeleton)
-    to_radians = np.pi / 180 if degrees else 1.0
-    frames = len(next(iter(values.values())))
+    roots, rotations = Spool(), Spool()
+    with closing(_read_frames(path, skeleton)) as blocks:
+        for values, degrees in blocks:
+            root_positions, quaternions = _posed(skeleton, values, np.pi / 180 if degrees else 1.0)
+            roots.append(to_world(root_positions))
+            rotations.append(quaternions_to_world(quaternions))
     index = {bone.name: j for j, bone in enumerate(skeleton.bones)}
-    world: list[Rotation] = []
+    offsets = np.array([bone.direction * bone.length * skeleton.unit_m for bone in skeleton.bones])
+    return Motion(
+        name=path.stem,
+        joints=tuple(index),
+        parents=tuple(-1 if bone.parent is None else index[bone.parent] for bone in skeleton.bones),
+        offsets=to_world(offsets),
+        root_positions=roots.rows(),
+        rotations=rotations.rows(),
+        rate_hz=_RATE_HZ,
+    )
+
+
+def _posed(
+    skeleton: Skeleton, values: dict[str, NDArray[np.float64]], to_radians: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Places of the root (frame, 3) [m] and rotations of all bones (frame, bone, 4), in mocap axes."""
+    frames = len(next(iter(values.values())))
+    world: dict[str, Rotation] = {}
     root_positions = np.zeros((frames, 3))
     for bone in skeleton.bones:
         frame = Rotation.from_euler(bone.axis_order, bone.axis_rad)
@@ -56,24 +79,15 @@ def load_amc(path: Path, skeleton: Skeleton) -> Motion:
         else:
             local = Rotation.identity(frames)
         posed = frame * local * frame.inv()
-        world.append(posed if bone.parent is None else world[index[bone.parent]] * posed)
-    offsets = np.array([bone.direction * bone.length * skeleton.unit_m for bone in skeleton.bones])
-    rotations = np.stack([rotation.as_quat() for rotation in world], axis=1)
-    return Motion(
-        name=path.stem,
-        joints=tuple(index),
-        parents=tuple(-1 if bone.parent is None else index[bone.parent] for bone in skeleton.bones),
-        offsets=to_world(offsets),
-        root_positions=to_world(root_positions),
-        rotations=quaternions_to_world(rotations),
-        rate_hz=_RATE_HZ,
-    )
+        world[bone.name] = posed if bone.parent is None else world[bone.parent] * posed
+    return root_positions, np.stack([rotation.as_quat() for rotation in world.values()], axis=1)
 
 
-def _read_frames(path: Path, skeleton: Skeleton) -> tuple[dict[str, NDArray[np.float64]], bool]:
-    lines = read_lines(path, "AMC motion")
+def _read_frames(path: Path, skeleton: Skeleton) -> Generator[tuple[dict[str, NDArray[np.float64]], bool]]:
+    """Values (frame, degree of freedom) of each bone that has some, a few frames at a time, and whether they are in degrees."""
     widths = {bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}
     table: dict[str, list[list[float]]] = {name: [] for name in widths}
+    number, n_frames = 0, 0
     known = {bone.name for bone in skeleton.bones}
     degrees = skeleton.degrees
     frame: int | None = None
@@ -81,41 +95,53 @@ def _read_frames(path: Path, skeleton: Skeleton) -> tuple[dict[str, NDArray[np.f
 
     def finish(line: int) -> None:
         missing = [name for name in widths if name not in seen]
-        if frame is not None and missing:
+        if missing:
             some = ", ".join(missing[:3]) + (" ..." if len(missing) > 3 else "")
             raise fail(path, line, f"frame {frame} lacks {len(missing)} bones ({some}); the file may be cut off")
+        check_size(path, len(skeleton.bones), n_frames)
 
-    for number, raw in enumerate(lines, start=1):
-        words = raw.split()
-        if not words or words[0].startswith("#"):
-            continue
-        if words[0].startswith(":"):
-            if words[0].upper() in (":DEGREES", ":RADIANS"):
-                degrees = words[0].upper() == ":DEGREES"
-        elif len(words) == 1 and _FRAME_NUMBER.fullmatch(words[0]):
-            finish(number - 1)
-            if frame is not None and int(words[0]) != frame + 1:
-                raise fail(path, number, f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive")
-            frame, seen = int(words[0]), set()
-        elif frame is None:
-            raise fail(path, number, f"{words[0][:40]!r} before the first frame number; this is not an AMC file")
-        else:
-            name = words[0]
-            if name not in known:
-                raise fail(
-                    path, number, f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject"
-                )
-            if name in seen:
-                raise fail(path, number, f"bone {name!r} is there twice in frame {frame}")
-            if len(words) - 1 != widths.get(name, 0):
-                raise fail(
-                    path, number, f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}"
-                )
-            seen.add(name)
-            if name in table:
-                table[name].append(numbers(words[1:], path, number))
+    def taken() -> dict[str, NDArray[np.float64]]:
+        values = {name: np.array(rows) for name, rows in table.items()}
+        for rows in table.values():
+            rows.clear()
+        return values
+
+    with closing(read_lines(path, "AMC motion")) as lines:
+        for number, raw in enumerate(lines, start=1):
+            words = raw.split()
+            if not words or words[0].startswith("#"):
+                continue
+            if words[0].startswith(":"):
+                if words[0].upper() in (":DEGREES", ":RADIANS"):
+                    if frame is not None and degrees != (words[0].upper() == ":DEGREES"):
+                        raise fail(path, number, f"{words[0]} after the first frame; it must stand before it")
+                    degrees = words[0].upper() == ":DEGREES"
+            elif len(words) == 1 and _FRAME_NUMBER.fullmatch(words[0]):
+                if frame is not None:
+                    finish(number - 1)
+                    if int(words[0]) != frame + 1:
+                        raise fail(path, number, f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive")
+                    if n_frames % FRAMES_AT_ONCE == 0:
+                        yield taken(), degrees
+                frame, seen, n_frames = int(words[0]), set(), n_frames + 1
+            elif frame is None:
+                raise fail(path, number, f"{words[0][:40]!r} before the first frame number; this is not an AMC file")
+            else:
+                name = words[0]
+                if name not in known:
+                    raise fail(
+                        path, number, f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject"
+                    )
+                if name in seen:
+                    raise fail(path, number, f"bone {name!r} is there twice in frame {frame}")
+                if len(words) - 1 != widths.get(name, 0):
+                    raise fail(
+                        path, number, f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}"
+                    )
+                seen.add(name)
+                if name in table:
+                    table[name].append(numbers(words[1:], path, number))
     if frame is None:
         raise InputError(f"{path}: no frame in this AMC file; it may be cut off")
-    finish(len(lines))
-    check_size(path, len(skeleton.bones), len(table["root"]) if "root" in table else 1)
-    return {name: np.array(rows) for name, rows in table.items()}, degrees
+    finish(number)
+    yield taken(), degrees

@@ -5,6 +5,7 @@ A bone's vector is length x direction, and lengths are inches divided by the ``l
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -61,50 +62,51 @@ def load_skeleton(path: Path) -> Skeleton:
     InputError
         Naming file and line.
     """
-    lines = read_lines(path, "ASF skeleton")
     bones: dict[str, Bone] = {"root": Bone("root", 1)}
     units = {"length": 1.0, "angle": 1.0}
     bone: Bone | None = None
     section, inside, has_root = "", False, False
-    for number, raw in enumerate(lines, start=1):
-        words = raw.split("#", 1)[0].split()
-        if not words:
-            continue
-        key = words[0].lower()
-        if key.startswith(":"):
-            section = key
-            has_root |= key == ":root"
-        elif section == ":units" and len(words) > 1:
-            if key == "angle":
-                units["angle"] = 0.0 if words[1].lower().startswith("rad") else 1.0
-            elif key == "length":
-                (units["length"],) = numbers(words[1:2], path, number)
-                if not units["length"] > 1e-6:
-                    raise fail(path, number, f"length unit {units['length']}; it must be positive, and above 1e-6")
-        elif section == ":root":
-            _root_line(bones["root"], key, words, path, number)
-        elif section == ":bonedata":
-            if key == "begin":
-                bone = Bone("", number)
-            elif key == "end":
-                if bone is not None:
-                    _check_bone(bone, path, number)
-                bone = None
-            elif bone is None:
-                raise fail(path, number, f"{words[0]!r} outside begin ... end")
-            else:
-                _bone_line(bone, key, words, bones, path, number)
-        elif section == ":hierarchy":
-            if key in ("begin", "end"):
-                inside = key == "begin"
-            elif inside:
-                _hierarchy_line(words, bones, path, number)
+    number = 0
+    with closing(read_lines(path, "ASF skeleton")) as lines:
+        for number, raw in enumerate(lines, start=1):
+            words = raw.split("#", 1)[0].split()
+            if not words:
+                continue
+            key = words[0].lower()
+            if key.startswith(":"):
+                section = key
+                has_root |= key == ":root"
+            elif section == ":units" and len(words) > 1:
+                if key == "angle":
+                    units["angle"] = 0.0 if words[1].lower().startswith("rad") else 1.0
+                elif key == "length":
+                    (units["length"],) = numbers(words[1:2], path, number)
+                    if not units["length"] > 1e-6:
+                        raise fail(path, number, f"length unit {units['length']}; it must be positive, and above 1e-6")
+            elif section == ":root":
+                _root_line(bones["root"], key, words, path, number)
+            elif section == ":bonedata":
+                if key == "begin":
+                    bone = Bone("", number)
+                elif key == "end":
+                    if bone is not None:
+                        _check_bone(bone, path, number)
+                    bone = None
+                elif bone is None:
+                    raise fail(path, number, f"{words[0]!r} outside begin ... end")
+                else:
+                    _bone_line(bone, key, words, bones, path, number)
+            elif section == ":hierarchy":
+                if key in ("begin", "end"):
+                    inside = key == "begin"
+                elif inside:
+                    _hierarchy_line(words, bones, path, number)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
         raise InputError(f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut off")
     if not bones["root"].dof:
         raise InputError(f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of the AMC")
     if inside:
-        raise fail(path, len(lines), "the hierarchy does not end; the file may be cut off")
+        raise fail(path, number, "the hierarchy does not end; the file may be cut off")
     check_size(path, len(bones))
     degrees = bool(units["angle"])
     if degrees:

@@ -7,6 +7,9 @@ site has no length.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
+from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +21,8 @@ from rtradar.errors import InputError
 from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import rotate
-from rtradar.motion.textfile import check_size, fail, numbers, read_lines
+from rtradar.motion.textfile import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
+from rtradar.spool import Spool, column, in_blocks
 
 UNITS_M = {"metre": 1.0, "CMU unit (0.45 inch)": 0.0254 / 0.45, "inch": 0.0254, "centimetre": 0.01, "millimetre": 0.001}
 """Length units that BVH files use; the format itself has none."""
@@ -40,6 +44,8 @@ class _Joint:
     line: int
     offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     channels: tuple[str, ...] = ()
+    column: int = 0
+    """Of its first channel among those of all joints."""
 
 
 def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
@@ -59,63 +65,66 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     InputError
         Naming file and line.
     """
-    lines = read_lines(path, "BVH motion")
-    joints, first = _read_hierarchy(lines, path)
-    rate_hz, values = _read_frames(lines, first, sum(len(joint.channels) for joint in joints), path)
-    check_size(path, len(joints), len(values))
-    local, positions = _channels(joints, values)
-    world: list[Rotation] = []
-    for joint, rotation in zip(joints, local, strict=True):
-        world.append(rotation if joint.parent < 0 else world[joint.parent] * rotation)
-    quaternions = np.stack([rotation.as_quat() for rotation in world], axis=1)
+    with closing(read_lines(path, "BVH motion")) as text:
+        lines = enumerate(text, start=1)
+        joints = _read_hierarchy(lines, path)
+        n_frames, rate_hz = _read_header(lines, path)
+        values = _read_frames(lines, n_frames, joints, path)
 
-    places = np.zeros((len(values), 3))
-    top = _carrier(joints, positions)
-    for ancestor in _chain(joints, top):  # from the file's root down to the joint that carries the body
-        parent = joints[ancestor].parent
-        places = positions[ancestor] if parent < 0 else places + rotate(quaternions[:, parent], positions[ancestor])
-
+    top = _carrier(joints, values)
     kept = [j for j in range(len(joints)) if top in _chain(joints, j)]
     renumber = {j: k for k, j in enumerate(kept)}
-    offsets = np.array([np.median(positions[j], axis=0) for j in kept])
+    offsets = np.array([np.median(_places(joints[j], values), axis=0) for j in kept])
     offsets[0] = 0.0
     scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
     if not 0 < scale < np.inf:
         raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
     for k, j in enumerate(kept[1:], start=1):
-        stretch = float(np.linalg.norm(positions[j] - offsets[k], axis=1).max()) * scale
+        stretch = float(np.linalg.norm(_places(joints[j], values) - offsets[k], axis=1).max()) * scale
         if stretch > _STRETCH_M:
             raise fail(
                 path, joints[j].line, f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid"
             )
     carriers = [kept[0]] + [joints[j].parent for j in kept[1:]]
+    roots, rotations = Spool(), Spool()
+    for (frames,) in in_blocks(values):
+        quaternions = _quaternions(joints, frames)
+        places = np.zeros((len(frames), 3))
+        for ancestor in _chain(joints, top):  # from the file's root down to the joint that carries the body
+            parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
+            places = places + (own if parent < 0 else rotate(quaternions[:, parent], own))
+        roots.append(to_world(places * scale))
+        rotations.append(quaternions_to_world(quaternions[:, carriers]))
     return Motion(
         name=path.stem,
         joints=tuple(joints[j].name for j in kept),
         parents=(-1, *(renumber[joints[j].parent] for j in kept[1:])),
         offsets=to_world(offsets * scale),
-        root_positions=to_world(places * scale),
-        rotations=quaternions_to_world(quaternions[:, carriers]),
+        root_positions=roots.rows(),
+        rotations=rotations.rows(),
         rate_hz=rate_hz,
     )
 
 
-def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int]:
-    """Joints in the file's order (parents first), and the line number of MOTION."""
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> list[_Joint]:
+    """Joints in the file's order (parents first), up to MOTION."""
     joints: list[_Joint] = []
     stack: list[int] = []
-    pending = -1
-    if not any(line.split()[:1] == ["HIERARCHY"] for line in lines):
-        raise fail(path, 1, "no HIERARCHY; this is not a BVH file")
-    for number, raw in enumerate(lines, start=1):
+    pending, number, begun = -1, 0, False
+    for number, raw in lines:
         words = raw.split()
         if not words or words[0] == "HIERARCHY":
+            begun |= bool(words)
             continue
+        if not begun:
+            raise fail(path, number, "no HIERARCHY before it; this is not a BVH file")
         key = words[0].upper()
         if key == "MOTION":
             if stack or not joints:
                 raise fail(path, number, "MOTION before the hierarchy ends; a brace is missing")
-            return joints, number
+            for before, joint in itertools.pairwise(joints):
+                joint.column = before.column + len(before.channels)
+            return joints
         if key in ("ROOT", "JOINT", "END"):
             if (key == "ROOT") == bool(joints):
                 raise fail(path, number, "a BVH file must have exactly one ROOT, first")
@@ -146,7 +155,7 @@ def _read_hierarchy(lines: list[str], path: Path) -> tuple[list[_Joint], int]:
             joints[stack[-1]].channels = _channel_names(words, path, number)
         else:
             raise fail(path, number, f"{words[0][:40]!r} is not expected in a BVH hierarchy")
-    raise fail(path, len(lines), "no MOTION; the file may be cut off")
+    raise fail(path, number, "no MOTION; the file may be cut off")
 
 
 def _channel_names(words: list[str], path: Path, line: int) -> tuple[str, ...]:
@@ -157,11 +166,12 @@ def _channel_names(words: list[str], path: Path, line: int) -> tuple[str, ...]:
     return names
 
 
-def _read_frames(lines: list[str], first: int, width: int, path: Path) -> tuple[float, NDArray[np.float64]]:
-    rows: list[list[float]] = []
+def _read_header(lines: Iterator[tuple[int, str]], path: Path) -> tuple[int, float]:
+    """Number of frames, and frames per second."""
+    number = 0
     frames: int | None = None
     interval: float | None = None
-    for number, raw in enumerate(lines[first:], start=first + 1):
+    for number, raw in lines:
         words = raw.replace(":", ": ").split()
         if not words:
             continue
@@ -175,39 +185,58 @@ def _read_frames(lines: list[str], first: int, width: int, path: Path) -> tuple[
             if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
                 raise fail(path, number, f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}")
             interval = time[0]
-        elif frames is None or interval is None:
-            raise fail(path, number, "Frames: and Frame Time: must stand before the values")
         else:
-            row = numbers(words, path, number)
-            if len(row) != width:
-                raise fail(path, number, f"frame {len(rows) + 1} has {len(row)} values where the hierarchy has {width} channels")
-            rows.append(row)
-    if frames is None or interval is None:
-        raise fail(path, len(lines), "no Frames: or Frame Time:; the file may be cut off")
-    if len(rows) != frames:
-        raise InputError(f"{path}: {len(rows)} frames where the header promises {frames}; the file may be cut off")
-    rate_hz = 1 / interval
-    # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
-    return (round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz), np.array(rows)
+            raise fail(path, number, "Frames: and Frame Time: must stand before the values")
+        if frames is not None and interval is not None:
+            rate_hz = 1 / interval
+            # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
+            return frames, (round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz)
+    raise fail(path, number, "no Frames: or Frame Time:; the file may be cut off")
 
 
-def _channels(joints: list[_Joint], values: NDArray[np.float64]) -> tuple[list[Rotation], list[NDArray[np.float64]]]:
-    """Local rotation and position (frame, 3) of each joint."""
-    rotations: list[Rotation] = []
-    positions: list[NDArray[np.float64]] = []
-    column = 0
+def _read_frames(lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_Joint], path: Path) -> NDArray[np.float64]:
+    """Values (frame, channel)."""
+    width, read = joints[-1].column + len(joints[-1].channels), 0
+    values, rows = Spool(), list[list[float]]()
+    for number, raw in lines:
+        words = raw.split()
+        if not words:
+            continue
+        row = numbers(words, path, number)
+        if len(row) != width:
+            raise fail(path, number, f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels")
+        rows.append(row)
+        read += 1
+        check_size(path, len(joints), read)
+        if len(rows) == FRAMES_AT_ONCE:
+            values.append(np.array(rows))
+            rows.clear()
+    if read != n_frames:
+        raise InputError(f"{path}: {read} frames where the header promises {n_frames}; the file may be cut off")
+    values.append(np.array(rows).reshape(-1, width))
+    return values.rows()
+
+
+def _places(joint: _Joint, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a joint is seen from its parent, (frame, 3), or (1, 3) where it has no position channels."""
+    moved = [k for k, name in enumerate(joint.channels) if name.endswith("position")]
+    if not moved:
+        return joint.offset[None]
+    places = np.tile(joint.offset, (len(values), 1))
+    places[:, ["xyz".index(joint.channels[k][0]) for k in moved]] = column(values, [joint.column + k for k in moved])
+    return places
+
+
+def _quaternions(joints: list[_Joint], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations of all joints (frame, joint, 4) in the axes of the file."""
+    world: list[Rotation] = []
     for joint in joints:
-        data = values[:, column : column + len(joint.channels)]
-        column += len(joint.channels)
         turns = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
         order = "".join(joint.channels[k][0].upper() for k in turns)
-        rotations.append(Rotation.from_euler(order, data[:, turns], degrees=True) if order else Rotation.identity(len(values)))
-        place = np.tile(joint.offset, (len(values), 1))
-        for k, name in enumerate(joint.channels):
-            if name.endswith("position"):
-                place[:, "xyz".index(name[0])] = data[:, k]
-        positions.append(place)
-    return rotations, positions
+        angles = values[:, [joint.column + k for k in turns]]
+        local = Rotation.from_euler(order, angles, degrees=True) if order else Rotation.identity(len(values))
+        world.append(local if joint.parent < 0 else world[joint.parent] * local)
+    return np.stack([rotation.as_quat() for rotation in world], axis=1)
 
 
 def _chain(joints: list[_Joint], joint: int) -> list[int]:
@@ -217,7 +246,7 @@ def _chain(joints: list[_Joint], joint: int) -> list[int]:
     return chain
 
 
-def _carrier(joints: list[_Joint], positions: list[NDArray[np.float64]]) -> int:
+def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
     """The joint that carries the body: the last of an unbranched chain from the root whose own position moves."""
     top, carrier = 0, 0
     while True:
@@ -226,7 +255,7 @@ def _carrier(joints: list[_Joint], positions: list[NDArray[np.float64]]) -> int:
             return carrier
         top = children[0]
         # A joint that holds its place in its parent to a millionth of its distance is a bone, not a carrier.
-        if joints[top].channels and np.ptp(positions[top], axis=0).max() > 1e-6 * (1 + np.abs(joints[top].offset).max()):
+        if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (1 + np.abs(joints[top].offset).max()):
             carrier = top
 
 

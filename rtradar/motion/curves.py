@@ -22,14 +22,14 @@ def bump(u: Array) -> Array:
     return 64 * (u * (1 - u)) ** 3
 
 
-def keyed(t: Array, times: Sequence[float], values: ArrayLike) -> Array:
+def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     """Minimum-jerk moves from value to value (key, ...), at rest at every key; constant outside. Returns (time, ...)."""
-    keys = np.asarray(values, dtype=np.float64)
-    trailing = (-1, *(1,) * (keys.ndim - 1))
-    result = np.broadcast_to(keys[0], (len(t), *keys.shape[1:])).copy()
-    for begin, end, first, last in zip(times[:-1], times[1:], keys[:-1], keys[1:], strict=True):
-        result += (last - first) * smooth((t - begin) / (end - begin)).reshape(trailing)
-    return result
+    at, keys = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
+    moves = np.diff(keys, axis=0)
+    reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
+    under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
+    share = smooth((t - at[under_way]) / np.diff(at)[under_way])
+    return np.asarray(reached[under_way] + moves[under_way] * share.reshape(-1, *(1,) * (keys.ndim - 1)))
 
 
 def hermite(t: Array, interval: tuple[float, float], begin: Sequence[ArrayLike], end: Sequence[ArrayLike]) -> Array:

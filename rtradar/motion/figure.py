@@ -1,4 +1,4 @@
-"""The synthetic actor's skeleton, and how a pose becomes a `Motion`.
+"""The synthetic actor's skeleton, and how a pose turns its bones.
 
 Segment lengths are fractions of the standing height after R. Drillis and R. Contini, Body Segment Parameters, New York
 University, technical report 1166.03, 1966 (as printed in D. A. Winter, Biomechanics and Motor Control of Human Movement):
@@ -10,15 +10,14 @@ head at 0.885, ankle a quarter of the foot from the heel, toe node 0.012 above t
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.motion.motion import Motion
-from rtradar.motion.names import NODE_PARENT, NODES
+from rtradar.motion.names import NODES
 
 Array = NDArray[np.float64]
 
@@ -76,6 +75,10 @@ class Pose:
     left: Array
     arms: Mapping[str, Arm]
     shrug: Array
+
+
+PosesAt = Callable[[Array], Pose]
+"""A pose at any times (n,) [s], the same whatever others are asked for with it."""
 
 
 def turn(axis: str, angle: Array | float) -> Rotation:
@@ -166,7 +169,7 @@ def roll_about_toe(pitch: Array, height_m: float) -> Array:
 
 
 def lowering(pose: Pose, height_m: float) -> float:
-    """How far the root must come down for both legs to reach their ankles at all times [m]."""
+    """How far the root must come down for both legs to reach their ankles at all these times [m]."""
     bones = offsets(height_m)
     leg = (THIGH + SHANK) * height_m * MAXIMUM_REACH
     worst = 0.0
@@ -177,19 +180,19 @@ def lowering(pose: Pose, height_m: float) -> float:
     return worst
 
 
-def build_motion(pose: Pose, *, name: str, height_m: float, girth: float, rate_hz: float, length_s: float) -> Motion:
-    """Rotations of all bones from a pose, as a `Motion` facing +x."""
+def rotations(pose: Pose, height_m: float) -> Array:
+    """Rotations (n, node, 4) of all bones of a pose."""
     bones = offsets(height_m)
     bent = pose.pelvis.inv() * pose.thorax
-    rotations: dict[str, Rotation] = {"root": pose.pelvis, "thorax": pose.thorax, "head": pose.head}
+    turned: dict[str, Rotation] = {"root": pose.pelvis, "thorax": pose.thorax, "head": pose.head}
     for node, share in (("lowerback", 1 / 3), ("upperback", 2 / 3)):
-        rotations[node] = pose.pelvis * Rotation.from_rotvec(share * bent.as_rotvec())
-    rotations["neck"] = pose.thorax * Rotation.from_rotvec(0.5 * (pose.thorax.inv() * pose.head).as_rotvec())
+        turned[node] = pose.pelvis * Rotation.from_rotvec(share * bent.as_rotvec())
+    turned["neck"] = pose.thorax * Rotation.from_rotvec(0.5 * (pose.thorax.inv() * pose.head).as_rotvec())
     for side, sign in SIDES.items():
         hip = pose.root + pose.pelvis.apply(bones[f"{side}_hip"])
         thigh, shank = bend(pose.ankles[side] - hip, THIGH * height_m, SHANK * height_m, pose.left, 1.0)
         arm = pose.arms[side]
-        rotations |= {
+        turned |= {
             f"{side}_hip": pose.pelvis,
             f"{side}_knee": thigh,
             f"{side}_ankle": shank,
@@ -199,14 +202,4 @@ def build_motion(pose: Pose, *, name: str, height_m: float, girth: float, rate_h
             f"{side}_wrist": arm.fore,
             f"{side}_hand": arm.hand,
         }
-    return Motion(
-        name=name,
-        joints=NODES,
-        parents=(-1, *(NODES.index(NODE_PARENT[node]) for node in NODES[1:])),
-        offsets=np.array([bones[node] for node in NODES]),
-        root_positions=pose.root,
-        rotations=np.stack([rotations[node].as_quat() for node in NODES], axis=1),
-        rate_hz=rate_hz,
-        length_s=length_s,
-        girth=girth,
-    )
+    return np.stack([turned[node].as_quat() for node in NODES], axis=1)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rtradar.motion.curves import bump, hermite, keyed, state
-from rtradar.motion.figure import ANKLE, HEEL_X, ROOT, SIDES, Array, Pose, roll_about_toe, swing_arm, turn
+from rtradar.motion.figure import ANKLE, HEEL_X, ROOT, SIDES, Array, Pose, PosesAt, roll_about_toe, swing_arm, turn
 from rtradar.motion.traits import Traits
 
 HALF_TRACK_M = 1.5
@@ -84,8 +86,8 @@ def _rolled(pitch: Array, height_m: float) -> Array:
     return np.array([0.0, 0.0, ANKLE * height_m]) + about_heel + roll_about_toe(np.maximum(pitch, 0.0), height_m)
 
 
-def _foot(t: Array, own: list[Step], traits: Traits) -> tuple[Array, Array, Array]:
-    """Ankle (n, 3), pitch (n,; toes down is positive) and yaw (n,) of one foot that steps on its own footprints."""
+def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Array, Array]]:
+    """Ankle (n, 3), pitch (n,; toes down is positive) and yaw (n,) at times (n,) of one foot that steps on its own footprints."""
     cycle, height = traits.cycle_s, traits.height_m
     sign = SIDES[own[0].side]
     keys: list[tuple[float, float]] = []
@@ -99,49 +101,71 @@ def _foot(t: Array, own: list[Step], traits: Traits) -> tuple[Array, Array, Arra
             (step.time + (STANCE + 0.09) * cycle, math.radians(60) * min(max(following, 0.25), 1.1)),
         ]
 
-    def pitch(at: Array) -> Array:
-        return keyed(at, [key[0] for key in keys], [key[1] for key in keys])
-
-    yaw = keyed(
-        t,
-        [time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:],
-        [step.heading for step in own for _ in (0, 1)][:-1],
+    pitch = partial(keyed, times=np.array([key[0] for key in keys]), values=np.array([key[1] for key in keys]))
+    yaw = partial(
+        keyed,
+        times=np.array([time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:]),
+        values=np.array([step.heading for step in own for _ in (0, 1)][:-1]),
     )
-    ankle = np.zeros((len(t), 3))
-    for step, after in itertools.pairwise(own):
-        lift = step.time + STANCE * cycle
+    landings = np.array([step.time for step in own])
 
-        def standing(at: Array, step: Step = step) -> Array:
-            across = sign * traits.track_m * np.array([-math.sin(step.heading), math.cos(step.heading), 0.0])
-            return np.array([*step.middle, 0.0]) + across + turn("z", step.heading).apply(_rolled(pitch(at), height))
+    def foot(t: Array) -> tuple[Array, Array, Array]:
+        ankle = np.zeros((len(t), 3))
+        first, last = np.searchsorted(landings, (t[0], t[-1]), side="right")
+        for step, after in itertools.pairwise(own[max(first - 1, 0) : last + 1]):
+            lift = step.time + STANCE * cycle
 
-        def landing(at: Array, after: Step = after) -> Array:
-            return standing(at, after)
+            def standing(at: Array, step: Step = step) -> Array:
+                across = sign * traits.track_m * np.array([-math.sin(step.heading), math.cos(step.heading), 0.0])
+                return np.array([*step.middle, 0.0]) + across + turn("z", step.heading).apply(_rolled(pitch(at), height))
 
-        stands = (t >= step.time) & (t < lift)
-        ankle[stands] = standing(t[stands])
-        swings = (t >= lift) & (t < after.time)
-        path = hermite(t[swings], (lift, after.time), state(standing, lift), state(landing, after.time))
-        clearance = traits.clearance_m * bump((t[swings] - lift) / (after.time - lift))
-        ankle[swings] = path + clearance[:, None] * np.array([0.0, 0.0, 1.0])
-    return ankle, pitch(t), yaw
+            def landing(at: Array, after: Step = after) -> Array:
+                return standing(at, after)
+
+            stands = (t >= step.time) & (t < lift)
+            ankle[stands] = standing(t[stands])
+            swings = (t >= lift) & (t < after.time)
+            path = hermite(t[swings], (lift, after.time), state(standing, lift), state(landing, after.time))
+            clearance = traits.clearance_m * bump((t[swings] - lift) / (after.time - lift))
+            ankle[swings] = path + clearance[:, None] * np.array([0.0, 0.0, 1.0])
+        return ankle, pitch(t), yaw(t)
+
+    return foot
 
 
-def walk(t: Array, duration_s: float, traits: Traits) -> Pose:
-    """Poses of a walk at times (n,), facing and starting along +x."""
+def walk(duration_s: float, traits: Traits) -> PosesAt:
+    """A walk, facing and starting along +x."""
     steps = footprints(traits, duration_s)
-    cycle, height = traits.cycle_s, traits.height_m
-    over = np.array([step.time + MIDSTANCE * cycle for step in steps])
+    over = np.array([step.time + MIDSTANCE * traits.cycle_s for step in steps])
     middles = np.array([step.middle for step in steps])
     headings = np.array([step.heading for step in steps])
     across = np.stack([-np.sin(headings), np.cos(headings)], axis=1)
     sway = 0.3 * traits.track_m * np.array([SIDES[step.side] for step in steps])
-    path = CubicSpline(over, middles + sway[:, None] * across)(t)
-    heading = CubicSpline(over, headings)(t)
-    vigour = keyed(t, list(over), [step.vigour for step in steps])
+    course = _Course(
+        path=CubicSpline(over, middles + sway[:, None] * across),
+        heading=CubicSpline(over, headings),
+        vigour=partial(keyed, times=over, values=np.array([step.vigour for step in steps])),
+        first_left_s=next(step.time for step in steps if step.side == "l"),
+        feet={side: _foot([step for step in steps if step.side == side], traits) for side in SIDES},
+    )
+    return partial(_walk, traits, course)
 
-    first_left = next(step.time for step in steps if step.side == "l")
-    phase = 2 * np.pi * (t - first_left) / cycle  # 0 where the left foot lands
+
+@dataclass(frozen=True)
+class _Course:
+    """Where a walk goes, as functions of time: the root's way over the floor, heading, length of the steps, feet."""
+
+    path: Callable[[Array], Array]
+    heading: Callable[[Array], Array]
+    vigour: Callable[[Array], Array]
+    first_left_s: float
+    feet: Mapping[str, Callable[[Array], tuple[Array, Array, Array]]]
+
+
+def _walk(traits: Traits, course: _Course, t: Array) -> Pose:
+    height = traits.height_m
+    path, heading, vigour = course.path(t), course.heading(t), course.vigour(t)
+    phase = 2 * np.pi * (t - course.first_left_s) / traits.cycle_s  # 0 where the left foot lands
     bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
     root = np.concatenate([path, (height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob)))[:, None]], axis=1)
     pelvis_yaw = -math.radians(5) * vigour * np.cos(phase)
@@ -150,7 +174,7 @@ def walk(t: Array, duration_s: float, traits: Traits) -> Pose:
     thorax = turn("z", heading + thorax_yaw) * turn("y", math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase))
     ankles, feet, arms = {}, {}, {}
     for side, sign in SIDES.items():
-        ankle, pitch, yaw = _foot(t, [step for step in steps if step.side == side], traits)
+        ankle, pitch, yaw = course.feet[side](t)
         ankles[side], feet[side] = ankle, turn("z", yaw) * turn("y", pitch)
         # Each arm swings with the other leg.
         beat = -sign * np.cos(phase - math.radians(15))

@@ -4,11 +4,26 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from rtradar.motion.curves import bump, hermite, keyed
-from rtradar.motion.figure import ANKLE, HIP, HIP_Y, ROOT, SHANK, SIDES, THIGH, Array, Pose, roll_about_toe, swing_arm, turn
+from rtradar.motion.figure import (
+    ANKLE,
+    HIP,
+    HIP_Y,
+    ROOT,
+    SHANK,
+    SIDES,
+    THIGH,
+    Array,
+    Pose,
+    PosesAt,
+    roll_about_toe,
+    swing_arm,
+    turn,
+)
 from rtradar.motion.traits import Traits
 
 GRAVITY_MPS2 = 9.81
@@ -70,12 +85,17 @@ def _height(t: Array, sets: list[list[_Flight]], prepare_s: float, standing: flo
     return z
 
 
-def jumping_jack(t: Array, duration_s: float, traits: Traits) -> Pose:
-    """Poses of jumping jacks at times (n,), facing +x."""
+def jumping_jack(duration_s: float, traits: Traits) -> PosesAt:
+    """Jumping jacks, facing +x."""
+    return partial(_jump, traits, _sets(traits, duration_s))
+
+
+def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = traits.height_m, traits.amplitude
-    sets = _sets(traits, duration_s)
-    hops = [hop for hops in sets for hop in hops]
     hop_s = HOP_S / traits.tempo
+    # Who jumps has stood still before the first hop of a set, and does after the last: further sets do not matter.
+    sets = [hops for hops in all_sets if hops[0].begin - hop_s < t[-1] and hops[-1].end + hop_s > t[0]]
+    hops = [hop for hops in sets for hop in hops]
 
     def between(values: tuple[float, float], lead: float, lag: float) -> Array:
         """From the first value (feet together) to the second (apart) and back, around every flight."""
@@ -88,7 +108,7 @@ def jumping_jack(t: Array, duration_s: float, traits: Traits) -> Pose:
     # The feet move sideways while they are well off the floor.
     apart = between((0.0, 1.0), -0.12 * FLIGHT_S, -0.12 * FLIGHT_S)
     # Heels lift before take-off and come down after landing, so that the legs need not be straight there.
-    contact = hop_s - (hops[0].end - hops[0].begin) if hops else hop_s - FLIGHT_S
+    contact = hop_s - (all_sets[0][0].end - all_sets[0][0].begin) if all_sets else hop_s - FLIGHT_S
     roll_s = ROLL * contact
     lift, roll = np.zeros(len(t)), np.zeros(len(t))
     for hop in hops:
@@ -106,8 +126,9 @@ def jumping_jack(t: Array, duration_s: float, traits: Traits) -> Pose:
         for track in (wide, close)
     )
     z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))
-    raised = between((math.radians(12), math.radians(134) * amplitude**0.5), 0.51 * contact, 0.48 * contact)
-    moving = np.sin(np.pi * (raised - raised.min()) / max(float(np.ptp(raised)), 1e-9)) ** 2
+    lowest, highest = math.radians(12), math.radians(134) * amplitude**0.5
+    raised = between((lowest, highest), 0.51 * contact, 0.48 * contact)
+    moving = np.sin(np.pi * (raised - lowest) / (highest - lowest)) ** 2
     root = np.stack([0.03 * height * roll, np.zeros(len(t)), z], axis=1)
     lean = math.radians(3) + math.radians(3) * (height * ROOT - z) / (0.1 * height)
     pelvis = turn("y", np.full(len(t), math.radians(3)))

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,7 @@ from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import CONVENTIONS, NODE_PARENT, NODES, Convention, plain
 from rtradar.motion.quaternions import rotate
+from rtradar.spool import Spool, in_blocks
 
 MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""
@@ -37,8 +38,10 @@ TOES_OF_FOOT = 0.5
 
 @dataclass(frozen=True)
 class _Bone:
+    """A vector in the bone's own axes, and what gives its rotations (frame, 4) by those frames of all positions and rotations."""
+
     offset: NDArray[np.float64]
-    rotations: NDArray[np.float64]
+    rotations: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 
     @property
     def length(self) -> float:
@@ -72,13 +75,18 @@ def to_nodes(motion: Motion) -> Motion:
                 f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} mm long ({' to '.join(ends)}); "
                 f"every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, mend the skeleton"
             )
+    root_positions, rotations = Spool(), Spool()
+    for frames in in_blocks(motion.positions, motion.rotations):
+        root_positions.append(frames[0][:, joints["root"]])
+        own = [bones[node].rotations(*frames) for node in NODES[1:]]
+        rotations.append(np.stack([frames[1][:, joints["root"]], *own], axis=1))
     return dataclasses.replace(
         motion,
         joints=NODES,
         parents=(-1, *(NODES.index(NODE_PARENT[node]) for node in NODES[1:])),
         offsets=np.array([np.zeros(3), *(bones[node].offset for node in NODES[1:])]),
-        root_positions=motion.positions[:, joints["root"]],
-        rotations=np.stack([motion.rotations[:, joints["root"]], *(bones[node].rotations for node in NODES[1:])], axis=1),
+        root_positions=root_positions.rows(),
+        rotations=rotations.rows(),
     )
 
 
@@ -112,22 +120,36 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:
     """One rigid bone from a joint to another: the recording's own, or one that points along the chain between them."""
+
+    def carried(_: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        return rotations[:, last]
+
     if motion.parents[last] == first or last == first:
-        return _Bone(motion.offsets[last] if last != first else np.zeros(3), motion.rotations[:, last])
-    reference = motion.rotations[:, last]
-    chord = rotate(reference * [-1, -1, -1, 1], motion.positions[:, last] - motion.positions[:, first])
-    lengths = np.linalg.norm(chord, axis=1)
-    length = float(np.median(lengths))
+        return _Bone(motion.offsets[last] if last != first else np.zeros(3), carried)
+
+    def chord(positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        return rotate(rotations[:, last] * [-1, -1, -1, 1], positions[:, last] - positions[:, first])
+
+    chords = np.concatenate([chord(*frames) for frames in in_blocks(motion.positions, motion.rotations)])
+    length = float(np.median(np.linalg.norm(chords, axis=1)))
     if length < MINIMUM_PART_M:
-        return _Bone(np.array([0.0, 0.0, length]), reference)
-    directions = chord / np.maximum(lengths, MINIMUM_PART_M)[:, None]
-    rest = np.median(directions, axis=0)
+        return _Bone(np.array([0.0, 0.0, length]), carried)
+    rest = np.median(_directions(chords), axis=0)
     rest /= max(float(np.linalg.norm(rest)), 1e-12)
-    # The smallest turn that takes the rest direction to where the chord points in this frame.
-    swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
-    norms = np.linalg.norm(swing, axis=1, keepdims=True)
-    swing = np.where(norms > 1e-9, swing / np.maximum(norms, 1e-9), [1.0, 0.0, 0.0, 0.0])
-    return _Bone(length * rest, multiply(reference, swing))
+
+    def pointing(positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        # The smallest turn that takes the rest direction to where the chord points in this frame.
+        directions = _directions(chord(positions, rotations))
+        swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
+        norms = np.linalg.norm(swing, axis=1, keepdims=True)
+        swing = np.where(norms > 1e-9, swing / np.maximum(norms, 1e-9), [1.0, 0.0, 0.0, 0.0])
+        return multiply(rotations[:, last], swing)
+
+    return _Bone(length * rest, pointing)
+
+
+def _directions(chords: NDArray[np.float64]) -> NDArray[np.float64]:
+    return chords / np.maximum(np.linalg.norm(chords, axis=1), MINIMUM_PART_M)[:, None]
 
 
 def multiply(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -14,6 +14,7 @@ from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from rtradar.errors import InputError
 from rtradar.motion.quaternions import rotate, sign_continuous
+from rtradar.spool import in_blocks, let_go, spooled
 
 _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
@@ -76,7 +77,7 @@ class Motion:
     def __post_init__(self) -> None:
         for field in ("offsets", "root_positions", "rotations"):
             array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
-            if not np.isfinite(array).all():
+            if not all(np.isfinite(rows).all() for (rows,) in in_blocks(array)):
                 raise InputError(f"Motion {self.name}: {field} holds NaN or infinity; every value must be finite")
             object.__setattr__(self, field, array)
         count, frames = len(self.joints), len(self.root_positions)
@@ -90,11 +91,11 @@ class Motion:
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
             raise InputError(f"Motion {self.name}: rate_hz = {self.rate_hz}; it must be positive")
         object.__setattr__(self, "rotations", sign_continuous(self.rotations))
-        norms = np.linalg.norm(self.rotations, axis=-1)
-        if np.abs(norms - 1).max() > 1e-6:
-            raise InputError(
-                f"Motion {self.name}: rotations are not unit quaternions (norm {norms.min():.3g} to {norms.max():.3g})"
-            )
+        norms = (np.linalg.norm(rows, axis=-1) for (rows,) in in_blocks(self.rotations))
+        extremes = np.array([(norm.min(), norm.max()) for norm in norms])
+        least, largest = extremes[:, 0].min(), extremes[:, 1].max()
+        if least < 1 - 1e-6 or largest > 1 + 1e-6:
+            raise InputError(f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})")
         last = self.first_frame_s + (frames - 1) / self.rate_hz
         if self.first_frame_s > 0 or (self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S):
             raise InputError(
@@ -118,7 +119,7 @@ class Motion:
     @cached_property
     def positions(self) -> NDArray[np.float64]:
         """Joints at the frames, (frame, joint, 3) [m], world."""
-        return self._forward(self.root_positions, self.rotations)
+        return spooled(self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations))
 
     # -- at any time -----------------------------------------------------------------------------------------------
 
@@ -183,6 +184,7 @@ class Motion:
                 frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
                 times = self.first_frame_s + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
                 found = PchipInterpolator(times, self.root_positions[frames]), CubicSpline(times, self.rotations[frames])
+                let_go(self.root_positions, self.rotations)
                 while len(self._kept_splines) >= _STRETCHES_KEPT:
                     self._kept_splines.pop(next(iter(self._kept_splines)))
                 self._kept_splines[stretch] = found
@@ -215,9 +217,8 @@ class Motion:
         """
         if not (math.isfinite(factor) and factor > 0):
             raise InputError(f"Motion.scaled: factor = {factor}; it must be positive")
-        return dataclasses.replace(
-            self, offsets=self.offsets * factor, root_positions=self.root_positions * factor, girth=self.girth * factor
-        )
+        moved = spooled(roots * factor for (roots,) in in_blocks(self.root_positions))
+        return dataclasses.replace(self, offsets=self.offsets * factor, root_positions=moved, girth=self.girth * factor)
 
     def turned(self, yaw_rad: float) -> Motion:
         """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above.
@@ -232,10 +233,17 @@ class Motion:
         Motion
         """
         half = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
-        x, y, z, w = (self.rotations[..., k] for k in range(4))
         s, c = half[2], half[3]
-        turned = np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
-        return dataclasses.replace(self, root_positions=rotate(half, self.root_positions), rotations=turned)
+
+        def turned(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+            x, y, z, w = (rotations[..., k] for k in range(4))
+            return np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
+
+        return dataclasses.replace(
+            self,
+            root_positions=spooled(rotate(half, roots) for (roots,) in in_blocks(self.root_positions)),
+            rotations=spooled(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
+        )
 
     def shifted(self, by_m: ArrayLike) -> Motion:
         """The same motion moved by ``by_m`` (3,) [m].
@@ -249,4 +257,5 @@ class Motion:
         -------
         Motion
         """
-        return dataclasses.replace(self, root_positions=self.root_positions + np.asarray(by_m, dtype=np.float64))
+        moved = spooled(roots + np.asarray(by_m, dtype=np.float64) for (roots,) in in_blocks(self.root_positions))
+        return dataclasses.replace(self, root_positions=moved)

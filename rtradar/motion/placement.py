@@ -12,6 +12,7 @@ from rtradar.errors import InputError
 from rtradar.motion.joints import to_nodes
 from rtradar.motion.motion import Motion
 from rtradar.motion.names import NODES
+from rtradar.spool import column
 
 MARGIN_FRAMES = 16
 """Frames kept before and after the interval, where there are any.
@@ -124,7 +125,8 @@ def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
 
 def hip_headings(nodes: Motion) -> NDArray[np.float64]:
     """Horizontal unit vectors (frame, 2) that the hips face: from right to left hip, turned clockwise by 90 degrees."""
-    left = nodes.positions[:, NODES.index("l_hip"), :2] - nodes.positions[:, NODES.index("r_hip"), :2]
+    hips = [column(nodes.positions, NODES.index(hip)) for hip in ("l_hip", "r_hip")]
+    left = hips[0][:, :2] - hips[1][:, :2]
     return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
 
 

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
+
+from rtradar.spool import in_blocks, spooled
 
 
 def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -28,10 +32,23 @@ def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
 
 def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose the sign of each quaternion (frame, ..., 4) so that it lies in the half-space of the frame before it."""
-    if len(quaternions) < 2:
-        return quaternions
-    same_side = np.sum(quaternions[1:] * quaternions[:-1], axis=-1) >= 0
-    if same_side.all():
+    if all(same_side.all() for _, same_side in _sides(quaternions)):
         return quaternions  # not copied: a recording that was only moved shares its rotations with the one before
-    signs = np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
-    return np.concatenate([quaternions[:1], quaternions[1:] * signs[..., None]])
+    return spooled(_turned_over(quaternions))
+
+
+def _turned_over(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+    sign = np.ones(quaternions.shape[1:-1])
+    for frames, same_side in _sides(quaternions):
+        signs = sign * np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
+        sign = signs[-1]
+        yield frames * signs[..., None]
+
+
+def _sides(quaternions: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+    """Some frames at a time, and whether each is in the half-space of the frame before it; the first frame is in its own."""
+    before = quaternions[:1]
+    for (frames,) in in_blocks(quaternions):
+        with_before = np.concatenate([before, frames])
+        yield frames, np.sum(with_before[1:] * with_before[:-1], axis=-1) >= 0
+        before = with_before[-1:]

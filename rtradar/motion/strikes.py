@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from rtradar.motion.figure import (
     UPPER_ARM,
     Array,
     Pose,
+    PosesAt,
     reach_arm,
     roll_about_toe,
     swing_arm,
@@ -41,12 +43,14 @@ KICK_PERIOD_S = 1.5
 """One kick and a short rest."""
 
 
-def kick(t: Array, duration_s: float, traits: Traits) -> Pose:
-    """Poses of front kicks of one leg at times (n,), facing +x.
+def kick(duration_s: float, traits: Traits) -> PosesAt:
+    """Front kicks of one leg, facing +x, for as long as there are times."""
+    del duration_s
+    return partial(_kick, traits)
 
-    The leg is led by its joint angles in the air (chamber, snap, chamber) and by its footprint on the floor.
-    """
-    del duration_s  # kicks go on for as long as there are times
+
+def _kick(traits: Traits, t: Array) -> Pose:
+    """The leg is led by its joint angles in the air (chamber, snap, chamber) and by its footprint on the floor."""
     height, kicker, other = traits.height_m, traits.side, traits.other
     clock = repeated(t, traits, KICK_PERIOD_S, 0.25)
     # A low kick needs nearly as high a knee, or the foot would scrape the floor.
@@ -119,9 +123,13 @@ PUNCH_PERIOD_S = 1.05
 """One punch and a short rest."""
 
 
-def punch(t: Array, duration_s: float, traits: Traits) -> Pose:
-    """Poses of straight punches of the rear hand at times (n,), facing +x."""
+def punch(duration_s: float, traits: Traits) -> PosesAt:
+    """Straight punches of the rear hand, facing +x, for as long as there are times."""
     del duration_s
+    return partial(_punch, traits)
+
+
+def _punch(traits: Traits, t: Array) -> Pose:
     height, hand, other = traits.height_m, traits.side, traits.other
     clock = repeated(t, traits, PUNCH_PERIOD_S, 0.25)
     # The hips lead, the hand follows and arrives last; then it comes back more slowly.

@@ -9,14 +9,16 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from rtradar.errors import InputError
-from rtradar.motion.figure import Array, Pose, build_motion, lowering
+from rtradar.motion.figure import PosesAt, lowering, offsets, rotations
 from rtradar.motion.gait import walk
 from rtradar.motion.jacks import jumping_jack
 from rtradar.motion.motion import Motion
+from rtradar.motion.names import NODE_PARENT, NODES
 from rtradar.motion.strikes import kick, punch
 from rtradar.motion.traits import Traits, draw_traits
+from rtradar.spool import Spool, in_blocks
 
-ACTIVITIES: Mapping[str, Callable[[Array, float, Traits], Pose]] = {
+ACTIVITIES: Mapping[str, Callable[[float, Traits], PosesAt]] = {
     "walk": walk,
     "kick": kick,
     "punch": punch,
@@ -107,15 +109,25 @@ def synthetic_motion(
     traits = draw_traits(np.random.default_rng(own), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
     if take:
         traits = dataclasses.replace(traits, phase=float(np.random.default_rng([*own, int(take)]).uniform()))
-    t = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
-    pose = ACTIVITIES[activity](t, duration_s, traits)
-    root = pose.root - [0.0, 0.0, lowering(pose, height_m)]
-    motion = build_motion(
-        dataclasses.replace(pose, root=root),
+    poses_at = ACTIVITIES[activity](duration_s, traits)
+    times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
+    down = [0.0, 0.0, max(lowering(poses_at(some), height_m) for (some,) in in_blocks(times))]
+    roots, turned = Spool(), Spool()
+    for (some,) in in_blocks(times):
+        pose = poses_at(some)
+        pose = dataclasses.replace(pose, root=pose.root - down)
+        roots.append(pose.root)
+        turned.append(rotations(pose, height_m))
+    bones = offsets(height_m)
+    motion = Motion(
         name=f"synthetic:{activity}",
-        height_m=height_m,
-        girth=build * height_m / 1.75,
+        joints=NODES,
+        parents=(-1, *(NODES.index(NODE_PARENT[node]) for node in NODES[1:])),
+        offsets=np.array([bones[node] for node in NODES]),
+        root_positions=roots.rows(),
+        rotations=turned.rows(),
         rate_hz=rate_hz,
         length_s=duration_s,
+        girth=build * height_m / 1.75,
     )
     return motion.turned(math.pi)

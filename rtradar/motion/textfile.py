@@ -3,29 +3,39 @@
 from __future__ import annotations
 
 import math
-import re
+from collections.abc import Generator
 from pathlib import Path
+
+from tqdm import tqdm
 
 from rtradar.errors import InputError
 
-_MOST_BYTES = 100_000_000
+FRAMES_AT_ONCE = 512
+"""Frames that are held as Python's numbers, which take four times the memory of an array's."""
+
+_MOST_BYTES = 2_000_000_000
+_MOST_CHARACTERS = 1_000_000
+"""In a line."""
+
 _MOST_JOINTS = 1000
-_MOST_POSES = 10_000_000
+_MOST_POSES = 100_000_000
 _LARGEST = 1e9
 """In whatever unit: a thousand kilometres in millimetres, a million turns in degrees."""
 
-_LINE_END = re.compile(r"\r\n|\r|\n")
+_LOOKED_AT_FIRST = 65_536
+_LONG_BYTES = 20_000_000  # some 3 s
+_CHARACTERS_A_STEP = 1_000_000
 
 
-def read_lines(path: Path, kind: str) -> list[str]:
-    """Lines of a text file, without their ends.
+def read_lines(path: Path, kind: str) -> Generator[str]:
+    """Lines of a text file, one after the other, with a bar where it takes long; to be closed before an error is told.
 
     Latin-1, for every byte is a character there and only comments use more than ASCII; line ends may be mixed.
 
     Raises
     ------
     InputError
-        Where the file is not there, is a directory, is empty, is binary, or is larger than 100 MB (half an hour at 120 Hz).
+        Where the file is not there, is a directory, is empty, is binary, or is larger than 2 GB (some six hours at 120 Hz).
     """
     if path.is_dir():
         raise InputError(f"{path}: a directory; give one {kind} file")
@@ -35,18 +45,33 @@ def read_lines(path: Path, kind: str) -> list[str]:
             raise InputError(
                 f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
             )
-        data = path.read_bytes()
+        with path.open("rb") as start:
+            if b"\0" in start.read(_LOOKED_AT_FIRST):
+                raise InputError(f"{path}: binary data; expected {kind} text")
+        # On a terminal; a bar starts a thread, which small files are not worth.
+        silent = None if size > _LONG_BYTES else True
+        bar = tqdm(total=size, desc=f"reading {path.name}", unit="B", unit_scale=True, leave=False, disable=silent)
+        with path.open(encoding="latin-1") as file, bar:
+            blank, behind = True, 0
+            while line := file.readline(_MOST_CHARACTERS + 1):
+                if "\0" in line:
+                    raise InputError(f"{path}: binary data; expected {kind} text")
+                if len(line) > _MOST_CHARACTERS:
+                    raise InputError(f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text")
+                blank = blank and not line.strip()
+                behind += len(line)
+                if behind > _CHARACTERS_A_STEP:
+                    bar.update(behind)
+                    behind = 0
+                yield line
     except OSError as error:
         raise InputError(f"{path}: cannot read this {kind} file ({error.strerror}); check the path") from None
-    if not data.strip():
+    if blank:
         raise InputError(f"{path}: empty; expected {kind} text")
-    if b"\0" in data:
-        raise InputError(f"{path}: binary data; expected {kind} text")
-    return _LINE_END.split(data.decode("latin-1"))
 
 
 def check_size(path: Path, joints: int, frames: int = 1) -> None:
-    """Refuse what would take more memory than a person's motion does: 1000 joints, or ten million poses of one."""
+    """Refuse what would take more room than a person's motion does: 1000 joints, or a hundred million poses of one."""
     if joints > _MOST_JOINTS:
         raise InputError(f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others out")
     if joints * frames > _MOST_POSES:

@@ -16,6 +16,7 @@ from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter import Rung
 from rtradar.scatter.poses import anchor_step
 from rtradar.signal import in_band
+from rtradar.spool import Spool, let_go
 
 _CHIRPS_AT_ONCE = 64
 
@@ -105,7 +106,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     """
     chirps = np.arange(0, n_chirps, anchor_step(radar))
     n_parts = len(body.part_names)
-    power_at, hidden_at = np.zeros((len(chirps), n_parts)), np.zeros((len(chirps), n_parts))
+    powers, shares_hidden = Spool(), Spool()
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts: set[str] = set()
     seen_in_band = False
@@ -118,12 +119,13 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         inside = in_band(echoes, radar)
         seen_in_band |= bool(inside.any())
         concerned["beyond_range"] += float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
-        by_part = power_at[first : first + len(chosen)]
+        by_part = np.zeros((len(chosen), n_parts))
         np.add.at(by_part.T, echoes.part, power.mean(axis=1).T)
+        powers.append(by_part)
         seen = np.zeros((len(chosen), echoes.length.shape[1], n_parts), dtype=bool)
         for echo, part in enumerate(echoes.part):
             seen[..., part] |= power[..., echo] > 0
-        hidden_at[first : first + len(chosen)] = 1 - seen.mean(axis=1)
+        shares_hidden.append(1 - seen.mean(axis=1))
         small = _small_curvature(radar, body, times)
         concerned["small_curvature"] += float((by_part * small).sum())
         small_parts |= {body.part_names[part] for part in np.flatnonzero((by_part * small).sum(axis=0))}
@@ -133,9 +135,11 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
             f"the person is never within the range of radar '{radar.name}', {radar.max_range_m:.2f} m; place the radar "
             "nearer (position_m) or raise samples_per_chirp"
         )
+    power_at, hidden_at = powers.rows(), shares_hidden.rows()
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
     looked_at = radar.centres_of(chirps)
     power = float(power_at.sum())
+    let_go(power_at)
     if power == 0:
         # A point of 1 m^2 at the world's origin stands in for the person.
         warnings.warn(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+from rtradar import spool
+from rtradar.motion import Motion, amc, bvh
 
 ASF = """# a comment
 :version 1.10
@@ -63,3 +68,29 @@ def asf_files(tmp_path: Path) -> tuple[Path, Path]:
     asf.write_bytes(ASF.replace("\n", "\r\n").encode("latin-1"))
     amc.write_bytes(AMC.replace("\n", "\r\n", 2).encode("latin-1"))
     return amc, asf
+
+
+@pytest.fixture
+def in_pieces(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
+    """From then on blocks are of three or four frames, and wait in files."""
+
+    def cut() -> None:
+        monkeypatch.setattr(spool, "_MOST_IN_MEMORY", 0)
+        monkeypatch.setattr(spool, "_ROWS_AT_ONCE", 3)
+        for reader in (amc, bvh):
+            monkeypatch.setattr(reader, "FRAMES_AT_ONCE", 4)
+
+    return cut
+
+
+@pytest.fixture
+def same() -> Callable[[Motion, Motion], None]:
+    """Holds one motion to another."""
+
+    def same(ours: Motion, theirs: Motion) -> None:
+        assert ours.joints == theirs.joints
+        # Rounding of arrays of other lengths, of which the processor takes several numbers at once.
+        for name in ("offsets", "root_positions", "rotations", "positions"):
+            np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=1e-14, err_msg=name)
+
+    return same

@@ -1,12 +1,13 @@
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion import load_motion
+from rtradar.motion import Motion, load_motion
 
 BVH = """HIERARCHY
 ROOT hip
@@ -134,3 +135,20 @@ def test_stretching_bone_is_refused(tmp_path: Path) -> None:
 def test_skeleton_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="its own skeleton"):
         load_motion(write(tmp_path, BVH), tmp_path / "x.asf")
+
+
+@pytest.mark.parametrize("frames", [2, 3, 4, 5, 8, 11])
+def test_bvh_in_pieces(
+    tmp_path: Path, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None], frames: int
+) -> None:
+    head = CARRIED[: CARRIED.index("Frames:")]
+    rows = [f"0 0 {10 * k}  {k} 100 0 {20 * k} 0 0  0 -40 {0.01 * k} 0 {3 * k} 0" for k in range(frames)]
+    path = tmp_path / "long.bvh"
+    path.write_text(head + f"Frames: {frames}\nFrame Time: 0.01\n" + "\n".join(rows))
+    whole = load_motion(path)
+    assert len(whole.root_positions) == frames
+    in_pieces()
+    same(load_motion(path), whole)
+    path.write_text(head + f"Frames: {frames + 1}\nFrame Time: 0.01\n" + "\n".join(rows))
+    with pytest.raises(InputError, match=f"{frames} frames where the header promises {frames + 1}"):
+        load_motion(path)

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -149,3 +150,11 @@ def test_multiply_is_composition() -> None:
     np.testing.assert_allclose(
         Rotation.from_quat(multiply(a.as_quat(), b.as_quat())).as_matrix(), (a * b).as_matrix(), atol=1e-12
     )
+
+
+@pytest.mark.parametrize("spine", [("Spine",), tuple("abcde")])
+def test_nodes_in_pieces(spine: tuple[str, ...], in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]) -> None:
+    motion = bvh_like(spine)  # feet, hands and, of five joints, a spine that point along chains
+    whole = to_nodes(motion)
+    in_pieces()
+    same(to_nodes(motion), whole)
