@@ -12,6 +12,7 @@ import numpy as np
 
 from rtradar.body import Body
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.gpu import has_nvidia_gpu
 from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
@@ -20,12 +21,13 @@ from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.process import FftDevices, fastest_fft_devices
 from rtradar.radar import Radar
-from rtradar.scatter import Rung, build_rung
+from rtradar.scatter import Rung, build_rung, takes_backend
 from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
 from rtradar.signal import Noise
+from rtradar.trace.backend import select
 
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
@@ -61,6 +63,8 @@ def prepare(
             raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
         radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
     walled = bool(scene.walls or scene.furniture)
+    if variant == "auto" and has_nvidia_gpu() and (walled or takes_backend(fidelity)):
+        select(variant)  # which times rays, and must not do so beside another process that compiles
     with processing_compiled_beside():
         with stages.time("motion"):
             radar = scene.place(radar)

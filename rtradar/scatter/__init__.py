@@ -1,6 +1,6 @@
 """The fidelity ladder: from a posed body to `Echoes`, one module a rung."""
 
-from rtradar.scatter.ladder import RUNGS, build_rung, register_rung
+from rtradar.scatter.ladder import RUNGS, build_rung, register_rung, takes_backend
 from rtradar.scatter.poses import Accountable, Rung, chirp_poses, one_echo_a_part
 from rtradar.scatter.scattering_length import scattering_length
 
@@ -13,4 +13,5 @@ __all__ = [
     "one_echo_a_part",
     "register_rung",
     "scattering_length",
+    "takes_backend",
 ]

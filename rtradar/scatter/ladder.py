@@ -80,6 +80,23 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
     return through_antennas(rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body), radar, body)
 
 
+def takes_backend(fidelity: str) -> bool:
+    """Whether the rung of that name asks Mitsuba.
+
+    Parameters
+    ----------
+    fidelity : str
+        One of `RUNGS`.
+
+    Returns
+    -------
+    bool
+    """
+    kind = RUNGS.find(fidelity)
+    with RUNGS.guarded(fidelity):
+        return "variant" in inspect.signature(kind).parameters
+
+
 class _Checked:
     """A rung of another package, which must give what the rest relies on."""
 
