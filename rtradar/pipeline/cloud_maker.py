@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ SPATIAL_POINTS = 30_000
 
 RANGE_TIME_S = 5e-3
 """Step of the range-time map, which pieces of a block are whole numbers of."""
+
+_CELLS_AT_ONCE = 1024
+"""Whose spectra in every channel are there at once, 7 kB each; a window of a person has some hundreds."""
 
 _PIECE_BYTES = 8e6
 """IF samples at once: some of it stays in a processor's cache, and threads still have enough to share."""
@@ -131,4 +134,17 @@ def window_angles(cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], ra
     """Angle spectra of the detected cells of one window."""
     rows, columns = np.nonzero(mask)
     velocity = radar.velocity_mps(radar.cycles_per_frame)
-    return angle_spectra(cell_spectra(cube, radar, rows, columns), radar, radar.range_m[rows], velocity[columns])
+    pieces = []
+    for first in range(0, max(len(rows), 1), _CELLS_AT_ONCE):
+        row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
+        values = cell_spectra(cube, radar, row, column)
+        pieces.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
+    return pieces[0] if len(pieces) == 1 else _joined(pieces)
+
+
+def _joined(pieces: list[AngleSpectra]) -> AngleSpectra:
+    def column(name: str) -> Any:
+        parts = [getattr(piece, name) for piece in pieces]
+        return None if parts[0] is None else np.concatenate(parts)
+
+    return AngleSpectra(pieces[0].sines, column("y"), column("z"), column("range_m"), column("velocity"))
