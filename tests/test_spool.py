@@ -94,7 +94,12 @@ def test_what_waits_in_a_file_is_no_memory() -> None:
 
 def limited(limit: str, value: int, code: str) -> subprocess.CompletedProcess[str]:
     """Code in a process of its own, in which one resource has a limit."""
-    begin = f"import resource, numpy as np\nfrom rtradar import spool\nfrom rtradar.spool import spooled\nresource.setrlimit(resource.{limit}, ({value},) * 2)\n"
+    begin = f"""
+import resource, numpy as np
+from rtradar import spool
+from rtradar.spool import spooled
+resource.setrlimit(resource.{limit}, ({value},) * 2)
+"""
     return subprocess.run([sys.executable, "-W", "error", "-c", begin + code], capture_output=True, text=True, check=False)
 
 
