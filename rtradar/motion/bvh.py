@@ -74,8 +74,7 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     top = _carrier(joints, values)
     kept = [j for j in range(len(joints)) if top in _chain(joints, j)]
     renumber = {j: k for k, j in enumerate(kept)}
-    offsets = np.array([np.median(_places(joints[j], values), axis=0) for j in kept])
-    offsets[0] = 0.0
+    offsets = np.array([np.zeros(3), *(np.median(_places(joints[j], values), axis=0) for j in kept[1:])])
     scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
     if not 0 < scale < np.inf:
         raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
