@@ -132,6 +132,8 @@ def _bone_line(bone: Bone, key: str, words: list[str], bones: dict[str, Bone], p
     if key == "name":
         if len(words) != 2:
             raise fail(path, line, "a bone needs one name")
+        if bone.name:
+            raise fail(path, line, f"bone {bone.name!r} gets a second name; every bone needs its own begin ... end")
         bone.name = words[1]
         if bone.name in bones:
             raise fail(path, line, f"bone {bone.name!r} is there twice; names must differ")

@@ -61,6 +61,7 @@ def test_bad_amc_says_where(asf_files: tuple[Path, Path], old: str, new: str, wo
     ("old", "new", "words"),
     [
         ("name second", "name first", ["two.asf, line 24", "twice"]),
+        ("length 10\n", "length 10\n    name third\n", ["two.asf, line 19", "'first' gets a second name"]),
         ("first second", "first third", ["two.asf, line 33", "'third'"]),
         ("    first second\n", "", ["two.asf, line 22", "'second'", "does not hang"]),
         ("dof rx\n", "dof l\n", ["two.asf, line 28", "only rx, ry, rz"]),
