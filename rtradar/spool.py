@@ -67,8 +67,7 @@ class Spool:
                 f"a long recording, {self._bytes / 1e6:.0f} MB so far, finds no room in {tempfile.tempdir or 'any folder'} "
                 f"for temporary files ({error.strerror}); let the environment variable TMPDIR name one that has some"
             ) from None
-        del self._waiting[1:]
-        self._waiting[0] = self._waiting[0][:0]  # which keeps the shape of a row
+        self._waiting = [np.empty((0, *rows.shape[1:]))]  # which keeps the shape of a row, and none of the memory
 
     def rows(self) -> NDArray[np.float64]:
         """All rows so far, at least one block of them; to be asked for once."""

@@ -19,8 +19,8 @@ from rows import Row, judged, main, reported
 
 LIMIT_MB = 3000.0
 
-# A recording waits in a file from 1 MB on, 9 s of a synthetic actor: 2 MB of some 400 from 3 s to 12 s, as made and placed. Peaks
-# of one and the same run differ by 0.1 % from process to process. Were the IF samples held, it would be gigabytes.
+# A recording waits in a file from 1 MB on: it takes at most 2 MB of some 400, as made and placed. Peaks of one and the same run
+# differ by 0.1 % from process to process. Were the IF samples held, it would be gigabytes.
 GROWTH = 1.01
 
 # Ten times as long: held twice, the recording alone would add 45 MB to some 330, its survey 9. What may grow is the heap.

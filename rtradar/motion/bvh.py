@@ -74,12 +74,16 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     top = _carrier(joints, values)
     kept = [j for j in range(len(joints)) if top in _chain(joints, j)]
     renumber = {j: k for k, j in enumerate(kept)}
-    offsets = np.array([np.zeros(3), *(np.median(_places(joints[j], values), axis=0) for j in kept[1:])])
+    offsets, spreads = np.zeros((len(kept), 3)), np.zeros(len(kept))
+    for k, j in enumerate(kept[1:], start=1):
+        places = _places(joints[j], values)
+        offsets[k] = np.median(places, axis=0)
+        spreads[k] = np.linalg.norm(places - offsets[k], axis=1).max()
     scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
     if not 0 < scale < np.inf:
         raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
     for k, j in enumerate(kept[1:], start=1):
-        stretch = float(np.linalg.norm(_places(joints[j], values) - offsets[k], axis=1).max()) * scale
+        stretch = spreads[k] * scale
         if stretch > _STRETCH_M:
             raise fail(
                 path, joints[j].line, f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid"

@@ -109,6 +109,7 @@ def synthetic_motion(
     traits = draw_traits(np.random.default_rng(own), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
     if take:
         traits = dataclasses.replace(traits, phase=float(np.random.default_rng([*own, int(take)]).uniform()))
+    # Asked for twice: how far down all must come is not known before the last, and too many would have to be kept.
     poses_at = ACTIVITIES[activity](duration_s, traits)
     times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
     down = [0.0, 0.0, max(lowering(poses_at(some), height_m) for (some,) in in_blocks(times))]

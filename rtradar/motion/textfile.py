@@ -23,7 +23,7 @@ _LARGEST = 1e9
 """In whatever unit: a thousand kilometres in millimetres, a million turns in degrees."""
 
 _LOOKED_AT_FIRST = 65_536
-_LONG_BYTES = 20_000_000  # some 3 s
+_LONG_BYTES = 20_000_000
 _CHARACTERS_A_STEP = 1_000_000
 
 

@@ -75,7 +75,7 @@ def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto"
             if dial not in known:
                 raise InputError(f"fidelity '{fidelity}' has no dial '{dial}'; it has: {', '.join(known) or 'none'}")
         # What traces nothing takes no backend.
-        backend = {"variant": variant} if "variant" in taken else {}
+        backend = {"variant": variant} if takes_backend(fidelity) else {}
         rung: Rung = kind(radar, body, spreading=spreading, **backend, **dials)
     return through_antennas(rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body), radar, body)
 
