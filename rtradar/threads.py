@@ -56,10 +56,14 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
                 failed[place] = error
                 deque(left, maxlen=0)  # nobody begins another
 
-    helpers = [_pool().submit(take) for _ in range(min(len(items), thread_count()) - 1)]
+    shared = [take]
+    helpers = [_pool().submit(_all_of, shared) for _ in range(min(len(items), thread_count()) - 1)]
     take()
     # Who has not woken by now has nothing left to do.
     awake = [helper for helper in helpers if not helper.cancel()]
+    # What is cancelled stays in the pool's queue until a thread wakes, on a busy machine for seconds, and is not to keep
+    # the arrays of this work, and of all that follows, until then.
+    shared.clear()
     try:
         wait(awake)
     except BaseException:  # an interrupt: nobody works on behind the back of who has left
@@ -69,6 +73,11 @@ def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
     if failed:
         raise failed[min(failed)]
     return results
+
+
+def _all_of(shared: list[Callable[[], None]]) -> None:
+    for take in shared:
+        take()
 
 
 @lru_cache(maxsize=1)

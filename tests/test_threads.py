@@ -7,7 +7,10 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from collections.abc import Callable
+from concurrent.futures import wait
+from functools import partial
 
 import pytest
 
@@ -74,6 +77,26 @@ def test_after_an_interrupt_nobody_works_on(monkeypatch: pytest.MonkeyPatch) -> 
 def test_work_may_itself_be_shared_among_threads() -> None:
     found = in_threads(lambda item: sum(in_threads(lambda other: item * other, range(8))), range(8))
     assert found == [28 * item for item in range(8)]
+
+
+@pytest.mark.usefixtures("four_threads")
+def test_work_is_not_kept_for_threads_that_have_not_woken() -> None:
+    class Array:
+        """Stands for one that is large."""
+
+    def work(item: int, array: Array) -> None:
+        pass
+
+    array, done = Array(), threading.Event()
+    gone = weakref.ref(array)
+    asleep = [threads._pool().submit(done.wait, 60) for _ in range(3)]  # as on a machine that is busy with other things
+    try:
+        in_threads(partial(work, array=array), range(8))
+        del array
+        assert gone() is None
+    finally:
+        done.set()
+        wait(asleep)
 
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
