@@ -192,6 +192,7 @@ def run(
         finally:
             products.close()
         del products  # its windows are the largest arrays, and pictures need room
+        give_back_memory()
         if not len(clouds.rdt.points):
             warnings.warn("nothing was detected: the clouds are empty", ValidityWarning, stacklevel=2)
         with stages.time("write"):
