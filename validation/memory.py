@@ -1,4 +1,4 @@
-"""Peak memory and seconds a stage of whole runs, each in a process of its own: short ones and long ones; and of reading an hour.
+"""Peak memory and seconds a stage of whole runs, each in a process of its own: short, long, starved; and of reading an hour.
 
 Memory is to be below 3 GB at 77 GHz and not to grow with the recording. Seconds are reported: they are of this machine.
 
@@ -26,6 +26,9 @@ GROWTH = 1.01
 # Ten times as long: held twice, the recording alone would add 45 MB to some 330, its survey 9. What may grow is the heap.
 LONG_GROWTH = 1.03
 SMALL_RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nsamples_per_chirp = 128\nchirp_duration_s = 500e-6\n"
+
+# What waits for a thread is to hold nothing; did it, each second of the capture would add some 700 MB.
+STARVED_GROWTH = 1.02
 
 # Of some 90 MB, most of which is Python and its packages; an hour of 30 joints takes 400 MB as an array.
 READING_GROWTH = 1.05
@@ -57,6 +60,38 @@ def long_runs(short_s: float, long_s: float) -> list[Row]:
             for seconds, one in found.items()
         ),
     ]
+
+
+def starved(duration_s: float) -> list[Row]:
+    """A run whose threads but one never wake, the worst that other work on the machine can do to it."""
+    peak = {}
+    for awake in (True, False):
+        with tempfile.TemporaryDirectory() as folder:
+            command = [sys.executable, "-W", "ignore", "-c", STARVED, str(int(awake)), str(duration_s), folder]
+            peak[awake] = float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+    claim = f"paper-12ghz, analytic, {duration_s:g} s"
+    growth = "peak memory, one thread awake over all"
+    return [judged(claim, growth, "1", peak[False] / peak[True], STARVED_GROWTH, says=f"a whole run: {growth}")]
+
+
+STARVED = """
+import sys, threading
+import rtradar as rt
+from rtradar.motion import synthetic_motion
+from rtradar.threads import in_threads, thread_count
+awake, duration_s, out = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
+asleep = threading.Event()
+if not awake:
+    taken = threading.Barrier(thread_count() + 1)
+    hold = lambda item: (taken.wait(), asleep.wait())
+    threading.Thread(target=in_threads, args=(hold, range(thread_count())), daemon=True).start()
+    taken.wait()
+try:
+    result = rt.run(synthetic_motion("walk", duration_s=duration_s), rt.Radar.preset("paper-12ghz"), out=out, fidelity="analytic")
+finally:
+    asleep.set()
+print(result.summary["peak_memory_mb"])
+"""
 
 
 def reading(short_s: float, long_s: float) -> list[Row]:
@@ -123,6 +158,7 @@ def measure(quick: bool) -> list[Row]:
             says = f"a whole run: {growth}"
             rows.append(judged(f"{radar}, {fidelity}", growth, "1", peak[long_s] / peak[short_s], GROWTH, says=says))
     rows += long_runs(*((6.0, 30.0) if quick else (30.0, 300.0)))
+    rows += starved(1.5 if quick else 3.0)
     rows += reading(60.0, 600.0 if quick else 3600.0)
     return rows
 
