@@ -19,9 +19,11 @@ from rows import Row, judged, main, reported
 
 LIMIT_MB = 3000.0
 
-# A recording waits in a file from 1 MB on: it takes at most 2 MB of some 400, as made and placed. Peaks of one and the same run
-# differ by 0.1 % from process to process. Were the IF samples held, it would be gigabytes.
+# A recording waits in a file from 1 MB on: it takes at most 2 MB of some 400, as made and placed. Were the IF samples held, it
+# would be gigabytes. How the arrays of two threads come to lie in one heap is chance, which adds some 10 MB at 77 GHz in the
+# first second, and never takes away: so what a run needs is the least of a few.
 GROWTH = 1.01
+RUNS = 3
 
 # Ten times as long: held twice, the recording alone would add 45 MB to some 330, its survey 9. What may grow is the heap.
 LONG_GROWTH = 1.03
@@ -143,20 +145,20 @@ def measure(quick: bool) -> list[Row]:
     short_s, long_s = (1.5, 3.0) if quick else (3.0, 12.0)
     for radar in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
         for fidelity in ("specular",) if quick else ("analytic", "specular"):
-            peak = {}
-            for duration_s in (short_s, long_s):
+            peaks: dict[float, list[float]] = {short_s: [], long_s: []}
+            for duration_s in (short_s, long_s) * (1 if quick else RUNS):
                 with tempfile.TemporaryDirectory() as folder:
                     found = summary(folder, radar, fidelity, duration_s)
-                peak[duration_s] = found["peak_memory_mb"]
-                claim = f"{radar}, {fidelity}, {duration_s:g} s"
-                rows.append(judged(claim, "peak memory", "MB", peak[duration_s], LIMIT_MB, says="a whole run: peak memory"))
+                peaks[duration_s].append(found["peak_memory_mb"])
+                claim = f"{radar}, {fidelity}, {duration_s:g} s, run {len(peaks[duration_s])}"
+                rows.append(judged(claim, "peak memory", "MB", peaks[duration_s][-1], LIMIT_MB, says="a whole run: peak memory"))
                 rows.append(reported(claim, "wall", "s", found["wall_s"]))
                 rows.append(reported(claim, "real-time factor", "1", found["real_time_factor"]))
                 for stage, seconds in found["stages"].items():
                     rows.append(reported(claim, f"stage {stage}", "s", seconds))
             growth = f"peak memory, {long_s:g} s over {short_s:g} s"
-            says = f"a whole run: {growth}"
-            rows.append(judged(f"{radar}, {fidelity}", growth, "1", peak[long_s] / peak[short_s], GROWTH, says=says))
+            says, ratio = f"a whole run: {growth}", min(peaks[long_s]) / min(peaks[short_s])
+            rows.append(judged(f"{radar}, {fidelity}", f"{growth}, the least of each", "1", ratio, GROWTH, says=says))
     rows += long_runs(*((6.0, 30.0) if quick else (30.0, 300.0)))
     rows += starved(1.5 if quick else 3.0)
     rows += reading(60.0, 600.0 if quick else 3600.0)
