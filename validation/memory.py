@@ -20,8 +20,8 @@ from rows import Row, judged, main, reported
 LIMIT_MB = 3000.0
 
 # A recording waits in a file from 1 MB on: it takes at most 2 MB of some 400, as made and placed. Were the IF samples held, it
-# would be gigabytes. How the arrays of two threads come to lie in one heap is chance, which adds some 10 MB at 77 GHz in the
-# first second, and never takes away: so what a run needs is the least of a few.
+# would be gigabytes. How the arrays of two threads come to lie in one heap is chance, which adds and never takes away: so what a
+# run needs is the least of a few.
 GROWTH = 1.01
 RUNS = 3
 
@@ -29,7 +29,7 @@ RUNS = 3
 LONG_GROWTH = 1.03
 SMALL_RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nsamples_per_chirp = 128\nchirp_duration_s = 500e-6\n"
 
-# What waits for a thread is to hold nothing; did it, each second of the capture would add some 700 MB.
+# What waits for a thread is to hold nothing: the blocks of the whole capture would else be there in the end.
 STARVED_GROWTH = 1.02
 
 # Of some 90 MB, most of which is Python and its packages; an hour of 30 joints takes 400 MB as an array.
