@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
-from rtradar.report.figures import bin_edges, decibels, new_figure
+from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 
 
 def draw_range_angle(
@@ -37,7 +37,7 @@ def draw_range_angle(
         figure.colorbar(image, ax=axes, label="Power of detected cells [dB re 1 m²]")
     panels[0].set_ylabel("Range [m]")
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str) -> None:
@@ -68,4 +68,4 @@ def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArra
         axes.legend(loc="upper right")
     figure.colorbar(dots, ax=figure.axes, label="Velocity [m/s], positive receding")
     figure.suptitle(f"{title}: {len(points)} points")
-    figure.savefig(path)
+    save_figure(figure, path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures import new_figure
+from rtradar.report.figures import new_figure, save_figure
 
 History = Sequence[dict[str, float]]
 
@@ -34,7 +34,7 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]], tit
     axes.set_xticks(range(1, len(rows) + 1), [name.replace(", ", "\n", 1) for name, _ in rows], fontsize=7)
     axes.set(ylabel="Test accuracy [%]", xlabel="Classifier", title=title, ylim=(min(0.0, *(min(one) for one in percent)), 102))
     axes.grid(axis="y", alpha=0.3)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_confusion(path: Path, counts: NDArray[np.int64], classes: Sequence[str], title: str) -> None:
@@ -81,7 +81,7 @@ def draw_learning(path: Path, histories: Sequence[History], title: str) -> None:
         axes.grid(alpha=0.3)
         axes.legend()
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def _draw_matrix(
@@ -104,4 +104,4 @@ def _draw_matrix(
     axes.set_yticks(range(len(names)), names)
     axes.set(xlabel=labels[0], ylabel=labels[1], title=title)
     figure.colorbar(image, label=labels[2])
-    figure.savefig(path)
+    save_figure(figure, path)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
@@ -16,9 +16,17 @@ _DYNAMIC_RANGE_DB = 60.0
 
 def new_figure(width: float, height: float) -> Figure:
     """An empty figure of that size [inch], without a window."""
-    figure = Figure(figsize=(width, height), dpi=130, layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
+    return Figure(figsize=(width, height), dpi=130, layout="constrained")
+
+
+def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
+    """Save as PNG, and empty the figure.
+
+    Figure and axes refer to each other. Were that left to Python's collector of cycles, what one picture takes would by chance
+    still be there with the next.
+    """
+    figure.savefig(file, format="png")
+    figure.clear()
 
 
 def decibels(power: NDArray[np.floating]) -> tuple[NDArray[np.float64], float, float]:
@@ -62,7 +70,7 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
     )
     axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
     figure.colorbar(image, label="Power, mean of channels [dB re 1 m²]")
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np.bool_], radar: Radar, title: str) -> None:
@@ -94,7 +102,7 @@ def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np
     left.set_ylabel("Range [m]")
     figure.colorbar(image, ax=[left, right], label="Power, all channels [dB re 1 m²]")
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
@@ -116,4 +124,4 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"{title}: {len(points)} points")
     axes.set_box_aspect((1.6, 1, 1))
     figure.colorbar(dots, label="Velocity [m/s], positive receding", shrink=0.6, pad=0.1)
-    figure.savefig(path)
+    save_figure(figure, path)

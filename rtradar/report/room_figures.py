@@ -12,7 +12,7 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
-from rtradar.report.figures import bin_edges, decibels, new_figure
+from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 from rtradar.scene import Scene
 
 _UPRIGHT = 0.5
@@ -61,7 +61,7 @@ def draw_plan(
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def walls_in_plan(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64], str]]:
@@ -113,7 +113,7 @@ def draw_before_after(
     panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, ax=list(panels), label="Power, all channels [dB re 1 m²]")
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
@@ -171,4 +171,4 @@ def draw_range_azimuth_with_walls(
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")
-    figure.savefig(path)
+    save_figure(figure, path)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures import bin_edges, decibels, new_figure
+from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 
 
 def draw_power_over_time(
@@ -43,7 +43,7 @@ def draw_power_over_time(
     below.set(xlabel="Time [s]", ylabel=f"Less {reference} [dB]")
     for axes in (above, below):
         axes.grid(alpha=0.3)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_part_power(
@@ -82,7 +82,7 @@ def draw_part_power(
     right.set(xlabel="Hidden [% of time and channels]", xlim=(0, 100))
     for axes in (left, right):
         axes.grid(alpha=0.3)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_maps(
@@ -117,7 +117,7 @@ def draw_maps(
     columns[0].set_ylabel(up[0])
     figure.colorbar(image, ax=list(columns), label="Power [dB re 1 m²]")
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)
 
 
 def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title: str) -> None:
@@ -143,4 +143,4 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
         axes.set_box_aspect((1.5, 1, 1))
     figure.suptitle(title)
-    figure.savefig(path)
+    save_figure(figure, path)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures import bin_edges, decibels, new_figure
+from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 
 
 def draw_spectrogram(
@@ -34,4 +34,4 @@ def draw_spectrogram(
     image = axes.imshow(values.T, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
     axes.set(xlabel="Time [s]", ylabel="Velocity [m/s], positive receding", title=title)
     figure.colorbar(image, label="Power, one channel [dB re 1 m²]")
-    figure.savefig(path)
+    save_figure(figure, path)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
 from rtradar.files import atomic_file
-from rtradar.report.figures import new_figure
+from rtradar.report.figures import new_figure, save_figure
 from rtradar.report.levels import Levels
 from rtradar.report.linked import Linked
 from rtradar.report.linked_page import VELOCITY_COLOURS
@@ -52,7 +52,7 @@ def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "pa
         artist.set_clip_on(False)
         artist.set_in_layout(False)
     with atomic_file(path) as file:
-        figure.savefig(file, format="png")
+        save_figure(figure, file)
 
 
 class _Paint:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import gc
+import pickle
 from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
 
 import rtradar as rt
 from rtradar.report import draw_before_after, draw_range_doppler, draw_range_time
+from rtradar.report.figures import new_figure, save_figure
 
 RADAR = rt.Radar(samples_per_chirp=16, tx_y=1, tx_z=0, rx_y=2, rx_z=0)
 POWER = np.random.default_rng(0).exponential(size=(16, 8))
@@ -20,7 +24,8 @@ MASK = POWER > 2
 def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Every figure that is saved, instead of its file."""
     figures: list[Figure] = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, path: figures.append(figure))
+    # As it was then, for afterwards it is emptied.
+    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(pickle.loads(pickle.dumps(figure))))
     return figures
 
 
@@ -42,3 +47,18 @@ def test_a_legend_says_once_what_dots_and_circles_are(drawn: list[Figure], ghost
     legend = drawn[0].axes[0].get_legend()
     assert legend is not None
     assert [text.get_text() for text in legend.get_texts()] == ["detected", "ghost over a wall, predicted"]
+
+
+def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path: Path) -> None:
+    """Without the collector of cycles, whose coming is chance."""
+    gc.collect()
+    gc.disable()
+    try:
+        figure = new_figure(4, 3)
+        figure.add_subplot().imshow(POWER)
+        save_figure(figure, tmp_path / "out.png")
+        assert not any(type(one) is RendererAgg for one in gc.get_objects())  # proxies would answer isinstance
+    finally:
+        gc.enable()
+    assert figure.axes == []
+    assert (tmp_path / "out.png").stat().st_size > 1000
