@@ -5,6 +5,8 @@ A window has some hundred detected cells among 30 000 to 170 000, in a few dozen
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +16,9 @@ from rtradar.process.steering import range_walk
 from rtradar.process.tapers import hann
 from rtradar.radar import Radar
 from rtradar.threads import in_threads
+
+_CACHE_BYTES = 2_500_000
+"""What a thread transforms at once: several channels of a short window, of a long one (77 GHz: 666 cycles) each by itself."""
 
 
 def cell_spectra(
@@ -68,14 +73,22 @@ def cell_spectra(
     used, place = np.unique(steps, return_inverse=True)
     place = place.reshape(steps.shape)
 
-    def transform(tx: int) -> None:
-        # One Tx at a time fits the cache of a core, and its channels lie side by side in what is filled.
-        weighted = np.take(cube[:, tx], used, axis=2)
+    # Before the range bins in use are picked out, NumPy copies all of them.
+    at_once = radar.n_rx
+    while at_once > 1 and n_cycles * at_once * n_range * cube.itemsize > _CACHE_BYTES:
+        at_once = math.ceil(at_once / 2)
+    batches = math.ceil(radar.n_rx / at_once)
+
+    def transform(item: int) -> None:
+        # Channels of one Tx lie side by side in what is filled.
+        tx, rx = item // batches, item % batches * at_once
+        weighted = np.take(cube[:, tx, rx : rx + at_once], used, axis=2)
         weighted *= weights
         doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
-        values[:, :, tx * radar.n_rx : (tx + 1) * radar.n_rx] = doppler[turns, :, place]
+        first = tx * radar.n_rx + rx
+        values[:, :, first : first + weighted.shape[1]] = doppler[turns, :, place]
 
-    in_threads(transform, range(radar.n_tx))
+    in_threads(transform, range(radar.n_tx * batches))
     return values
 
 
