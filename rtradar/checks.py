@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import DTypeLike, NDArray
 
 from rtradar.errors import InputError
 
@@ -58,6 +60,17 @@ def check_text(where: str, key: str, value: object) -> str:
     if isinstance(value, str) and value.strip() and value.isprintable():
         return value
     raise InputError(f"{where}: {key} = {shown(value)}; it must be a string of one line, not empty")
+
+
+def array_to_fill(where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+    """The array that was given to be filled; where none was, a new one."""
+    if out is None:
+        return np.empty(shape, dtype=dtype)
+    if out.shape == shape and out.dtype == dtype and out.flags.carray:
+        return out
+    raise ValueError(
+        f"{where}: out has shape {out.shape}, type {out.dtype}; it must have {shape}, {np.dtype(dtype)}, C-contiguous, writeable"
+    )
 
 
 def _number(value: object) -> float | None:

@@ -30,7 +30,7 @@ class Taker(Protocol):
     piece: int
 
     def take(self, spectra: NDArray[np.complex64], first: int) -> None:
-        """Range spectra (chirp, rx, range) from chirp ``first`` on; whole TDM cycles."""
+        """Range spectra (chirp, rx, range) from chirp ``first`` on; whole TDM cycles. The next come in the same array."""
 
 
 @dataclass(frozen=True)
@@ -99,9 +99,14 @@ class Capture:
         room = self.inside.room if self.inside else None
         piece = taker.piece if kept is None else self.block  # which is a chunk of the array
 
+        # The largest arrays there are but for the windows: made anew for each piece, now and then they find no hole in the heap.
+        shape = min(piece, self.block), radar.n_rx, radar.samples_per_chirp
+        made, transformed = np.empty(shape, dtype=np.complex64), np.empty(shape, dtype=np.complex64)
+
         def spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
+            n, times = len(echoes.tx), radar.chirp_times(len(echoes.tx), first)
             with stages.time("signal"):
-                samples = synthesize(echoes, radar, radar.chirp_times(len(echoes.tx), first), dtype=np.complex64)
+                samples = synthesize(echoes, radar, times, dtype=np.complex64, out=made[:n])
             if room is not None:
                 with stages.time("clutter"):
                     room.add(samples, np.arange(first, first + len(samples)))
@@ -115,7 +120,7 @@ class Capture:
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
                 apart = separate(received, radar, first)
-                return with_cpu_in_reserve(partial(range_spectrum, apart, radar), self.fft_devices.range)
+                return with_cpu_in_reserve(partial(range_spectrum, apart, radar, out=transformed[:n]), self.fft_devices.range)
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

@@ -16,6 +16,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.checks import array_to_fill
 from rtradar.compiled import compiled
 from rtradar.errors import InputError
 from rtradar.process import torch_transforms
@@ -97,7 +98,14 @@ def range_doppler(
     return RangeDoppler(np.ascontiguousarray(values), radar.range_m, radar.velocity_mps(n_cycles))
 
 
-def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = None, device: str = "cpu") -> NDArray[np.complex64]:
+def range_spectrum(
+    x: ArrayLike,
+    radar: Radar,
+    *,
+    window: ArrayLike | None = None,
+    device: str = "cpu",
+    out: NDArray[np.complex64] | None = None,
+) -> NDArray[np.complex64]:
     """Range spectrum of each chirp, the part of the work that overlapping windows share.
 
     Parameters
@@ -110,6 +118,8 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
         Instead of the periodic Hann window.
     device : str
         ``cpu`` for SciPy's FFTs; any other is torch's, and named as torch names it.
+    out : (chirp, rx, range) complex64, optional
+        Array to fill, C-contiguous, which may be ``x`` itself; otherwise a new one is made.
 
     Returns
     -------
@@ -120,12 +130,15 @@ def range_spectrum(x: ArrayLike, radar: Radar, *, window: ArrayLike | None = Non
     ------
     InputError
         Where the shape does not fit the radar or the window has the wrong length or no weight.
+    ValueError
+        Where ``out`` is not an array of that shape and type.
     """
     samples = _checked_if(x, radar)
     scale = weights(window, samples.shape[2], "window").astype(np.float32)
+    spectra = array_to_fill("range_spectrum", out, samples.shape, np.complex64)
     if device != "cpu":
-        return torch_transforms.range_spectra(samples, scale, device)
-    spectra = np.empty(samples.shape, dtype=np.complex64)
+        spectra[...] = torch_transforms.range_spectra(samples, scale, device)
+        return spectra
 
     def transform(first: int) -> None:
         block = spectra[first : first + _CHIRPS_PER_BATCH]

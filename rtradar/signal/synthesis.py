@@ -8,6 +8,7 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
+from rtradar.checks import array_to_fill
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
@@ -54,7 +55,12 @@ def _in_band(length: NDArray[np.float64], radar: Radar) -> NDArray[np.bool_]:
 
 
 def synthesize(
-    echoes: Echoes, radar: Radar, times: ArrayLike, *, dtype: DTypeLike = np.complex128
+    echoes: Echoes,
+    radar: Radar,
+    times: ArrayLike,
+    *,
+    dtype: DTypeLike = np.complex128,
+    out: NDArray[np.complexfloating] | None = None,
 ) -> NDArray[np.complexfloating]:
     """IF samples of a block of chirps, without noise.
 
@@ -70,6 +76,8 @@ def synthesize(
         Of the samples. Phases are float64 in both. For complex64, samples are added up in float32, to 1e-6 of the sum of the
         magnitudes: by `spread_sum` of many echoes and 16 samples or more, with at most 6 frequencies, else where amplitudes are
         given at 3 frequencies at most.
+    out : (chirp, rx, sample) complex, optional
+        Array of that type to fill, C-contiguous; otherwise a new one is made.
 
     Returns
     -------
@@ -81,7 +89,7 @@ def synthesize(
     Raises
     ------
     ValueError
-        Where times and echoes differ in their number of chirps.
+        Where times and echoes differ in their number of chirps, or ``out`` is not an array of that shape and type.
 
     Warns
     -----
@@ -98,7 +106,7 @@ def synthesize(
     _warn_of_motion_in_chirp(echoes, radar, times)
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
-    out = np.empty((*echoes.length.shape[:2], radar.samples_per_chirp), dtype=dtype)
+    out = array_to_fill("synthesize", out, (*echoes.length.shape[:2], radar.samples_per_chirp), dtype)
     nodes = len(echoes.frequency)
     many = echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES) and nodes <= MOST_NODES
     many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES

@@ -64,6 +64,9 @@ def test_range_spectra(samples: np.ndarray) -> None:
     agree(range_spectrum(samples, SMALL, device=BY_TORCH), range_spectrum(samples, SMALL))
     window = np.hamming(32)
     agree(range_spectrum(samples, SMALL, window=window, device=BY_TORCH), range_spectrum(samples, SMALL, window=window))
+    out = np.empty(samples.shape, np.complex64)
+    assert range_spectrum(samples, SMALL, device=BY_TORCH, out=out) is out
+    agree(out, range_spectrum(samples, SMALL))
 
 
 @pytest.mark.parametrize("multiplexing", ["tdm", "ddm"])

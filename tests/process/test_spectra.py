@@ -197,3 +197,26 @@ def test_range_time_is_the_mean_power_of_its_cycles() -> None:
     assert range_time(spectra[:0], radar)[0].shape == (0, 8)
     with pytest.raises(InputError, match="range_time: spectra have shape"):
         range_time(spectra[:, :1], radar)
+
+
+@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
+def test_into_an_array_that_is_there(kind: type) -> None:
+    x = noise(SMALL, 6).astype(kind)
+    expected, out = range_spectrum(x, SMALL), np.full(x.shape, np.nan, np.complex64)
+    assert range_spectrum(x, SMALL, out=out) is out
+    np.testing.assert_array_equal(out, expected)
+
+
+def test_in_place() -> None:
+    x = noise(SMALL, 6).astype(np.complex64)
+    expected = range_spectrum(x, SMALL)
+    np.testing.assert_array_equal(range_spectrum(x, SMALL, out=x), expected)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind", "every"), [((6, 2, 31), np.complex64, 1), ((6, 2, 32), float, 1), ((6, 2, 64), np.complex64, 2)]
+)
+def test_an_array_that_cannot_be_filled(shape: tuple[int, ...], kind: type, every: int) -> None:
+    out = np.empty(shape, kind)[..., ::every]
+    with pytest.raises(ValueError, match=r"range_spectrum: out has shape .* must have \(6, 2, 32\), complex64, C-contiguous"):
+        range_spectrum(noise(SMALL, 6), SMALL, out=out)

@@ -359,3 +359,19 @@ def test_less_than_a_cycle_says_nothing_of_motion() -> None:
 def test_times_belong_to_the_chirps(times: object) -> None:
     with pytest.raises(ValueError, match=r"times has shape .*must be \(6,\)"):
         synthesize(random_echoes(SMALL, 6, 1), SMALL, times)
+
+
+@pytest.mark.filterwarnings("ignore:an echo moves")  # the random lengths jump from chirp to chirp
+@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
+@pytest.mark.parametrize("count", [0, 3, 200])
+@pytest.mark.parametrize("nodes", [1, 3])
+def test_into_an_array_that_is_there(kind: type, count: int, nodes: int) -> None:
+    echoes, times = random_echoes(SMALL, 6, count, nodes=nodes), SMALL.chirp_times(6)
+    out = np.full((6, SMALL.n_rx, SMALL.samples_per_chirp), np.nan, kind)
+    assert synthesize(echoes, SMALL, times, dtype=kind, out=out) is out
+    np.testing.assert_array_equal(out, synthesize(echoes, SMALL, times, dtype=kind))
+
+
+def test_an_array_that_cannot_be_filled() -> None:
+    with pytest.raises(ValueError, match=r"synthesize: out has shape \(6, 4, 40\), type complex64; .*complex128"):
+        synthesize(random_echoes(SMALL, 6, 0), SMALL, SMALL.chirp_times(6), out=np.empty((6, 4, 40), np.complex64))
