@@ -203,7 +203,7 @@ def run(
             pictures = draw_pictures(folder, radar, clouds, title)
             if inside:
                 pictures |= draw_room_pictures(folder, radar, body, scene, inside, title)
-        give_back_memory()
+        give_back_memory()  # what pictures took, before the view and the report take theirs
 
         def spent() -> dict[str, Any]:
             return cost(stages, time.perf_counter() - began - warmup_s, warmup_s, n_chirps * radar.chirp_interval_s)

@@ -74,9 +74,7 @@ def cell_spectra(
     place = place.reshape(steps.shape)
 
     # Before the range bins in use are picked out, NumPy copies all of them.
-    at_once = radar.n_rx
-    while at_once > 1 and n_cycles * at_once * n_range * cube.itemsize > _CACHE_BYTES:
-        at_once = math.ceil(at_once / 2)
+    at_once = min(radar.n_rx, max(1, _CACHE_BYTES // (n_cycles * n_range * cube.itemsize)))
     batches = math.ceil(radar.n_rx / at_once)
 
     def transform(item: int) -> None:

@@ -119,7 +119,7 @@ def range_spectrum(
     device : str
         ``cpu`` for SciPy's FFTs; any other is torch's, and named as torch names it.
     out : (chirp, rx, range) complex64, optional
-        Array to fill, C-contiguous, which may be ``x`` itself; otherwise a new one is made.
+        Array to fill, C-contiguous; otherwise a new one is made.
 
     Returns
     -------

@@ -20,12 +20,12 @@ def new_figure(width: float, height: float) -> Figure:
 
 
 def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
-    """Save as PNG, and empty the figure.
+    """Save as what the path ends with, else as PNG, and empty the figure.
 
     Figure and axes refer to each other. Were that left to Python's collector of cycles, what one picture takes would by chance
     still be there with the next.
     """
-    figure.savefig(file, format="png")
+    figure.savefig(file, format=None if isinstance(file, Path) else "png")
     figure.clear()
 
 

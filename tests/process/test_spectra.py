@@ -207,12 +207,6 @@ def test_into_an_array_that_is_there(kind: type) -> None:
     np.testing.assert_array_equal(out, expected)
 
 
-def test_in_place() -> None:
-    x = noise(SMALL, 6).astype(np.complex64)
-    expected = range_spectrum(x, SMALL)
-    np.testing.assert_array_equal(range_spectrum(x, SMALL, out=x), expected)
-
-
 @pytest.mark.parametrize(
     ("shape", "kind", "every"), [((6, 2, 31), np.complex64, 1), ((6, 2, 32), float, 1), ((6, 2, 64), np.complex64, 2)]
 )

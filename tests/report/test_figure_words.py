@@ -51,13 +51,18 @@ def test_a_legend_says_once_what_dots_and_circles_are(drawn: list[Figure], ghost
 
 def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path: Path) -> None:
     """Without the collector of cycles, whose coming is chance."""
+
+    def renderers() -> int:
+        return sum(type(one) is RendererAgg for one in gc.get_objects())  # proxies would answer isinstance
+
     gc.collect()
     gc.disable()
+    before = renderers()
     try:
         figure = new_figure(4, 3)
         figure.add_subplot().imshow(POWER)
         save_figure(figure, tmp_path / "out.png")
-        assert not any(type(one) is RendererAgg for one in gc.get_objects())  # proxies would answer isinstance
+        assert renderers() == before
     finally:
         gc.enable()
     assert figure.axes == []
