@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rtradar.compiled import compiled, taken_in
 from rtradar.scatter.first_come import FirstCome
-from rtradar.trace.side_by_side import in_tracing_threads
+from rtradar.threads import in_threads
 
 PIECES = 8
 """Parts of the interval between two anchors where it is divided the most: 1.25 ms of 10 ms."""
@@ -83,7 +83,7 @@ class Envelope:
     def prepare_anchors(self, indices: Iterable[int]) -> None:
         """Find these anchors, of `TOGETHER` intervals at the most, with all cores: one by itself has too little to share."""
         missing = [index for index in sorted({min(index, self._end) for index in indices}) if index not in self._anchors]
-        found = in_tracing_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
+        found = in_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
         for index, sample in zip(missing, found, strict=True):
             self._anchors.keep(index, sample)
 
@@ -93,7 +93,7 @@ class Envelope:
         missing = [index for index in around if index not in self._intervals]
         self.prepare_anchors(index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0)
         ends = [self._ends(index) for index in missing]
-        found = in_tracing_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
+        found = in_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
         self._intervals.update(zip(missing, found, strict=True))
         for index in around:
             self._intervals.move_to_end(index)

@@ -17,7 +17,7 @@ from typing import Literal
 
 from rtradar.errors import BackendError, InputError
 from rtradar.gpu import has_nvidia_gpu
-from rtradar.threads import thread_limit
+from rtradar.trace.jit_threads import begin_with_one
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
 from rtradar.trace.verdict import Verdict, judge, query_s
 
@@ -119,6 +119,7 @@ def use(backend: Backend) -> ModuleType:
         Where Dr.Jit was imported with another libLLVM since the backend was selected, or the variant cannot be set.
     """
     loaded = loaded_llvm_version()
+    first = "drjit" not in sys.modules
     if loaded is None and backend.llvm_path is not None:
         os.environ[ENVIRONMENT_VARIABLE] = backend.llvm_path
     elif backend.kind == "llvm" and loaded != backend.llvm_version:
@@ -126,22 +127,14 @@ def use(backend: Backend) -> ModuleType:
     try:
         import mitsuba as mi
 
+        if first:  # whoever imported Dr.Jit before us may have computed with it, and rules its threads
+            begin_with_one()
         if mi.variant() != backend.variant:
             mi.set_variant(backend.variant)
-            _limit_threads(backend.kind)
     except ImportError as error:
         reason = str(error).splitlines()[0]
         raise BackendError(f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor") from error
     return mi
-
-
-def _limit_threads(kind: Kind) -> None:
-    """Hold Dr.Jit to the threads of this process, where they are limited; it takes all cores otherwise."""
-    limit = thread_limit()
-    if kind == "llvm" and limit is not None:
-        import drjit as dr
-
-        dr.set_thread_count(limit)
 
 
 def available() -> tuple[Kind, ...]:

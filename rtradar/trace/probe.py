@@ -5,7 +5,6 @@ line of JSON before the kernel (the version of the libLLVM that Dr.Jit took), on
 """
 
 import json
-import os
 import sys
 import time
 from typing import Any
@@ -25,9 +24,8 @@ def main(variant: str, timed: bool) -> None:
     import mitsuba as mi
 
     print(json.dumps({"llvm_version": list(dr.detail.llvm_version())}), flush=True)
+    dr.set_thread_count(1)  # as for rtradar, unless rays are many
     mi.set_variant(variant)
-    if "RTRADAR_THREADS" in os.environ and variant.startswith("llvm"):
-        dr.set_thread_count(int(os.environ["RTRADAR_THREADS"]))
     mesh = mi.Mesh("triangle", 3, 1)
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 0, 1, 0]

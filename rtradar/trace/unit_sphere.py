@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,15 @@ from numpy.typing import NDArray
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import rays_of
-from rtradar.trace.side_by_side import ONE_AT_A_TIME
 
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
 _LEAST_RAYS = 4096
 """Traced at once, with idle ones among them: what Dr.Jit keeps for itself would else grow with the most that ever came."""
+
+
+_ONE_AT_A_TIME = threading.Lock()
 
 
 class UnitSphere:
@@ -49,6 +52,6 @@ class UnitSphere:
         padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
         padded[:, :count] = rays
         padded[3, count:] = 1  # from the middle, no way at all
-        with ONE_AT_A_TIME:
+        with _ONE_AT_A_TIME:
             ray = rays_of(mi, padded[:3].T, padded[3:6].T, padded[6])
             return np.asarray(self._scene.ray_test(ray, coherent=True).numpy())[:count]

@@ -17,7 +17,6 @@ from typing import Any
 from rtradar.errors import InputError
 from rtradar.files import atomic_file, temporary_folder
 from rtradar.gpu import gpu_name
-from rtradar.threads import thread_count
 from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, Library
 
 TIMEOUT_S = 120.0
@@ -85,8 +84,8 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
 def query_s(variant: str, library: Library | None) -> float | None:
     """How long ``variant`` takes to tell of some rays, the same for all variants.
 
-    It is measured once and kept on the disk, until a package, the library, the GPU, its driver or the number of threads changes:
-    so runs do not differ in what they compute on.
+    It is measured once and kept on the disk, until a package, the library, the GPU or its driver changes: so runs do not differ
+    in what they compute on.
 
     Parameters
     ----------
@@ -101,7 +100,7 @@ def query_s(variant: str, library: Library | None) -> float | None:
         [s]; None where it does not work, or takes too long to tell.
     """
     known = _key(variant, library)
-    key = f"{known}; {gpu_name()}; {thread_count()} threads; seconds of a query"
+    key = f"{known}; {gpu_name()}; seconds of a query by one thread"
     kept = _read_cache()
     if known is not None and key in kept:
         return kept[key]["query_s"]

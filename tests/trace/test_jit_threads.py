@@ -1,0 +1,133 @@
+"""Threads of Dr.Jit, which grow only, and threads of ours that trace: the same rays, the same kernel."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+
+import numpy as np
+import pytest
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.scatter import build_rung
+from rtradar.threads import THREADS_VARIABLE, in_threads
+from rtradar.trace.backend import Backend, use
+from rtradar.trace.unit_sphere import UnitSphere
+
+SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
+
+
+def rays(count: int) -> np.ndarray:
+    """Every second one goes away from the sphere."""
+    found = np.zeros((7, count), dtype=np.float32)
+    found[0], found[3], found[6] = 3.0, np.where(np.arange(count) % 2 == 0, -1.0, 1.0), 9.0
+    return found
+
+
+def test_a_kernel_serves_all_threads(backend: Backend) -> None:
+    if backend.kind == "scalar":
+        pytest.skip("the scalar backend has no kernels")
+    import drjit as dr
+
+    sphere = UnitSphere(use(backend))
+    sphere.meets(rays(10))
+    kernels = []
+
+    def trace() -> None:
+        with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
+            dr.kernel_history_clear()
+            np.testing.assert_array_equal(sphere.meets(rays(5000)), np.arange(5000) % 2 == 0)
+            kernels.extend(entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT)
+
+    other = threading.Thread(target=trace)
+    other.start()
+    other.join()
+    assert [entry["cache_hit"] for entry in kernels] == [1]
+
+
+@pytest.mark.usefixtures("four_threads")
+def test_many_threads_trace_at_once(backend: Backend) -> None:
+    sphere = UnitSphere(use(backend))
+    count = 40 if backend.kind == "scalar" else 4000
+    found = in_threads(lambda item: int(sphere.meets(rays(count + item)).sum()), range(32))
+    assert found == [(count + item + 1) // 2 for item in range(32)]
+
+
+def in_a_new_process(program: str, threads: int) -> list[str]:
+    """What that program prints, as words."""
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program],
+        env={**os.environ, THREADS_VARIABLE: str(threads)},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
+    program = f"""
+import numpy as np
+from rtradar.trace.backend import select, use
+from rtradar.trace.bounces import BodySurfaces
+from rtradar.trace.jit_threads import MANY_RAYS
+mi = use(select("{backend.kind}"))
+import drjit as dr
+surfaces = BodySurfaces(mi, np.ones((1, 3)))
+surfaces.pose(np.zeros((1, 3)), np.eye(3)[None])
+for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS, 1"}):
+    antennas, points = np.full((rays, 3), (3.0, 0.0, 0.0)), np.full((rays, 3), (1.0, 0.0, 0.0))
+    assert surfaces.sees(antennas, points, np.zeros(rays, dtype=np.int64)).all()
+    print(dr.thread_count())
+"""
+    expected = {"llvm": ["1", "1", "3", "3"], "cuda": ["1"] * 4, "scalar": ["1"]}
+    assert in_a_new_process(program, threads=3) == expected[backend.kind]
+
+
+def test_threads_of_who_came_first_are_left_alone(backend: Backend) -> None:
+    program = f"""
+from rtradar.trace.backend import select, use
+from rtradar.trace.jit_threads import MANY_RAYS, serve
+backend = select("{backend.kind}")
+import os
+os.environ["DRJIT_LIBLLVM_PATH"] = backend.llvm_path or ""
+import drjit
+drjit.set_thread_count(4)
+mi = use(backend)
+serve(mi, MANY_RAYS)
+print(drjit.thread_count())
+"""
+    assert in_a_new_process(program, threads=2) == ["4"]
+
+
+def test_no_rung_takes_threads_of_dr_jit_away(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+    # It can wait for ever for one that falls asleep in the same moment.
+    use(backend)
+    import drjit as dr
+
+    dr.set_thread_count(max(2, dr.thread_count()))  # something to take away
+    given: list[int] = []
+    monkeypatch.setattr(dr, "set_thread_count", given.append)
+    body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
+    for fidelity in ("specular", "fresnel", "physical-optics", "rays"):
+        build_rung(fidelity, SMALL, body, variant=backend.kind).echoes(np.arange(2))
+    assert all(count >= dr.thread_count() for count in given)
+
+
+@pytest.mark.usefixtures("four_threads")
+def test_physical_optics_is_the_same_with_any_number_of_threads_and_any_blocks(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
+    chirps = np.arange(0, int(body.duration_s / SMALL.chirp_interval_s), 29)
+    given = {"variant": backend.kind, "facets": 80}
+    at_once = build_rung("physical-optics", SMALL, body, **given).echoes(chirps).amplitude
+    monkeypatch.setenv(THREADS_VARIABLE, "1")
+    rung = build_rung("physical-optics", SMALL, body, **given)
+    by_blocks = [rung.echoes(chirps[first : first + 5]).amplitude for first in range(0, len(chirps), 5)]
+    np.testing.assert_array_equal(at_once, np.concatenate(by_blocks, axis=1))
