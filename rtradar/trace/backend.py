@@ -111,7 +111,8 @@ def select(variant: str = "auto") -> Backend:
 def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
-    Objects made under one variant belong to it: drop them before the next is set.
+    Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one thread until many rays come
+    (`rtradar.trace.jit_threads`); where it was imported before, it keeps the threads it has.
 
     Raises
     ------

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.jit_threads import serve
+from rtradar.trace.jit_threads import grow_for
 from rtradar.trace.rays import rays_of
 
 _LIFT_OF_PART = 1e-3
@@ -76,7 +76,7 @@ def first_hits(
     """Number (ray,) of what vector variants meet first, without meaning where the distance (ray,) is infinite."""
     import drjit as dr
 
-    serve(mi, len(starts))
+    grow_for(mi, len(starts))
     found = scene.ray_intersect_preliminary(rays_of(mi, starts, directions), coherent=False)
     met = dr.reinterpret_array(mi.UInt32, getattr(found, what))
     dr.eval(found.t, met)

@@ -13,7 +13,7 @@ from typing import Any
 from rtradar.threads import thread_count
 
 MANY_RAYS = 1 << 16
-"""At once, from which on all cores trace: some 10 ms of one."""
+"""At once, from which on all cores share them."""
 
 _ONE_AT_A_TIME = threading.Lock()
 
@@ -25,7 +25,7 @@ def begin_with_one() -> None:
     dr.set_thread_count(1)
 
 
-def serve(mi: Any, rays: int) -> None:
+def grow_for(mi: Any, rays: int) -> None:
     """Give Dr.Jit as many threads as this process may use, if that many rays are to be traced with Mitsuba ``mi``."""
     if rays < MANY_RAYS or not mi.variant().startswith("llvm"):
         return

@@ -92,14 +92,14 @@ for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS
 def test_threads_of_who_came_first_are_left_alone(backend: Backend) -> None:
     program = f"""
 from rtradar.trace.backend import select, use
-from rtradar.trace.jit_threads import MANY_RAYS, serve
+from rtradar.trace.jit_threads import MANY_RAYS, grow_for
 backend = select("{backend.kind}")
 import os
 os.environ["DRJIT_LIBLLVM_PATH"] = backend.llvm_path or ""
 import drjit
 drjit.set_thread_count(4)
 mi = use(backend)
-serve(mi, MANY_RAYS)
+grow_for(mi, MANY_RAYS)
 print(drjit.thread_count())
 """
     assert in_a_new_process(program, threads=2) == ["4"]
