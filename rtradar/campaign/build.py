@@ -6,6 +6,7 @@ import math
 import time
 from collections import Counter, defaultdict
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from rtradar.campaign.work import Outcome, work
 from rtradar.clouds.collection_index import sweep, write_index
 from rtradar.clouds.sample import is_whole, sample_path
 from rtradar.errors import InputError
+from rtradar.files import unfinished
 from rtradar.output_folder import alone_in
 
 
@@ -105,13 +107,15 @@ def build_dataset(
         done: list[Outcome] = []
         count = 0
         if store.missing:
+            # What own workers leave goes with them, also where this process is told to end; those of others may still write.
+            leftovers = unfinished(lambda: sweep(folder)) if scheduler is None else nullcontext()
             try:
-                with dask_client(workers, scheduler) as client:
+                with leftovers, dask_client(workers, scheduler) as client:
                     count = len(client.scheduler_info(n_workers=-1)["workers"])
                     chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
                     done = work(client, chosen, folder, made=make)
             except BaseException:
-                if scheduler is None:  # its workers are gone; those of others may still write
+                if scheduler is None:
                     sweep(folder)
                 raise
             sweep(folder)

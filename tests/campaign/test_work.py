@@ -180,6 +180,31 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     assert list(out.iterdir()) == [unfinished]
 
 
+@pytest.mark.parametrize(("scheduler", "left"), [(None, []), ("tcp://elsewhere:8786", [".0123.npz.4567.part"])])
+def test_half_samples_of_own_workers_go_as_the_process_has_to_end(tmp_path: Path, scheduler: str | None, left: list[str]) -> None:
+    (tmp_path / "small.toml").write_text(RADAR)
+    (tmp_path / "set.toml").write_text(TINY)
+    program = f"""
+import contextlib, os
+from pathlib import Path
+from rtradar.campaign import build
+from rtradar.files import discard_unfinished
+folder = Path({str(tmp_path)!r})
+
+@contextlib.contextmanager
+def killed(workers, scheduler):
+    (folder / "out" / ".0123.npz.4567.part").write_bytes(b"half")
+    discard_unfinished()
+    os._exit(0)
+    yield
+
+build.dask_client = killed
+build.build_dataset(folder / "set.toml", folder / "out", scheduler={scheduler!r})
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=120)
+    assert [path.name for path in (tmp_path / "out").glob(".*.part")] == left
+
+
 def test_a_plan_estimates_what_it_does_not_make(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
     text = TINY.replace("count = 2", "count = 7").replace('["analytic"]', '["analytic", "specular"]')
