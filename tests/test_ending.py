@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import platform
 import signal
 import subprocess
 import sys
@@ -9,6 +10,8 @@ import time
 from pathlib import Path
 
 import pytest
+
+from rtradar.cli import ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
@@ -77,3 +80,28 @@ def test_children_files_and_folders_go_too(tmp_path: Path) -> None:
     assert said == "rtradar: ended by SIGTERM; two lines\n"
     assert list(tmp_path.iterdir()) == []
     assert not runs(child)
+
+
+FIRST_THREAD_ENDS = """
+import ctypes, platform, threading
+threading.Thread(target=ctypes.CDLL(None).sleep, args=(600,)).start()
+ctypes.CDLL(None).syscall({"x86_64": 60, "aarch64": 93}[platform.machine()], 0)  # exit, of this thread alone
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux") or platform.machine() not in ("x86_64", "aarch64"), reason="Linux's way")
+def test_a_child_runs_until_its_last_thread_has_ended() -> None:
+    child = subprocess.Popen([sys.executable, "-c", FIRST_THREAD_ENDS])
+    try:
+        while runs(child.pid):
+            assert child.poll() is None
+            time.sleep(0.01)
+        assert child.pid in ending._descendants()
+    finally:
+        child.kill()
+    # Until somebody asks how it ended, the system keeps its number, without threads.
+    until = time.monotonic() + 60
+    while child.pid in ending._descendants():
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    child.wait()

@@ -95,9 +95,10 @@ def _descendants() -> set[int]:
     parents = {}
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError, ValueError, IndexError):
-            state, parent = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()[:2]
-            if state != "Z":
-                parents[int(stat.parent.name)] = int(parent)
+            fields = stat.read_text(encoding="utf-8", errors="replace").rpartition(")")[2].split()
+            # Of one that is killed the first thread may be dead while another still makes a file.
+            if fields[0] != "Z" or int(fields[17]) > 1:
+                parents[int(stat.parent.name)] = int(fields[1])
     found: set[int] = set()
     newly = {os.getpid()}
     while newly:
