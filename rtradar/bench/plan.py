@@ -78,7 +78,7 @@ class Plan:
     @property
     def growing_durations_s(self) -> tuple[float, ...]:
         """Lengths of recording that growth is measured over [s]."""
-        return (self.duration_s, 2 * self.duration_s) if self.quick else (3.0, 6.0, 12.0, 30.0)
+        return (self.duration_s, 2 * self.duration_s) if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
 
 
 @dataclass(frozen=True)

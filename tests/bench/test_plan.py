@@ -12,7 +12,7 @@ def test_quick_is_less_of_everything_unless_asked_for() -> None:
     plan = plan_of(radar=None, fidelity="specular , fresnel", repeats=None, duration_s=0.25, quick=True, only=None)
     assert plan == Plan(("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True)
     assert plan.growing_durations_s == (0.25, 0.5)
-    assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0)
+    assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0, 60.0)
 
 
 def test_growth_is_of_specular_or_of_the_last_rung() -> None:
