@@ -37,7 +37,9 @@ def main(variant: str, timed: bool) -> None:
         hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(x, 0.25, 4.0), mi.Vector3f(0, 0, -1)))
         nearest: Any = dr.slice(dr.minimum(hit.t, dr.opaque(mi.Float, 5.0)))
         distances.append(float(nearest))
-    print(json.dumps({"works": distances == [4.0, 5.0]}), flush=True)
+    # A hit may lie some steps of float32 off: reciprocals of rays are first guessed by the processor, each maker's its own way.
+    works = all(abs(distance - right) < 1e-6 * right for distance, right in zip(distances, (4, 5), strict=True))
+    print(json.dumps({"works": works}), flush=True)
     if timed:
         print(json.dumps({"query_s": query_s(mi)}), flush=True)
 

@@ -10,6 +10,7 @@ import platform
 import signal
 import subprocess
 import sys
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,8 @@ TIMEOUT_S = 120.0
 
 QUERY_TIMEOUT_S = 30.0
 """Where it serves to choose the faster; who takes longer to begin is not chosen."""
+
+_PROBE = Path(__file__).with_name("probe.py")
 
 _STOPPED = {-number for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))}
 """Somebody ended the probe, with the program that waits for it perhaps: that says nothing of the library."""
@@ -57,7 +60,8 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
     """Whether ``variant`` works, with that libLLVM loaded.
 
     The answer of an earlier process is taken from the disk where neither the library nor Dr.Jit nor Mitsuba has changed
-    since; answers on GPUs, which come and go without a trace in a file, and probes that took too long are not kept.
+    since, nor what is asked; answers on GPUs, which come and go without a trace in a file, and probes that took too long are
+    not kept.
 
     Parameters
     ----------
@@ -121,7 +125,7 @@ def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[
         if library is not None:
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
-        command = [sys.executable, "-P", str(Path(__file__).with_name("probe.py")), variant, *(["--timed"] if timed else [])]
+        command = [sys.executable, "-P", str(_PROBE), variant, *(["--timed"] if timed else [])]
         limit_s = QUERY_TIMEOUT_S if timed else TIMEOUT_S
         done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", timeout=limit_s)
     said: dict[str, Any] = {}
@@ -170,6 +174,7 @@ def _key(variant: str, library: Library | None) -> str | None:
     try:
         versions = [f"{name} {importlib.metadata.version(name)}" for name in ("mitsuba", "drjit")]
         about = [] if library is None else [library.path, str(os.stat(library.path).st_mtime_ns)]
+        about.append(f"probe {zlib.crc32(_PROBE.read_bytes()):08x}")
     except (importlib.metadata.PackageNotFoundError, OSError):
         return None
     return "; ".join([variant, platform.machine(), sys.executable, *versions, *about])

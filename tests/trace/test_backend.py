@@ -262,6 +262,17 @@ def test_a_verdict_is_kept_until_the_library_changes(empty_cache: Path, tmp_path
     assert [path.name for path in empty_cache.iterdir()] == ["verdicts.json"]
 
 
+def test_a_verdict_is_not_kept_when_another_question_is_asked(
+    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    probes = _counted(monkeypatch, "gives wrong results")
+    for text in ("one", "another", "another"):
+        (tmp_path / "probe.py").write_text(text)
+        monkeypatch.setattr(verdict, "_PROBE", tmp_path / "probe.py")
+        verdict.judge("scalar_rgb", None)
+    assert len(probes) == 2
+
+
 @pytest.mark.parametrize(("ended", "probed"), [(-signal.SIGABRT, 1), (-signal.SIGKILL, 2), (-signal.SIGTERM, 2)])
 def test_a_probe_that_was_told_to_end_says_nothing_of_the_library(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch, ended: int, probed: int
