@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
+import re
 import secrets
 import shutil
 import stat
@@ -23,6 +25,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 
 _MOST_JSON_BYTES = 100_000_000
+_TOKEN_BYTES = 6
 _PATIENCE_S = 1.0
 """Waited, at the end, for a file that is just taking its name."""
 
@@ -54,7 +57,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
         if not stat.S_ISREG(target.stat().st_mode):
             raise InputError(f"cannot write '{target}': what has that name is no file; give another path")
     # Not by the process alone: on a shared disk another machine may write the same file.
-    beside = target.with_name(f".{target.name}.{secrets.token_hex(6)}.part")
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(_TOKEN_BYTES)}.part")
     with unfinished(lambda: beside.unlink(missing_ok=True)):
         try:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
@@ -69,6 +72,45 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
         finally:
             beside.unlink(missing_ok=True)
+
+
+def remove_parts(folder: Path, names: str) -> int:
+    """Remove what `atomic_file` left of files as it was killed; how many.
+
+    Parameters
+    ----------
+    folder : path
+        One into which no other command writes.
+    names : str
+        Regular expression that the whole name of such a file matches.
+    """
+    part = re.compile(rf"\.({names})\.[0-9a-f]{{{2 * _TOKEN_BYTES}}}\.part")
+    count = 0
+    for path in folder.iterdir():
+        if part.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode):
+            path.unlink(missing_ok=True)
+            count += 1
+    return count
+
+
+def open_regular(path: Path) -> BinaryIO:
+    """Open a file that may be anybody's for reading; what is no regular file, such as a pipe, is never waited for.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read, or is no regular file.
+    """
+    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+        os.close(descriptor)
+        raise OSError(errno.EINVAL, "not a regular file", str(path))
+    return os.fdopen(descriptor, "rb")
+
+
+def check_regular(path: Path) -> None:
+    """Raise OSError where `open_regular` would: for files that a library opens by name."""
+    open_regular(path).close()
 
 
 def check_place(path: Path | None, option: str = "--json") -> None:
@@ -135,10 +177,12 @@ def read_json(path: Path) -> Any:
     ValueError
         Where it is no JSON, is nested deeper than Python goes, or is larger than 100 MB.
     """
-    if path.stat().st_size > _MOST_JSON_BYTES:
+    with open_regular(path) as file:
+        text = file.read(_MOST_JSON_BYTES + 1)
+    if len(text) > _MOST_JSON_BYTES:
         raise ValueError(f"more than {_MOST_JSON_BYTES / 1e6:g} MB")
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
+        return json.loads(text.decode("utf-8"))
     except RecursionError:
         raise ValueError("nested too deep") from None
 
@@ -154,7 +198,7 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
         Where it is no such archive, is damaged, claims more than it holds, or is larger than ``most_bytes`` once unpacked.
     """
     found = {}
-    with path.open("rb") as file:
+    with open_regular(path) as file:
         try:
             with zipfile.ZipFile(file) as archive:
                 if sum(entry.file_size for entry in archive.infolist()) > most_bytes:

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import torch
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, check_regular
 
 _MOST_BYTES = 1_000_000_000  # of PointNet with its optimiser: 42 MB
 _KEYS = ("network", "optimiser", "epochs", "history")
@@ -57,6 +57,7 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """
     cure = "remove it to train anew, or give another folder"
     try:
+        check_regular(path)
         if path.stat().st_size > _MOST_BYTES:
             raise InputError(f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}")
         _check_archive(path)

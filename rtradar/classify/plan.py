@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,9 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
     """Raise where the folder holds another plan; where the data lie may change."""
     path = out / PLAN
     try:
-        if not path.exists():
+        if not os.path.lexists(path):
+            if found := sorted(out.glob("training-*")):
+                raise InputError(f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; give another folder (--out)")
             return
     except OSError as error:  # such as a name that is too long
         raise _unwritable(out, error) from None

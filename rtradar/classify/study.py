@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import re
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -24,6 +25,7 @@ from rtradar.classify.source import Clouds
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples, check_points, predict, train_network
 from rtradar.errors import InputError
+from rtradar.files import remove_parts
 
 _CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
 _MADE = (
@@ -134,8 +136,11 @@ def train_study(
         for number in missing:
             one, folder = splits[number], training_folder(out, number)
             folder.mkdir(exist_ok=True)
-            for leftover in folder.glob(".*.part"):  # of one that was killed while it wrote
-                leftover.unlink(missing_ok=True)
+            if folder.is_symlink():
+                raise InputError(
+                    f"'{folder}' is a link, and its training would be written elsewhere; give another folder (--out)"
+                )
+            remove_parts(folder, rf"{re.escape(_CHECKPOINT)}|{re.escape(_OUTCOME)}")
             start = bar.n
 
             def show(epoch: int, row: dict[str, float], start: int = start, name: str = one.name) -> None:

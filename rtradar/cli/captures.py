@@ -96,6 +96,7 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
     )
     run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
     run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
+    run.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
     run.add_argument("--json", type=Path, metavar="FILE", help="write the summary there too")
 
 
@@ -169,4 +170,5 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
         "seed": options.seed,
         "variant": options.variant,
         "spreading": not options.no_spreading,
+        "overwrite": options.overwrite,
     }

@@ -67,6 +67,7 @@ def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
         "--data", type=Path, nargs="+", metavar="DIR", help="of --baselines: the clouds (default: where they were)"
     )
     evaluate.add_argument("--out", type=Path, metavar="DIR", help="folder for tables and pictures (default: the first OUT)")
+    evaluate.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
     evaluate.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
 
@@ -108,8 +109,8 @@ def _train(options: argparse.Namespace) -> int:
 def _evaluate(options: argparse.Namespace) -> int:
     check_place(options.json)
     from rtradar.classify.study import load_study
-    from rtradar.output_folder import all_or_nothing
-    from rtradar.report.evaluation import NUMBERED_PICTURES, write_evaluation
+    from rtradar.output_folder import atomic_folder
+    from rtradar.report.evaluation import EVALUATION_FILES, write_evaluation
 
     studies = [load_study(folder) for folder in options.trained]
     baselines = {}
@@ -121,7 +122,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
     out = options.out or options.trained[0]
-    with all_or_nothing(out, NUMBERED_PICTURES) as folder:
+    with atomic_folder(out, EVALUATION_FILES, overwrite=options.overwrite) as folder:
         table, content = write_evaluation(studies, baselines, folder)
     if options.json is not None:
         write_json(options.json, content)

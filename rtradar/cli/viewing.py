@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,7 @@ def _view(options: argparse.Namespace) -> int:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
     from rtradar.pipeline.view import view
 
-    page = options.out or (None if options.still else options.folder / "view.html")
+    page = options.out or (None if options.still else _own_page(options.folder))
     told = view(options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour)
     if options.json is not None:
         write_json(options.json, told)
@@ -53,3 +54,13 @@ def _view(options: argparse.Namespace) -> int:
         if not webbrowser.open(page.resolve().as_uri()):
             print("no browser was found here; open the page by hand")
     return 0
+
+
+def _own_page(folder: Path) -> Path:
+    """Where the page goes unless told otherwise; InputError where that would replace what rtradar did not write."""
+    from rtradar.report.page import is_page
+
+    page = folder / "view.html"
+    if os.path.lexists(page) and not is_page(page):
+        raise InputError(f"'{page}' is there, and no page of rtradar view; name another file (--out)")
+    return page

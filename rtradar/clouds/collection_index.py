@@ -11,7 +11,7 @@ from pathlib import Path
 from rtradar.checks import shown
 from rtradar.clouds.sample_file import FORMAT
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json
+from rtradar.files import atomic_file, read_json, remove_parts
 
 INDEX = "collection.json"
 """Name of the file that says which samples belong to the collection."""
@@ -21,10 +21,7 @@ _IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a name, and no way to another
 
 def sweep(folder: Path) -> int:
     """Remove what killed writers left of samples; their number. None may be writing."""
-    leftovers = [*folder.glob(".*.npz.*.part"), *folder.glob(f".{INDEX}.*.part")]
-    for path in leftovers:
-        path.unlink(missing_ok=True)
-    return len(leftovers)
+    return remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
 
 
 def write_index(folder: Path, identities: Iterable[str]) -> None:
@@ -33,13 +30,25 @@ def write_index(folder: Path, identities: Iterable[str]) -> None:
     Raises
     ------
     InputError
-        Where it cannot be written.
+        Where it cannot be written, or a file of that name is there that is no index.
     """
+    path = folder / INDEX
+    if os.path.lexists(path) and not _is_index(path):
+        raise InputError(f"'{path}' is there, and no index of a collection; move it away, or give another folder (--out)")
     content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
-    with atomic_file(folder / INDEX) as file:
+    with atomic_file(path) as file:
         file.write(content.encode() + b"\n")
         file.flush()
         os.fsync(file.fileno())
+
+
+def _is_index(path: Path) -> bool:
+    """Whether it looks like one, of whatever format."""
+    try:
+        content = read_json(path)
+    except (OSError, ValueError):
+        return False
+    return isinstance(content, dict) and "format" in content and isinstance(content.get("samples"), list)
 
 
 def read_index(folder: Path) -> tuple[str, ...]:
@@ -57,7 +66,7 @@ def read_index(folder: Path) -> tuple[str, ...]:
         why = error.strerror
         raise InputError(f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build") from None
     except ValueError:
-        raise InputError(f"'{path}' is damaged; mend the collection with: rtradar dataset build") from None
+        raise InputError(f"'{path}' is damaged; move it away and mend the collection with: rtradar dataset build") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("samples"), list):
         raise InputError(f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build")
     identities = content["samples"]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_file import DIGEST, FORMAT
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, open_regular
 
 
 @dataclass(frozen=True)
@@ -95,7 +95,8 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
 def is_whole(path: Path) -> bool:
     """Whether a sample's file is there and every byte of it is as it was written."""
     try:
-        whole = path.read_bytes()
+        with open_regular(path) as file:
+            whole = file.read()
     except OSError:
         return False
     return len(whole) > DIGEST and hashlib.sha256(whole[:-DIGEST]).hexdigest().encode() == whole[-DIGEST:]

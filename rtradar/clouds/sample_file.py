@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.files import check_regular
 
 FORMAT = 1
 """Of a sample's file and of the index; a reader refuses others."""
@@ -43,6 +44,7 @@ def read_sample(path: Path, name: str) -> Any:
         Where the file is damaged, or larger than 200 MB.
     """
     try:
+        check_regular(path)
         size = path.stat().st_size
         if size <= _MOST_BYTES:
             return _about(_array(path, name)) if name == "about" else _array(path, name).reshape(-1, 3).astype(np.float64)

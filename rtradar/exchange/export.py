@@ -15,7 +15,8 @@ from rtradar.exchange.int16 import read_int16, write_int16
 from rtradar.exchange.mat import read_mat, write_mat
 from rtradar.exchange.netcdf import read_netcdf, write_netcdf
 from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
-from rtradar.output_folder import settle
+from rtradar.files import check_regular
+from rtradar.output_folder import check_whole
 
 _T = TypeVar("_T")
 
@@ -84,7 +85,7 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     elif suffix in IF_FORMATS:
         raise InputError(f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made")
     else:
-        settle(origin.parent)
+        check_whole(origin.parent)
         cloud = read_cloud(origin)
         said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[suffix][0](target, cloud)
     return {"file": str(target)} | said
@@ -141,6 +142,7 @@ def _read(path: Path, readers: Mapping[str, Callable[[Path], _T]], what: str) ->
     if reader is None:
         raise InputError(f"'{path}': {what} is read from {', '.join(readers)}; give such a file")
     try:
+        check_regular(path)
         return reader(path)
     except _DAMAGE as error:
         why = getattr(error, "strerror", None) or " ".join(str(error).split())[:100] or type(error).__name__

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from rtradar.errors import InputError
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, read_json
 
 _LARGEST = 32767
 _WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"
@@ -31,7 +32,7 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
     for file in (path, beside):
         if file.is_dir():
             raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
-    if beside.exists() and not _ours(beside):
+    if os.path.lexists(beside) and not _ours(beside):
         raise InputError(f"'{beside}' is there, and something else; it would be replaced: give another file (--out)")
     peak = 0.0
     for _, block in recording.blocks("finding the peak"):
@@ -71,7 +72,7 @@ def read_int16(path: Path) -> IfCube:
     Exception
         Of many kinds where the files are others; `rtradar.exchange.read_if` makes one line of it.
     """
-    about = json.loads(path.with_suffix(".json").read_text(encoding="utf-8"))
+    about = read_json(path.with_suffix(".json"))
     shape = tuple(map(int, about["shape"]))
     whole = np.fromfile(path, dtype="<i2")
     if len(shape) != 5 or min(shape) < 0 or shape[4] != 2 or whole.size != math.prod(shape):
@@ -85,6 +86,6 @@ def read_int16(path: Path) -> IfCube:
 
 def _ours(path: Path) -> bool:
     try:
-        return bool(json.loads(path.read_text(encoding="utf-8"))["what"] == _WHAT)
+        return bool(read_json(path)["what"] == _WHAT)
     except (OSError, ValueError, KeyError, TypeError):
         return False

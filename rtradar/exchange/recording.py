@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,7 +16,8 @@ from numpy.typing import NDArray
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.output_folder import settle
+from rtradar.files import check_regular, read_json
+from rtradar.output_folder import check_whole
 from rtradar.radar import Radar
 
 IF_AXES = ("chirp", "tx", "rx", "sample")
@@ -110,11 +112,11 @@ def open_recording(folder: Path) -> IfRecording:
     """
     import zarr  # slow to import
 
-    settle(folder)
+    check_whole(folder)
     if not (folder / "if.zarr").is_dir():
         raise InputError(f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if")
     try:
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = read_json(folder / "summary.json")
         radar = Radar(**summary["parameters"]["radar"])
     except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:  # an InputError is a ValueError
         raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
@@ -129,6 +131,9 @@ def open_recording(folder: Path) -> IfRecording:
             "export a run under tdm or fdm"
         )
     try:
+        for parent, _, names in os.walk(folder / "if.zarr"):
+            for name in names:
+                check_regular(Path(parent, name))
         stored = zarr.open_array(folder / "if.zarr", mode="r")
         shape, kind = stored.shape, np.dtype(stored.dtype)
     except Exception as error:  # zarr fails in many ways on a damaged folder

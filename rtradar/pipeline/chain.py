@@ -18,14 +18,15 @@ from numpy.typing import NDArray
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion
-from rtradar.output_folder import all_or_nothing
+from rtradar.output_folder import atomic_folder
 from rtradar.pipeline.if_array import if_array
 from rtradar.pipeline.moments import moments
-from rtradar.pipeline.pictures import PICTURES, draw_pictures
+from rtradar.pipeline.output_files import RUN_FILES
+from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.room_pictures import ROOM_PICTURES, draw_room_pictures
+from rtradar.pipeline.room_pictures import draw_room_pictures
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
@@ -82,6 +83,7 @@ def run(
     order: int = 1,
     keep_all: bool = False,
     detector: str = "os-cfar",
+    overwrite: bool = False,
 ) -> Result:
     """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
 
@@ -93,7 +95,8 @@ def run(
     scene : Scene, optional
         Free space if left out.
     out : path
-        Folder; files of the same name in it are replaced, pictures of an earlier run removed, others left alone.
+        Folder, which is made if it is not there. The files of an earlier run that its ``summary.json`` lists are replaced or
+        removed; all others stay as they are.
     fidelity : str
         The rung; `rtradar.scatter.RUNGS` has their names.
     start_s, duration_s : float
@@ -128,6 +131,8 @@ def run(
         Whether paths, walls and furniture are kept though they stay below the noise.
     detector : str
         What marks the cells of a map; `rtradar.process.DETECTORS` has the names.
+    overwrite : bool
+        Whether files that ``out`` holds under names of the new ones are replaced even where no ``summary.json`` lists them.
 
     Returns
     -------
@@ -173,7 +178,7 @@ def run(
     windows, n_chirps, warmup_s, title = capture.windows, capture.n_chirps, capture.warmup_s, capture.title
     received = ReceivedWindow(radar, int(windows[len(windows) // 2])) if clutter_removal != "none" else None
     give_back_memory()  # what compiling and the pass over the whole recording took
-    with all_or_nothing(Path(out), PICTURES + ROOM_PICTURES) as folder:
+    with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
         products = Products(
             folder / "maps.h5",
             radar,
@@ -242,6 +247,7 @@ def run(
                 rdt_points=clouds.rdt.points,
                 spatial=clouds.spatial,
             )
-        text = json.dumps(summary | spent(), indent=2, allow_nan=False, default=plain)
+        files = {"files": RUN_FILES.list_of(folder)}
+        text = json.dumps(summary | spent() | files, indent=2, allow_nan=False, default=plain)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
     return Result(clouds.rdt.points, json.loads(text), capture.survey, Path(out))

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.output_folder import all_or_nothing
+from rtradar.output_folder import atomic_folder
 from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
 from rtradar.pipeline.chain import Result, run
+from rtradar.pipeline.output_files import comparison_files
 from rtradar.pipeline.pictures import busiest_window, thinned
 from rtradar.radar import Radar
 from rtradar.report.comparison_page import write_comparison
@@ -77,6 +78,7 @@ def compare(
     *,
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
+    overwrite: bool = False,
     **options: Any,
 ) -> Comparison:
     """Run several rungs on the same recording and say what differs.
@@ -94,6 +96,8 @@ def compare(
         Folder; a run of each rung in a folder of its name, and ``compare.json``, ``compare.html`` and pictures.
     fidelities : sequence of str
         Two rungs or more, each once; `rtradar.scatter.RUNGS` has their names.
+    overwrite : bool
+        Whether files that ``out`` holds under names of the new ones are replaced even where no ``compare.json`` lists them.
     **options
         Of `run`.
 
@@ -114,7 +118,8 @@ def compare(
             raise InputError(f"fidelity '{name}' is unknown; allowed: {', '.join(RUNGS)} (--fidelities)")
     if len(names) < 2 or len(set(names)) < len(names):
         raise InputError(f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)")
-    with all_or_nothing(Path(out)) as folder:
+    kind = comparison_files(list(RUNGS))
+    with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         for name in names:
             shared = {"noise_power_m2": results[names[0]].summary["noise_power_m2"]} if results else {}
@@ -122,6 +127,7 @@ def compare(
         summary = _summary(results, folder, radar, names[-1])
         pictures = _draw(results, folder, radar, names[-1])
         write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures)
+        summary["files"] = kind.list_of(folder)
         (folder / "compare.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return Comparison(summary, Path(out))
 

@@ -21,9 +21,6 @@ from rtradar.report import (
     draw_spectrogram,
 )
 
-PICTURES = ("spectrogram.png", "range_angle.png", "cloud_xyz.png")
-"""Those that not every run has."""
-
 _COLUMNS = 600
 """Steps of time in a picture, those of 3 s; longer captures are averaged to as many, so that memory does not grow."""
 

@@ -14,8 +14,6 @@ from rtradar.radar import Radar
 from rtradar.report import draw_before_after, draw_plan, draw_range_azimuth_with_walls
 from rtradar.scene import Scene
 
-ROOM_PICTURES = ("clutter_removal.png", "range_azimuth_walls.png", "plan.png")
-
 _TRACK_POINTS = 400
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -13,8 +12,8 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.files import read_arrays, stored
-from rtradar.output_folder import settle
+from rtradar.files import check_regular, read_arrays, read_json, stored
+from rtradar.output_folder import check_whole
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
 from rtradar.report.levels import MOST_LEVEL, Levels
@@ -82,7 +81,7 @@ def view(
     """
     if colour not in COLOURS:
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
-    settle(Path(folder))
+    check_whole(Path(folder))
     linked = load_linked(Path(folder))
     times = linked.moments.times
     if time_s is not None and not times[0] - linked.radar.frame_duration_s <= time_s <= times[-1] + linked.radar.frame_duration_s:
@@ -119,7 +118,8 @@ def load_linked(folder: Path) -> Linked:
     spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"))
     path = folder / "maps.h5"
     try:
-        with h5py.File(path) as file:
+        check_regular(path)
+        with h5py.File(path, "r") as file:
             maps = _maps(file)
             if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
@@ -153,7 +153,7 @@ def load_linked(folder: Path) -> Linked:
 
 def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
     try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
+        summary = read_json(path)
         return summary, Radar(**summary["parameters"]["radar"])
     except InputError as error:
         raise InputError(f"'{path}': {error}; {_MEND}") from None

@@ -24,12 +24,16 @@ from rtradar.classify.scores import (
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.files import atomic_file
+from rtradar.output_folder import OutputFiles
 from rtradar.report.classifier_figures import draw_accuracies, draw_confusion, draw_learning, draw_transfer
 
 Group = tuple[str, Sequence[Outcome]]
 
-NUMBERED_PICTURES = ("confusion-[0-9]*.png", "learning-[0-9]*.png", "transfer-[0-9]*.png")
-"""Patterns of the names of those that are drawn for each study."""
+EVALUATION_FILES = OutputFiles(
+    "evaluation.json",
+    r"evaluation\.json|trainings\.csv|history\.csv|table\.txt|accuracy\.png|(confusion|learning|transfer)-[1-9]\d*\.png",
+)
+"""Those that an evaluation makes."""
 
 
 def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome]], out: Path) -> tuple[str, dict[str, Any]]:
@@ -84,9 +88,10 @@ def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome
     table = "\n\n".join(blocks)
     content = {"classes": classes, "groups": [_numbers(title, outcomes, len(classes)) for title, outcomes in groups]}
     content["plans"] = [study.plan for study in studies]
-    _write(out / "evaluation.json", json.dumps(content, indent=1) + "\n")
     _write(out / "table.txt", table + "\n")
     _write_csv(out, groups)
+    content["files"] = EVALUATION_FILES.list_of(out)
+    _write(out / "evaluation.json", json.dumps(content, indent=1) + "\n")
     return table, content
 
 

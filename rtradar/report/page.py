@@ -6,18 +6,20 @@ import base64
 import hashlib
 import json
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, open_regular
 
 _PAGE = Template("""<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
 <meta http-equiv="Content-Security-Policy" content="$policy">
+<meta name="generator" content="rtradar">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>$title</title>
@@ -110,6 +112,13 @@ def write_page(
         for pieces, text in zip(large, after, strict=True):
             file.writelines(pieces)
             file.write(text)
+
+
+def is_page(path: Path) -> bool:
+    """Whether a file is a page that `write_page` wrote; False, too, where there is none or it is no regular file."""
+    with suppress(OSError), open_regular(path) as file:
+        return b'<meta name="generator" content="rtradar">' in file.read(4096)
+    return False
 
 
 def _asset(name: str) -> str:
