@@ -17,7 +17,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO
+from typing import Any, BinaryIO, TextIO, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,11 @@ _MOST_JSON_BYTES = 100_000_000
 _TOKEN_BYTES = 6
 _PATIENCE_S = 1.0
 """Waited, at the end, for a file that is just taking its name."""
+
+DISK_ERRORS = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS") if hasattr(errno, name))
+"""Numbers of errors that say that a disk takes no more."""
+
+_T = TypeVar("_T")
 
 _lock = threading.RLock()
 _unfinished: list[Callable[[], object]] = []
@@ -72,6 +77,88 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
         finally:
             beside.unlink(missing_ok=True)
+
+
+class LastingFile:
+    """A binary file for HDF5 to write, whose failures wait until `check` is called.
+
+    HDF5 cannot close a file that it cannot write: it would print a traceback for each object that it holds, and crash as the
+    process ends. So after the first failure what is written here is dropped, and whoever writes asks what went wrong.
+
+    Parameters
+    ----------
+    file : binary file
+        Open for writing and reading.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise what went wrong first.
+
+        Raises
+        ------
+        OSError
+            Where something could not be written.
+        """
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> LastingFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, and raise what went wrong first; may be called again.
+
+        Raises
+        ------
+        OSError
+            Where something could not be written.
+        """
+        self._try(self._file.close, None)
+        self.check()
+
+    def write(self, data: Any) -> int:
+        """Write all of it, or drop it."""
+        size = memoryview(data).nbytes
+        return self._try(lambda: self._file.write(data), size)
+
+    def read(self, size: int = -1) -> bytes:
+        """Read."""
+        return self._try(lambda: self._file.read(size), bytes(max(size, 0)))
+
+    def readinto(self, buffer: Any) -> int:
+        """Read into a buffer."""
+        return self._try(lambda: self._file.readinto(buffer), memoryview(buffer).nbytes)  # type: ignore[attr-defined]
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move to a place."""
+        return self._try(lambda: self._file.seek(offset, whence), offset)
+
+    def tell(self) -> int:
+        """The place now."""
+        return self._try(self._file.tell, 0)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Change the size of the file."""
+        return self._try(lambda: self._file.truncate(size), size or 0)
+
+    def flush(self) -> None:
+        """Write what is held in memory."""
+        self._try(self._file.flush, None)
+
+    def _try(self, action: Callable[[], _T], otherwise: _T) -> _T:
+        if self._error is None:
+            try:
+                return action()
+            except OSError as error:
+                self._error = error
+        return otherwise
 
 
 def remove_parts(folder: Path, names: str) -> int:

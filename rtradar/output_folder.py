@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rtradar.errors import InputError
-from rtradar.files import not_to_be_parted, unfinished
+from rtradar.files import DISK_ERRORS, not_to_be_parted, unfinished
 
 _WORK = re.compile(r"\.rtradar-[0-9a-f]{16}")
 _MARKER = ".made-by-rtradar"
@@ -35,7 +35,6 @@ _UNFINISHED = ".unfinished"
 _MOST_LIST_BYTES = 100_000_000
 _STORE = re.compile(r"(.*\.zarr/)")
 
-_OF_DISK = {getattr(errno, name, None) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")} - {None}
 _HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
 
 
@@ -493,7 +492,7 @@ def _trouble_of_disk(error: BaseException) -> str:
     number = error.errno if isinstance(error, OSError) else None
     if number is None and isinstance(error, OSError | RuntimeError) and (told := _HDF5_ERRNO.search(str(error))):
         number = int(told[1])
-    return os.strerror(number) if number is not None and number in _OF_DISK else ""
+    return os.strerror(number) if number is not None and number in DISK_ERRORS else ""
 
 
 def one_of(names: Sequence[str]) -> str:

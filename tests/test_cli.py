@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import subprocess
 import sys
@@ -252,3 +253,47 @@ def test_import_is_quick_and_light() -> None:
     heavy = ["numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh", "torch", "dask", "sklearn"]
     code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+
+
+@pytest.mark.parametrize("command", [["run", "synthetic:kick"], ["compare", "synthetic:kick"], ["export", "x"], ["view", "x"]])
+def test_an_empty_name_is_not_the_current_folder(
+    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main([*command, "--out", ""]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
+@pytest.mark.parametrize("buffered", [True, False])
+def test_what_cannot_be_printed_is_said_in_one_line(walked: Path, tmp_path: Path, buffered: bool) -> None:
+    words = [sys.executable, *([] if buffered else ["-u"]), "-m", "rtradar", "view", walked, "--out", tmp_path / "page.html"]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment)
+    assert done.returncode == 1
+    assert done.stderr == "rtradar: cannot write to the standard output: No space left on device\n"
+
+
+LIMITED = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+from rtradar.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
+@pytest.mark.parametrize("command", ["run", "export .nc", "export .mat"])
+def test_files_that_may_not_grow_are_told_in_one_line(walked: Path, tmp_path: Path, command: str) -> None:
+    words = {
+        "run": ["run", "synthetic:kick", *SHORT, "--fidelity", "analytic", "--out", tmp_path / "out"],
+        "export .nc": ["export", walked, "--out", tmp_path / "samples.nc"],
+        "export .mat": ["export", walked, "--out", tmp_path / "samples.mat"],
+    }[command]
+    done = subprocess.run([sys.executable, "-c", LIMITED, *map(str, words)], capture_output=True, text=True, check=False)
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert "File too large" in done.stderr.splitlines()[-1]
+    assert not list(tmp_path.iterdir())

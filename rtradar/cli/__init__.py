@@ -9,8 +9,11 @@ and how to mend it.
 from __future__ import annotations
 
 import argparse
+import errno
+import os
 import sys
 import warnings
+from contextlib import suppress
 from typing import TextIO
 
 from rtradar.errors import BackendError, CampaignError, ExtensionError, InputError
@@ -31,14 +34,32 @@ def main(arguments: list[str] | None = None) -> int:
     options = argparse.Namespace(stopped=_WHOLE)
     if arguments is None:
         end_well(lambda: options.stopped.format(**vars(options)))
-    status = _main(arguments, options)
+    status = _flushed(_main(arguments, options))
     stay_if_ending()
+    return status
+
+
+def _flushed(status: int) -> int:
+    """The exit status once all that was printed is written: 1, and one line, where that cannot be."""
+    from rtradar.cli.values import fail
+
+    try:
+        if sys.stdout is not None:
+            sys.stdout.flush()
+    except (OSError, ValueError) as error:
+        # Python would try again as it ends, and print a traceback.
+        with suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if not isinstance(error, BrokenPipeError):
+            fail(1, f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}")
+        return status or 1
     return status
 
 
 def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     # After the first moments, in which a signal would still show a traceback.
     from rtradar.cli.values import fail
+    from rtradar.files import DISK_ERRORS
 
     warnings.showwarning = _show_warning
     try:
@@ -57,6 +78,10 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
         return fail(1, f"out of memory ({str(error) or 'no more to be had'}); {_WHOLE}")
     except BrokenPipeError:
         return 1
+    except OSError as error:
+        if error.filename is not None or error.errno not in DISK_ERRORS | {errno.EBADF}:
+            raise
+        return fail(1, f"cannot write to the standard output: {error.strerror}")
     return status
 
 

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import decibels, number, seconds, whole
+from rtradar.cli.values import decibels, number, path, seconds, whole
 from rtradar.errors import InputError
 from rtradar.files import check_place, write_json
 from rtradar.radar import PRESETS
@@ -64,7 +63,7 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "motion", metavar="MOTION", help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack"
     )
-    run.add_argument("--skeleton", type=Path, metavar="ASF", help="the .asf of an .amc recording")
+    run.add_argument("--skeleton", type=path, metavar="ASF", help="the .asf of an .amc recording")
     run.add_argument(
         "--radar",
         default="paper-12ghz",
@@ -95,9 +94,9 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
         help="where to compute, and Mitsuba's backend; cpu: llvm or else scalar, auto: a GPU where it is faster (default: auto)",
     )
     run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
-    run.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the results")
+    run.add_argument("--out", type=path, required=True, metavar="DIR", help="folder for the results")
     run.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
-    run.add_argument("--json", type=Path, metavar="FILE", help="write the summary there too")
+    run.add_argument("--json", type=path, metavar="FILE", help="write the summary there too")
 
 
 def _run(options: argparse.Namespace) -> int:

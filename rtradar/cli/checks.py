@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import seconds, whole
+from rtradar.cli.values import path, seconds, whole
 from rtradar.files import check_place
 
 if TYPE_CHECKING:
@@ -16,15 +15,15 @@ if TYPE_CHECKING:
 def add(commands: Subcommands) -> None:
     """Add the three commands."""
     doctor = commands.add_parser("doctor", help="which ray-tracing backends work on this machine, and what to install")
-    doctor.add_argument("--json", type=Path, metavar="FILE", help="write the findings there as JSON")
+    doctor.add_argument("--json", type=path, metavar="FILE", help="write the findings there as JSON")
     doctor.set_defaults(command=_doctor)
 
     validate = commands.add_parser("validate", help="hold every claim against its reference; 1 where one fails")
     validate.add_argument("--quick", action="store_true", help="fewer cases of each claim")
     validate.add_argument("--only", metavar="NAME", help="one claim by its key (sphere, path, doppler, ...), or one script")
-    validate.add_argument("--json", type=Path, metavar="FILE", help="write all rows there as JSON")
-    validate.add_argument("--figure", type=Path, metavar="DIR", help="draw one picture a script there")
-    validate.add_argument("--readme", type=Path, metavar="FILE", help="replace the table of figures in this markdown file")
+    validate.add_argument("--json", type=path, metavar="FILE", help="write all rows there as JSON")
+    validate.add_argument("--figure", type=path, metavar="DIR", help="draw one picture a script there")
+    validate.add_argument("--readme", type=path, metavar="FILE", help="replace the table of figures in this markdown file")
     validate.set_defaults(command=_validate)
 
     bench = commands.add_parser("bench", help="how long every stage takes, beside other rungs, the paper's method and floors")
@@ -38,8 +37,8 @@ def add(commands: Subcommands) -> None:
     bench.add_argument("--duration", type=seconds, metavar="S", help="of the capture [s] (default: 3; with --quick 0.5)")
     bench.add_argument("--only", metavar="PART", help="rungs (with the paper's method and floors), or growth")
     bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
-    bench.add_argument("--json", type=Path, metavar="FILE", help="write all that is measured there as JSON")
-    bench.add_argument("--figure", type=Path, metavar="FILE", help="draw it there, as PNG")
+    bench.add_argument("--json", type=path, metavar="FILE", help="write all that is measured there as JSON")
+    bench.add_argument("--figure", type=path, metavar="FILE", help="draw it there, as PNG")
     bench.set_defaults(command=_bench)
 
 

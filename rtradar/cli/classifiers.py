@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import number, numbers, whole
+from rtradar.cli.values import number, numbers, path, whole
 from rtradar.errors import InputError
 from rtradar.files import check_place, write_json
 
@@ -24,10 +23,10 @@ def add(commands: Subcommands) -> None:
 
 def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument(
-        "data", type=Path, nargs="+", metavar="DIR", help="folders of clouds, as rtradar dataset build leaves them"
+        "data", type=path, nargs="+", metavar="DIR", help="folders of clouds, as rtradar dataset build leaves them"
     )
     train.add_argument(
-        "--out", type=Path, required=True, metavar="OUT", help="folder for the trainings; one that is there is gone on with"
+        "--out", type=path, required=True, metavar="OUT", help="folder for the trainings; one that is there is gone on with"
     )
     train.add_argument("--recipe", default="lean", help="lean, our own, or paper (default: lean)")
     train.add_argument(
@@ -58,17 +57,17 @@ def _add_train(train: argparse.ArgumentParser) -> None:
 
 def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
     evaluate.add_argument(
-        "trained", type=Path, nargs="+", metavar="OUT", help="folders that rtradar train made, of the same clouds"
+        "trained", type=path, nargs="+", metavar="OUT", help="folders that rtradar train made, of the same clouds"
     )
     evaluate.add_argument(
         "--baselines", action="store_true", help="also simple classifiers, on the clouds and the split of the first"
     )
     evaluate.add_argument(
-        "--data", type=Path, nargs="+", metavar="DIR", help="of --baselines: the clouds (default: where they were)"
+        "--data", type=path, nargs="+", metavar="DIR", help="of --baselines: the clouds (default: where they were)"
     )
-    evaluate.add_argument("--out", type=Path, metavar="DIR", help="folder for tables and pictures (default: the first OUT)")
+    evaluate.add_argument("--out", type=path, metavar="DIR", help="folder for tables and pictures (default: the first OUT)")
     evaluate.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
-    evaluate.add_argument("--json", type=Path, metavar="FILE", help="write the numbers there too")
+    evaluate.add_argument("--json", type=path, metavar="FILE", help="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
 
 

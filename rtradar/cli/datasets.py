@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import OneLineParser, count
+from rtradar.cli.values import OneLineParser, count, path
 from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
@@ -19,13 +18,13 @@ def add(commands: Subcommands) -> None:
     build = dataset.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser).add_parser(
         "build", help="make the samples of a collection that are missing or damaged; started again it goes on"
     )
-    build.add_argument("spec", type=Path, metavar="SPEC.toml", help="what the collection shall hold")
-    build.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder of the collection")
+    build.add_argument("spec", type=path, metavar="SPEC.toml", help="what the collection shall hold")
+    build.add_argument("--out", type=path, required=True, metavar="DIR", help="folder of the collection")
     build.add_argument("--plan", action="store_true", help="make a sample of each kind, and say how long the others will take")
     place = build.add_mutually_exclusive_group()
     place.add_argument("--workers", type=count, metavar="N", help="processes that share the cores (default: one a core)")
     place.add_argument("--scheduler", metavar="ADDRESS", help="a Dask scheduler to use, such as tcp://host:8786")
-    build.add_argument("--json", type=Path, metavar="FILE", help="write what was made there as JSON")
+    build.add_argument("--json", type=path, metavar="FILE", help="write what was made there as JSON")
     build.set_defaults(command=_dataset_build, stopped="the same command goes on with the samples that '{out}' has not yet")
 
 

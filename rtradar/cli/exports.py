@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from rtradar.cli.values import path
 from rtradar.files import check_place, write_json
 
 if TYPE_CHECKING:
@@ -16,16 +16,16 @@ def add(commands: Subcommands) -> None:
     """Add the command."""
     export = commands.add_parser("export", help="IF samples for MATLAB, xarray or as int16, clouds as PLY or PCD")
     export.add_argument(
-        "source", type=Path, metavar="SOURCE", help="folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd"
+        "source", type=path, metavar="SOURCE", help="folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd"
     )
     export.add_argument(
         "--out",
-        type=Path,
+        type=path,
         required=True,
         metavar="FILE",
         help="its suffix says the format: .mat, .nc or .bin of IF samples; .ply, .pcd or .npz of a cloud",
     )
-    export.add_argument("--json", type=Path, metavar="FILE", help="write there as JSON what was written")
+    export.add_argument("--json", type=path, metavar="FILE", help="write there as JSON what was written")
     export.set_defaults(command=_export)
 
 

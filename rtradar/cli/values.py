@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
@@ -70,6 +71,13 @@ def count(text: str) -> int:
     if value < 1:
         raise ValueError
     return value
+
+
+def path(text: str) -> Path:
+    """Not empty: the path of nothing would be that of the current folder."""
+    if not text:
+        raise argparse.ArgumentTypeError("it is empty; give the name of a file or folder")
+    return Path(text)
 
 
 for _kind, _name in (

@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import seconds
+from rtradar.cli.values import path, seconds
 from rtradar.errors import InputError
 from rtradar.files import check_place, write_json
 
@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 def add(commands: Subcommands) -> None:
     """Add the command."""
     view = commands.add_parser("view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser")
-    view.add_argument("folder", type=Path, metavar="DIR", help="what 'rtradar run --out DIR' left")
+    view.add_argument("folder", type=path, metavar="DIR", help="what 'rtradar run --out DIR' left")
     view.add_argument(
         "--out",
-        type=Path,
+        type=path,
         metavar="FILE.html",
         help="write the page there, and open nothing (default: DIR/view.html, opened)",
     )
@@ -29,9 +29,9 @@ def add(commands: Subcommands) -> None:
     view.add_argument(
         "--colour", choices=("part", "power", "velocity"), default="part", help="what colours mean at first (default: part)"
     )
-    view.add_argument("--still", type=Path, metavar="FILE.png", help="draw one moment; without --out there is no page then")
+    view.add_argument("--still", type=path, metavar="FILE.png", help="draw one moment; without --out there is no page then")
     view.add_argument("--time", type=seconds, metavar="S", help="of the still [s] (default: the middle)")
-    view.add_argument("--json", type=Path, metavar="FILE", help="write what was shown and written there")
+    view.add_argument("--json", type=path, metavar="FILE", help="write what was shown and written there")
     view.set_defaults(command=_view)
 
 

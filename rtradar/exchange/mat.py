@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rtradar.exchange.recording import IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import atomic_file, stored
+from rtradar.files import LastingFile, atomic_file, stored
 
 _HEADER = b"MATLAB 7.3 MAT-file, Platform: rtradar, Created on: Thu Jan  1 00:00:00 1970 HDF5 schema 1.00 ."
 """Text of the file; the same time always, so that the same samples give the same file."""
@@ -32,15 +32,16 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
     """
     chirps, *rest = recording.shape
     chunk = (*rest[::-1], recording.step)
-    with atomic_file(path) as raw:
+    with atomic_file(path) as raw, LastingFile(raw) as written:
         # MATLAB reads no newer layout than that of HDF5 1.8.
-        with h5py.File(raw, "w", userblock_size=_HEADER_BYTES, libver=("earliest", "v108")) as file:
+        with h5py.File(written, "w", userblock_size=_HEADER_BYTES, libver=("earliest", "v108")) as file:
             data = file.create_dataset("if_samples", (*rest[::-1], chirps), _COMPLEX, chunks=chunk)
             data.attrs["MATLAB_class"] = np.bytes_("single")
             for first, block in recording.blocks("writing"):
                 turned = np.zeros(chunk, dtype=np.complex64)  # whole, as chunks at the end of an axis are in the file
                 turned[..., : len(block)] = block.T
                 data.id.write_direct_chunk((0, 0, 0, first), turned.tobytes())
+                written.check()
             for name, quantity in quantities(recording.radar, chirps).items():
                 _put(file, name, quantity.values if quantity.values.ndim > 1 else quantity.values[None])
             struct = file.create_group("radar")
@@ -49,8 +50,8 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
                 _put(struct, name, [[value]])
             _put_text(struct, "name", recording.radar.name or "-")
             _put_text(struct, "all", radar_text(recording.radar))
-        raw.seek(0)
-        raw.write(_HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
+        written.seek(0)
+        written.write(_HEADER.ljust(116) + bytes(8) + b"\x00\x02IM")
     return {"variable": "if_samples", "type": "complex single"}
 
 

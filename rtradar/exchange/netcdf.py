@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import atomic_file, stored
+from rtradar.files import LastingFile, atomic_file, stored
 
 _PARTS = ("if_real", "if_imag")
 """netCDF knows no complex numbers."""
@@ -25,7 +25,8 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
     """
     shape = recording.shape
     chunk = (recording.step, *shape[1:])
-    with atomic_file(path) as raw, h5py.File(raw, "w", libver=("earliest", "v108"), track_order=True) as file:
+    layout: dict[str, Any] = {"libver": ("earliest", "v108"), "track_order": True}
+    with atomic_file(path) as raw, LastingFile(raw) as written, h5py.File(written, "w", **layout) as file:
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
             axis = file.create_dataset(name, data=np.arange(length))
             axis.make_scale(name)
@@ -50,6 +51,7 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
                 whole = np.zeros(chunk, dtype=np.float32)  # as chunks at the end of an axis are in the file
                 whole[: len(block)] = values
                 part.id.write_direct_chunk((first, 0, 0, 0), whole.tobytes())
+            written.check()
     return {"variables": list(_PARTS), "type": "float32"}
 
 

@@ -11,6 +11,8 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.files import LastingFile
+
 _AXES = {
     "time": ("s", "centre of the processing window since the start of the capture"),
     "slow_time": ("s", "centre of the averaged cycles since the start of the capture"),
@@ -62,7 +64,8 @@ class MapStore:
 
     def __init__(self, path: Path, fixed: Mapping[str, NDArray[np.float64]], attributes: Mapping[str, Any]) -> None:
         # The newest format indexes growing data in constant memory.
-        self._file = h5py.File(path, "w", libver="latest")
+        self._written = LastingFile(path.open("w+b"))
+        self._file = h5py.File(self._written, "w", libver="latest")
         for key, value in attributes.items():
             self._file.attrs[key] = value
         for name in (*_GROWING, *fixed):
@@ -102,6 +105,7 @@ class MapStore:
             data = self._file[name]
             data.resize(len(data) + len(steps), axis=0)
             data[len(data) - len(steps) :] = steps
+        self._written.check()
 
     def put(self, time: float, **maps: ArrayLike) -> None:
         """Maps of one moment [s], which do not grow."""
@@ -115,3 +119,4 @@ class MapStore:
     def close(self) -> None:
         """Write what is held, and let the file go; may be called again."""
         self._file.close()
+        self._written.close()
