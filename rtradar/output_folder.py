@@ -261,9 +261,10 @@ def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
 def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> None:
     found = _existing(place, kind)
     foreign = sorted(found.keys() - _owned(found, _read_list(place, kind).get("files", ())))
-    odd = [name for name in foreign if not (stat.S_ISREG(found[name]) or stat.S_ISLNK(found[name]))]
+    odd = [name for name in foreign if kind.is_folder(name) or not (stat.S_ISREG(found[name]) or stat.S_ISLNK(found[name]))]
     if overwrite and odd:
-        raise InputError(f"'{place.path}' holds '{odd[0]}', which is no file; move it away, or give another folder (--out)")
+        is_not = "no folder" if kind.is_folder(odd[0]) else "no file"
+        raise InputError(f"'{place.path}' holds '{odd[0]}', which is {is_not}; move it away, or give another folder (--out)")
     if foreign and not overwrite:
         more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
         raise InputError(

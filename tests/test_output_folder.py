@@ -7,6 +7,7 @@ import json
 import os
 import shutil
 import socket
+import stat
 import subprocess
 import sys
 from collections.abc import Callable
@@ -124,6 +125,13 @@ def bind(path: Path) -> None:
             os.chdir(here)
 
 
+def device(path: Path) -> None:
+    try:
+        os.mknod(path, 0o600 | stat.S_IFCHR, os.makedev(1, 5))  # /dev/zero, which never ends
+    except PermissionError:
+        pytest.skip("only root makes devices")
+
+
 FOREIGN: dict[str, Callable[[Path], object]] = {
     "file": lambda path: path.write_text("mine"),
     "folder": lambda path: path.mkdir() or (path / "mine").write_text("mine"),  # type: ignore[func-returns-value]
@@ -132,6 +140,7 @@ FOREIGN: dict[str, Callable[[Path], object]] = {
     "dangling link": lambda path: path.symlink_to("nowhere"),
     "pipe": os.mkfifo,
     "socket": bind,
+    "device": device,
 }
 
 

@@ -3,8 +3,9 @@
 Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
 build``, ``train``, ``export`` and ``view``, some into a folder where an older result of the same command lies. Claimed is: every
 file is as it was before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes
-within 2 s, with status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the next
-one that looks into the folder of a run finds old files or new ones, not both, and takes away what is neither.
+within 2 s, with status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the folder
+of a run holds old files or new ones, not both; a command that reads it changes nothing, and the next run into it takes away what
+is neither.
 
     python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
@@ -191,12 +192,17 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
     _, orphans = psutil.wait_procs(children, timeout=10)
     after = contents(out) if out.exists() else {}
     left = tally(old, after)
+    hidden, lost, changed, new = compared(old, after)
+    touched = 0
     if name == "SIGKILL" and not case.single:
         look = [sys.executable, "-m", "rtradar", "export", str(out), "--out", str(work / "samples.mat")]
         subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S)  # a folder without samples is refused
-        after = contents(out) if out.exists() else {}
-        left += f", then {tally(old, after)}"
-    hidden, lost, changed, new = compared(old, after)
+        touched = len(set((contents(out) if out.exists() else {}).items()) ^ set(after.items()))
+        _, said_again = start(case, out, work).communicate(timeout=PATIENCE_S)
+        if said_again:
+            print(said_again)
+        hidden = compared(old, contents(out))[0]
+        left += f", then {tally(old, contents(out))}"
     lines = [line for line in said.replace("\r", "\n").splitlines() if line.startswith("rtradar: ")]
     ended = f"{seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
     row = f"{case.name:26} {stage.name:18} {name:8} {ended}"
@@ -207,6 +213,8 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
     if not case.single:
         mixed = len(changed) + len(new) if len(changed) < len(old) else 0
         found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed"))
+    if name == "SIGKILL" and not case.single:
+        found.append(judged(claim, "files that a reader changed", "1", touched, 0, says=SAYS + "files that a reader changed"))
     if name != "SIGKILL":
         found += [
             judged(claim, "end", "s", seconds, 2.0, says=SAYS + "seconds until it has ended"),
