@@ -115,6 +115,72 @@ def test_joints_stand_where_the_table_puts_them(tmp_path: Path, walk: np.ndarray
     assert to_nodes(motion) is motion
 
 
+def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Markers of somebody of this height, and the centres of the joints, of the left side: forward, left, up [m].
+
+    He stands with his forearms forward, his thumbs up and his gaze level. Heights and breadths are fractions of the standing
+    height after Drillis and Contini (see `rtradar.motion.figure`): chin 0.870, eyes 0.936, shoulders 0.818 high and 0.129 to
+    the side, hips 0.530 and 0.048, knees 0.285, ankles 0.039. Markers lie on the skin, about 3 to 6 cm from the centre of a
+    limb; waist markers are worn on the crest of the hip bone, 0.60 high, and wrist bars stand off the back of the hand's wrist.
+    The head is carried before the spine: the ear lies 50 degrees above the horizontal of the seventh cervical vertebra.
+    """
+    arm, elbow = 0.118, 0.818 - 0.186
+    joints = {
+        "head": (0.0, 0.0, (0.870 + 1) / 2),
+        "root": (0.030, 0.0, 0.570),
+        "hip": (0.030, 0.048, 0.530),
+        "knee": (0.030, 0.048, 0.285),
+        "ankle": (0.020, 0.048, 0.039),
+        "toe": (0.100, 0.048, 0.030),
+        "shoulder": (0.0, arm, 0.818 - 0.020),
+        "elbow": (0.0, arm, elbow),
+        "wrist": (0.146, arm, elbow),
+        "hand": (0.190, arm, elbow),
+    }
+    markers = {
+        "FHD": (0.070, 0.040, 0.950),
+        "BHD": (-0.025, 0.035, 0.950),
+        "C7": (-0.035, 0.0, 0.860),
+        "CLAV": (0.035, 0.0, 0.818),
+        "T10": (-0.060, 0.0, 0.700),
+        "STRN": (0.060, 0.0, 0.690),
+        "SHO": (0.0, 0.129, 0.818 + 0.010),
+        "ELB": (-0.010, arm + 0.025, elbow),
+        "WRA": (0.150, arm + 0.025, elbow + 0.022),
+        "WRB": (0.150, arm + 0.025, elbow - 0.022),
+        "FIN": (0.200, arm + 0.015, elbow),
+        "FWT": (0.070, 0.070, 0.600),
+        "BWT": (-0.070, 0.045, 0.600),
+        "KNE": (0.025, 0.048 + 0.030, 0.285),
+        "ANK": (0.015, 0.048 + 0.022, 0.039),
+        "TOE": (0.100, 0.048, 0.030),
+    }
+    return tuple({name: height * np.array(place) for name, place in places.items()} for places in (markers, joints))  # type: ignore[return-value]
+
+
+@pytest.mark.parametrize("height", [1.2, 1.77, 2.05])
+def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> None:
+    """Within 3 % of the height, 5.3 cm of a grown man: a mean person's markers are no nearer to anybody's own joints."""
+    markers, joints = anatomical(height)
+
+    def mirrored(places: dict[str, np.ndarray], name: str, side: str, plain: str) -> np.ndarray:
+        return places[name] if name in places else places[plain] * [1, 1 if side in "lL" else -1, 1]
+
+    worn = [name for name in HDM05 if name in NEEDED]
+    path = moved(np.array([mirrored(markers, name, name[0], name[1:]) for name in worn]))
+    motion = load_motion(write(tmp_path / "walk.c3d", path, worn))
+    known = [node for node in NODES if node in joints or node[2:] in joints]
+    expected = moved(np.array([mirrored(joints, node, node[0], node[2:]) for node in known]))
+    found = motion.positions[:, [NODES.index(node) for node in known]]
+    apart = np.linalg.norm(found - expected, axis=2).max(axis=0) / height
+    assert dict(zip(known, apart.round(3), strict=True)) == {node: pytest.approx(0, abs=0.03) for node in known}
+    # The spine rises from bone to bone, from the root to the head.
+    spine = motion.positions[:, [NODES.index(n) for n in ("root", "lowerback", "upperback", "thorax", "neck", "head")]]
+    rises = np.diff(spine[..., 2], axis=1) / height
+    assert rises.min() > 0.03
+    assert rises.max() < 0.15
+
+
 def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.ndarray) -> None:
     motion = load_motion(write(tmp_path / "walk.c3d", walk))
     # He turns by 1.2 rad/s as a whole: every bone's rotation from the first frame on is that turn.

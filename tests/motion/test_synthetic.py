@@ -140,6 +140,33 @@ def test_punch(seed: int, side: str) -> None:
     assert max(speeds(motion, "l_toe").max(), speeds(motion, "r_toe").max()) < 1e-6
 
 
+@pytest.mark.parametrize("height_m", [1.3, 1.75, 2.0])
+@pytest.mark.parametrize(("activity", "least_deg", "most_deg"), [("kick", 20.0, 40.0), ("punch", 25.0, 50.0)])
+def test_who_strikes_stands_on_bent_knees(activity: str, least_deg: float, most_deg: float, height_m: float) -> None:
+    """How high the root is follows from where the feet stand, how long the legs are and how far a fighter's knees are bent.
+
+    Leg lengths are those of Drillis and Contini: thigh 0.245 and shank 0.246 of the standing height, and the root lies 0.04
+    above the hip joints. A root 2 % of the height lower or higher would bend the knees by 10 degrees more or less.
+    """
+    for seed in range(4):
+        motion = synthetic_motion(activity, seed, height_m=height_m, side="left")
+        found = motion.positions / height_m
+        # The right leg stands all the time; the left one kicks.
+        for side in "r" if activity == "kick" else "lr":
+            ankle, hip = (found[:, NODE(f"{side}_{end}")] for end in ("ankle", "hip"))
+            np.testing.assert_allclose(ankle[:, 2], 0.039, atol=1e-6)
+            aside = np.linalg.norm((hip - ankle)[:, :2], axis=1)
+            lowest, highest = (
+                0.039 + np.sqrt(0.245**2 + 0.246**2 + 2 * 0.245 * 0.246 * np.cos(np.radians(bend)) - aside**2)
+                for bend in (most_deg, least_deg)
+            )
+            assert (lowest < hip[:, 2]).all()
+            assert (hip[:, 2] < highest).all()
+        # Both hips are level to 15 degrees, so the root is as far above their middle.
+        hips = found[:, [NODE("l_hip"), NODE("r_hip")], 2].mean(axis=1)
+        np.testing.assert_allclose(found[:, 0, 2] - hips, 0.04, atol=0.04 * (1 - np.cos(np.radians(15))))
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_jumping_jack_flies_freely(seed: int) -> None:
     motion = synthetic_motion("jumping_jack", seed, duration_s=4.0)
