@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from collections import Counter
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.analytic import far_field_echo
+from rtradar.scatter.first_come import FirstCome
 from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
 from rtradar.scatter.fresnel import sweep_nodes
 from rtradar.scatter.fresnel_anchors import ZoneShares
@@ -38,11 +40,16 @@ _MARGIN = 0.7
 _LEAST_COMPLEX = 1e-3
 
 
+_KEPT_CHUNKS, _PASSING = 25, 4
+"""Of so many instants: the first 20 s of a recording, which is gone through twice, and of what comes later what a block needs."""
+
+
 class Planned(NamedTuple):
-    """Some instants: ``chosen (time, part)`` ways, ``told`` what they were chosen by."""
+    """Some instants: ``chosen (time, part)`` ways; ``in_view (time, part)`` and ``hiders (time, part, part)`` of a `Forecast`."""
 
     chosen: NDArray[np.int64]
-    told: Forecast
+    in_view: NDArray[np.bool_]
+    hiders: NDArray[np.bool_]
 
 
 class _Group(NamedTuple):
@@ -100,7 +107,11 @@ class Auto:
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
         self._starts = MirrorStarts(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
-        self._planned: dict[int, Planned] = {}
+        self._planned: FirstCome[int, Planned] = FirstCome(_KEPT_CHUNKS, _PASSING)
+        # What `account` tells: parts and instants (way, part) and by reason, and as bits of a number the chunks that are in it.
+        self._ways = np.zeros((len(WAYS), len(body.part_names)), dtype=np.int64)
+        self._why: Counter[str] = Counter()
+        self._counted = 0
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -138,34 +149,34 @@ class Auto:
 
     def account(self) -> dict[str, Any]:
         """What was modelled how, and why, as shares of part and time so far: ``ways``, ``parts`` and ``why``, for JSON."""
-        chosen = np.concatenate([planned.chosen for planned in self._planned.values()])
-        told = [planned.told for planned in self._planned.values()]
-        hidden, in_view = (np.concatenate([getattr(one, name) for one in told]) for name in ("hidden", "in_view"))
-        # Of what the next cheaper way leaves wrong, is most due to curvature?
-        cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
-        wrong, optics = (
-            np.take_along_axis(np.concatenate([getattr(one, name) for one in told]), cheaper, axis=1)[:, 0]
-            for name in ("wrong", "optics")
-        )
-        curved = optics > wrong
-        higher = chosen > ANALYTIC
-        why = {
-            "left out: hidden": chosen == LEFT_OUT,
-            "analytic: enough": chosen == ANALYTIC,
-            "higher: hidden": higher & hidden,
-            "higher: cut by an edge": higher & ~hidden & ~in_view,
-            "higher: in full view, curvature": higher & in_view & curved,
-            "higher: in full view, near field": higher & in_view & ~curved,
-        }
         names = self._body.part_names
+        whole = self._ways.sum()
         return {
-            "ways": {name: float((chosen == way).mean()) for way, name in enumerate(WAYS)},
-            "why": {reason: float(where.mean()) for reason, where in why.items()},
+            "ways": {name: float(count / whole) for name, count in zip(WAYS, self._ways.sum(axis=1), strict=True)},
+            "why": {reason: float(count / whole) for reason, count in self._why.items()},
             "parts": {
-                names[part]: {name: float((chosen[:, part] == way).mean()) for way, name in enumerate(WAYS)}
-                for part in range(len(names))
+                part: {name: float(share) for name, share in zip(WAYS, counts / counts.sum(), strict=True)}
+                for part, counts in zip(names, self._ways.T, strict=True)
             },
         }
+
+    def _count(self, chosen: NDArray[np.int64], told: Forecast) -> None:
+        """Add some instants, chosen (time, part), to what `account` tells."""
+        # Of what the next cheaper way leaves wrong, is most due to curvature?
+        cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
+        wrong, optics = (np.take_along_axis(errors, cheaper, axis=1)[:, 0] for errors in (told.wrong, told.optics))
+        curved = optics > wrong
+        higher = chosen > ANALYTIC
+        for reason, where in {
+            "left out: hidden": chosen == LEFT_OUT,
+            "analytic: enough": chosen == ANALYTIC,
+            "higher: hidden": higher & told.hidden,
+            "higher: cut by an edge": higher & ~told.hidden & ~told.in_view,
+            "higher: in full view, curvature": higher & told.in_view & curved,
+            "higher: in full view, near field": higher & told.in_view & ~curved,
+        }.items():
+            self._why[reason] += int(where.sum())
+        self._ways += (chosen == np.arange(len(WAYS))[:, None, None]).sum(axis=1)
 
     def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         """Weights (way, chirp, part), which sum to 1 or, left out, to less; and parts that others cut there (part,)."""
@@ -180,7 +191,7 @@ class Auto:
                 planned, row = self._plan(int(instant))
                 here = np.flatnonzero(end == instant)
                 weights[planned.chosen[row], here[:, None], parts] += weight[here]
-                cut |= ~planned.told.in_view[row]
+                cut |= ~planned.in_view[row]
         weights[LEFT_OUT] = 0
         return weights, cut
 
@@ -189,22 +200,28 @@ class Auto:
         before = int(time / self._radar.chirp_interval_s) // self._step
         instants = [self._plan(max(0, before + i)) for i in (-1, 0, 1, 2)]
         edges = np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
-        hiders = np.any([planned.told.hiders[row] for planned, row in instants], axis=0)
+        hiders = np.any([planned.hiders[row] for planned, row in instants], axis=0)
         return np.asarray(hiders & edges[:, None])
 
     def _plan(self, instant: int) -> tuple[Planned, int]:
         """The chunk of instants that holds this one, and its row."""
         chunk, row = divmod(instant, _INSTANTS_AT_ONCE)
-        if chunk not in self._planned:
-            # One more on either side, for what a part needs there it is given here, too.
-            instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
-            times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
-            poses = self._body.at(np.minimum(times, self._body.duration_s))
-            told = forecast(self._radar, poses, spreading=self._spreading)
-            chosen = choose(told, self._power_share, self._complex_share)
-            inner = {name: array[1:-1] for name, array in told._asdict().items()}
-            self._planned[chunk] = Planned(chosen[1:-1], Forecast(**inner))
-        return self._planned[chunk], row
+        return self._planned.get(chunk, partial(self._look_ahead, chunk)), row
+
+    def _look_ahead(self, chunk: int) -> Planned:
+        # One more on either side, for what a part needs there it is given here, too.
+        instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
+        times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
+        poses = self._body.at(np.minimum(times, self._body.duration_s))
+        told = forecast(self._radar, poses, spreading=self._spreading)
+        chosen = choose(told, self._power_share, self._complex_share)[1:-1]
+        told = Forecast(**{name: array[1:-1] for name, array in told._asdict().items()})
+        # Later ones are looked at again in the next pass, and are not to count twice.
+        if not self._counted >> chunk & 1:
+            self._counted |= 1 << chunk
+            self._count(chosen, told)
+        # Copies, which do not hold what they are cut from.
+        return Planned(chosen.copy(), told.in_view.copy(), told.hiders.copy())
 
     def _by(
         self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]

@@ -1,7 +1,9 @@
 """The rung that chooses: what it tells beforehand, what it chooses, and what it hands on."""
 
 import dataclasses
+import gc
 import itertools
+import tracemalloc
 from dataclasses import dataclass
 
 import numpy as np
@@ -199,6 +201,37 @@ def test_the_account_says_all_and_adds_up(backend: Backend) -> None:
     assert account["parts"]["curtain"]["left-out"] == 0
     for ways in account["parts"].values():
         assert sum(ways.values()) == pytest.approx(1)
+
+
+@dataclass(frozen=True)
+class Swinging(Passing):
+    """The same, to and fro for minutes."""
+
+    duration_s: float = 100.0
+
+    def at(self, times: Array) -> Poses:
+        return super().at(0.1 + 0.2 * np.sin(2 * np.pi * np.asarray(times) / 4))
+
+
+def test_what_is_kept_does_not_grow_with_the_capture() -> None:
+    rung = Auto(passing_radar(), Swinging(), tolerance_db=10.0)  # type: ignore[arg-type]
+    held, first_pass = [], {}
+    tracemalloc.start()
+    try:
+        for _ in range(2):  # power, then the signal
+            for begin in range(0, 100_000, 800):  # 1 ms each
+                rung.echoes(np.array([begin]))
+                if begin in (30_400, 99_200):
+                    gc.collect()
+                    held.append(tracemalloc.get_traced_memory()[0])
+            first_pass = first_pass or rung.account()
+    finally:
+        tracemalloc.stop()
+    # 69 s more, and all of it again: nothing but Python's own tables. To keep what was forecast took 1.2 MB.
+    assert max(held[1:]) - held[0] < 60e3
+    # Nothing counts twice.
+    assert rung.account() == first_pass
+    assert 0 < first_pass["ways"]["left-out"] < 1
 
 
 @pytest.mark.slow
