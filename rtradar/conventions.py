@@ -26,8 +26,10 @@ Spreading
 Watts
     ``|amplitude|^2`` and the power of IF samples, in m^2, times P_t G_t G_r lambda^2 / (4 pi)^3 (`Radar.watts_per_m2`) are the
     received power of the radar equation P_r = P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R1^2 R2^2) [W] (Skolnik, Introduction to
-    Radar Systems, 3rd ed., section 1.2), lambda at the sweep centre. A complex sample holds noise of k T F Fs watts, for the
-    ideal IF low-pass is as wide as the sample rate Fs (Richards, Fundamentals of Radar Signal Processing, chapter 2).
+    Radar Systems, 3rd ed., section 1.2), lambda at the sweep centre. A complex sample holds noise of k (T + 290 K (F - 1)) Fs
+    watts (`Radar.noise_power_w`): T is the temperature of what the antennas see, and the noise factor F is that of a source at
+    290 K (Friis, Proc. IRE 32, 1944). The ideal IF low-pass is as wide as the sample rate Fs (Richards, Fundamentals of Radar
+    Signal Processing, chapter 2).
 
 Wavelength
     Doppler, angle and near-field phases belong to the CENTRE frequency of the sweep, for that is how fast the phase
@@ -46,6 +48,9 @@ SPEED_OF_LIGHT_MPS = 299_792_458.0
 
 BOLTZMANN_J_PER_K = 1.380649e-23
 """Boltzmann's constant [J/K], exact by the definition of the kelvin."""
+
+NOISE_FIGURE_TEMPERATURE_K = 290.0
+"""Temperature of the source for which the noise figure of a receiver is defined (IEEE) [K]."""
 
 MINIMUM_ANTENNA_DISTANCE_M = 0.3
 """A body part nearer to an antenna than this is refused: the echo model has no meaning there."""

@@ -1,4 +1,7 @@
-"""Powers in watts against the radar equation, written out, and noise against kTBF."""
+"""Powers in watts against the radar equation, written out, and noise against kTBF.
+
+Powers are far below the absolute tolerance that `pytest.approx` has unless told otherwise, so all name ``abs=0``.
+"""
 
 from __future__ import annotations
 
@@ -49,15 +52,28 @@ def test_noise_is_ktbf() -> None:
     # -174 dBm/Hz, 11 dB, 512 kHz.
     assert RADAR.sample_rate_hz == pytest.approx(512e3)
     assert 10 * math.log10(RADAR.noise_power_w * 1e3) == pytest.approx(-173.975 + 11 + 10 * math.log10(512e3), abs=0.001)
-    cold = dataclasses.replace(RADAR, noise_temperature_k=29.0)
-    assert cold.noise_power_w == pytest.approx(RADAR.noise_power_w / 10)
+
+
+@pytest.mark.parametrize(
+    ("figure_db", "antenna_k"), [(11.0, 20.0), (11.0, 0.0), (3.0, 290.0), (3.0, 2900.0), (0.0, 77.0), (0.0, 0.0)]
+)
+def test_the_receiver_adds_its_noise_whatever_the_antennas_see(figure_db: float, antenna_k: float) -> None:
+    # The definition of the noise figure: the receiver adds F - 1 times the noise of a source at 290 K (Friis 1944).
+    radar = dataclasses.replace(RADAR, noise_figure_db=figure_db, noise_temperature_k=antenna_k)
+    received = 1.380649e-23 * antenna_k * 512e3
+    added = 1.380649e-23 * 290 * (10 ** (figure_db / 10) - 1) * 512e3
+    assert radar.noise_power_w == pytest.approx(received + added, rel=1e-12, abs=0)
+    samples = np.zeros((2000, 4, 128), np.complex64)
+    Noise(radar.noise_power_w / radar.watts_per_m2, 0).add(samples, radar, 0)
+    measured = (np.abs(samples.astype(np.complex128)) ** 2).mean() * radar.watts_per_m2
+    assert measured == pytest.approx(received + added, rel=5 / math.sqrt(samples.size), abs=0)
 
 
 def test_measured_noise_power() -> None:
     samples = np.zeros((2000, 4, 128), np.complex64)
     Noise(RADAR.noise_power_w / RADAR.watts_per_m2, 0).add(samples, RADAR, 0)
     measured = (np.abs(samples.astype(np.complex128)) ** 2).mean() * RADAR.watts_per_m2
-    assert measured == pytest.approx(RADAR.noise_power_w, rel=5 / math.sqrt(samples.size))
+    assert measured == pytest.approx(RADAR.noise_power_w, rel=5 / math.sqrt(samples.size), abs=0)
 
 
 def test_a_run_by_watts(tmp_path: Path) -> None:
@@ -68,15 +84,15 @@ def test_a_run_by_watts(tmp_path: Path) -> None:
     ]
     first, second = (result.summary for result in results)
     assert first["parameters"]["snr_db"] == "physical"
-    assert first["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w)
-    assert second["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w)
-    assert second["watts"]["echo_power_w"] == pytest.approx(10 * first["watts"]["echo_power_w"])
-    assert second["noise_power_m2"] == pytest.approx(first["noise_power_m2"] / 10)
+    assert first["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w, rel=1e-12, abs=0)
+    assert second["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w, rel=1e-12, abs=0)
+    assert second["watts"]["echo_power_w"] == pytest.approx(10 * first["watts"]["echo_power_w"], rel=1e-12, abs=0)
+    assert second["noise_power_m2"] == pytest.approx(first["noise_power_m2"] / 10, rel=1e-12, abs=0)
     with h5py.File(tmp_path / "a" / "maps.h5") as file:
         floor = float(np.median(file["range_doppler"][0])) * RADAR.watts_per_m2
     # Hann in both transforms, four channels: 1.5^2 / (128 samples x 200 cycles); the median of Gamma(4) is 0.918 of its mean.
     expected = 4 * RADAR.noise_power_w * 1.5**2 / (128 * 200) * 0.918
-    assert floor == pytest.approx(expected, rel=0.05)
+    assert floor == pytest.approx(expected, rel=0.05, abs=0)
 
 
 @pytest.mark.parametrize(

@@ -6,20 +6,22 @@ reflector  a triangular trihedral of 0.5 m, its return by `rays`, through IF sam
 small      the same of 0.3 m, where what the three plates send back by themselves counts more: the closed form leaves it out,
            so this is reported
 point      the same chain with a known cross-section
-noise      mean power of IF samples without an echo against k T F Fs, within five standard deviations of that mean, and through
-           the range-Doppler map
+noise      mean power of IF samples without an echo against k (T + 290 K (F - 1)) Fs (Friis, Proc. IRE 32, 1944), within five
+           standard deviations of that mean, at antenna temperatures T of 290, 20 and 0 K, and through the range-Doppler map
 
 A trihedral is asked far away, where its cross-section is one, and then set at its range.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 from collections.abc import Iterator
 
 import numpy as np
 import trimesh
+from numpy.typing import NDArray
 from rows import Row, judged, main, reported
 
 import rtradar as rt
@@ -100,11 +102,10 @@ def point_rows() -> Iterator[Row]:
 
 def noise_rows(quick: bool) -> Iterator[Row]:
     made = radar(24e9)
-    expected = BOLTZMANN * 290 * 10 ** (FIGURE_DB / 10) * 256 / 62.5e-6
+    expected = noise_w(290.0)
     total, count, maps = 0.0, 0, []
     for seed in range(2 if quick else 8):
-        samples = np.zeros((made.chirps_per_frame, 2, 256), np.complex64)
-        Noise(made.noise_power_w / made.watts_per_m2, seed).add(samples, made, 0)
+        samples = noise_samples(made, seed)
         total += float((np.abs(samples.astype(np.complex128)) ** 2).sum()) * made.watts_per_m2
         count += samples.size
         power = power_map(range_spectrum(samples, made)[:, None], made)
@@ -120,6 +121,27 @@ def noise_rows(quick: bool) -> Iterator[Row]:
     error = abs(10 * math.log10(float(np.mean(maps)) / mapped))
     says = "noise power in range-Doppler maps in watts against k T F Fs over the windows' gain"
     yield judged("noise", "in the map", "dB", error, 0.02, says=says)
+    says = (
+        "noise power of IF samples with antennas that see 0, 20 and 1000 K against k (T + 290 K (F - 1)) Fs, in standard "
+        "deviations of the mean"
+    )
+    for antenna_k in (0.0, 20.0, 1000.0):
+        samples = noise_samples(dataclasses.replace(made, noise_temperature_k=antenna_k), 8)
+        mean = float((np.abs(samples.astype(np.complex128)) ** 2).mean()) * made.watts_per_m2
+        sigmas = abs(mean / noise_w(antenna_k) - 1) * math.sqrt(samples.size)
+        yield judged("noise", f"antennas that see {antenna_k:g} K, off by", "sigma", sigmas, 5.0, says=says)
+
+
+def noise_w(antenna_k: float) -> float:
+    """Of one IF sample: what the antennas see, and what the receiver adds to a source of 290 K by its noise figure [W]."""
+    return BOLTZMANN * (antenna_k + 290 * (10 ** (FIGURE_DB / 10) - 1)) * 256 / 62.5e-6
+
+
+def noise_samples(made: rt.Radar, seed: int) -> NDArray[np.complex64]:
+    """IF samples of one frame without an echo."""
+    samples = np.zeros((made.chirps_per_frame, 2, 256), np.complex64)
+    Noise(made.noise_power_w / made.watts_per_m2, seed).add(samples, made, 0)
+    return samples
 
 
 def measure(quick: bool) -> list[Row]:

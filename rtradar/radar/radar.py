@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from rtradar.antenna import Antenna
-from rtradar.conventions import BOLTZMANN_J_PER_K
+from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_array, check_multiplexing, checked_values
 from rtradar.radar.schedule import Schedule
@@ -69,7 +69,8 @@ class Radar(Schedule):
     noise_figure_db : float, optional
         Of the receiver, everything from the antenna to the IF samples. With the transmit power it says how strong noise is.
     noise_temperature_k : float
-        Of what the antennas see; 290 K is the one that noise figures refer to.
+        Of what the antennas see. The noise of the receiver itself follows from its noise figure, which is defined for a source
+        at 290 K, and does not change with it.
     tx_antenna, rx_antenna : Antenna, optional
         Of each Tx and Rx, a table in TOML; isotropic if left out.
 
@@ -186,7 +187,10 @@ class Radar(Schedule):
 
     @property
     def noise_power_w(self) -> float:
-        """K T F B of one complex IF sample [W], B the sample rate.
+        """K (T + 290 K (F - 1)) B of one complex IF sample [W].
+
+        T is the `noise_temperature_k` of what the antennas see, F the noise factor and B the sample rate. Noise factors are
+        defined for a source at 290 K, so the receiver itself adds the noise of 290 K (F - 1), whatever the antennas see.
 
         Raises
         ------
@@ -195,5 +199,5 @@ class Radar(Schedule):
         """
         if self.noise_figure_db is None:
             raise InputError(f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; give it")
-        factor = 10 ** (self.noise_figure_db / 10)
-        return float(BOLTZMANN_J_PER_K * self.noise_temperature_k * factor * self.sample_rate_hz)
+        receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
+        return float(BOLTZMANN_J_PER_K * (self.noise_temperature_k + receiver_k) * self.sample_rate_hz)
