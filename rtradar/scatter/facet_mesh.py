@@ -8,7 +8,7 @@ each, down to a quarter of a wavelength.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,9 @@ from rtradar.errors import InputError
 from rtradar.scatter.facet_integral import facet_integral
 from rtradar.scatter.facets import mesh_facets
 from rtradar.scatter.polarization import copolar
+from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backend import select, use
 from rtradar.trace.mesh_visibility import MeshTracer
-
-if TYPE_CHECKING:
-    import trimesh
 
 LARGEST_KA = 400.0
 """Of a smooth mesh; a larger one must have the facets that an ellipsoid of its surface would need."""
@@ -50,7 +48,7 @@ Array = NDArray[np.float64]
 
 
 def mesh_scattering(
-    mesh: trimesh.Trimesh,
+    mesh: Triangles,
     tx: Array,
     rx: Array,
     wavenumber: Array,
@@ -62,17 +60,14 @@ def mesh_scattering(
     Raises
     ------
     InputError
-        Where the mesh has no surface, is too coarse, or an antenna is inside of it.
+        Where the mesh is too coarse, or an antenna so near that it takes too many facets.
     BackendError
         Where no backend of that kind works here.
     """
-    corners, closed = _oriented(mesh)
     _refuse_coarse(mesh, float(wavenumber.max()))
+    corners, closed = np.ascontiguousarray(mesh.corners), mesh.closed
     tracer = MeshTracer(use(select(variant)), corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     middle = corners.mean(axis=(0, 1))
-    if closed:
-        for name, antennas in (("tx", tx), ("rx", rx)):
-            _refuse_inside(corners, name, antennas)
     field = np.empty(len(tx), dtype=np.complex128)
     for pair in range(len(tx)):
         divided, face = _divide_bent(corners, tx[pair], rx[pair], wavenumber[pair])
@@ -93,31 +88,17 @@ def mesh_scattering(
     return field * copolar(tx - middle, rx - middle, polarization)
 
 
-def _oriented(mesh: trimesh.Trimesh) -> tuple[Array, bool]:
-    """Corners (facet, 3, 3) of the triangles that have an area, outward where the mesh is closed; whether it is."""
-    vertices = np.asarray(mesh.vertices, dtype=np.float64)
-    if len(mesh.faces) == 0 or not np.isfinite(vertices).all():
-        raise InputError("scattering_length: the mesh has no triangle or holds NaN; give one with finite vertices")
-    closed = bool(mesh.is_watertight)
-    if closed and not mesh.is_winding_consistent:
-        mesh = mesh.copy()
-        mesh.fix_normals()
-    corners = vertices[np.asarray(mesh.faces)]
-    if closed and mesh.volume < 0:
-        corners = corners[:, ::-1]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    if not area.any():
-        raise InputError("scattering_length: no triangle of the mesh has an area; give a surface")
-    return np.ascontiguousarray(corners[area > 0]), closed
-
-
-def _refuse_coarse(mesh: trimesh.Trimesh, wavenumber: float) -> None:
+def _refuse_coarse(triangles: Triangles, wavenumber: float) -> None:
     """A smooth mesh beyond ka = 400 needs 6 (ka)^2 facets on the surface of its sphere, and its share of them."""
-    spread = np.asarray(mesh.vertices) - np.asarray(mesh.bounds).mean(axis=0)
+    import trimesh  # slow to import
+
+    vertices = triangles.vertices
+    spread = vertices - (vertices.min(axis=0) + vertices.max(axis=0)) / 2
     radius = float(np.linalg.norm(spread, axis=1).max())
     ka = wavenumber * radius
     if ka <= LARGEST_KA:
         return
+    mesh = trimesh.Trimesh(vertices, triangles.faces, process=False)
     angles = np.asarray(mesh.face_adjacency_angles)
     # What meets at sharper angles is an edge, at less than a thousandth of a radian one plane.
     if np.count_nonzero((angles > 1e-3) & (angles < 0.5)) <= len(angles) / 2:
@@ -128,19 +109,6 @@ def _refuse_coarse(mesh: trimesh.Trimesh, wavenumber: float) -> None:
             f"physical optics of a smooth mesh with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs {needed} facets; "
             f"it has {len(mesh.faces)}: mesh it finer"
         )
-
-
-def _refuse_inside(corners: Array, name: str, antennas: Array) -> None:
-    """By the solid angle under which the mesh is seen, 4 pi from inside (Van Oosterom and Strackee, 1983)."""
-    low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
-    for index in np.flatnonzero(((antennas >= low) & (antennas <= high)).all(axis=1)):
-        ways = corners - antennas[index]
-        a, b, c = ways[:, 0], ways[:, 1], ways[:, 2]
-        la, lb, lc = (np.linalg.norm(way, axis=1) for way in (a, b, c))
-        volume = np.sum(a * np.cross(b, c), axis=1)
-        below = la * lb * lc + np.sum(a * b, axis=1) * lc + np.sum(b * c, axis=1) * la + np.sum(c * a, axis=1) * lb
-        if abs(np.arctan2(volume, below).sum()) > math.pi:
-            raise InputError(f"scattering_length: {name}[{index}] is inside the mesh; antennas must stand outside the target")
 
 
 def _divide_bent(corners: Array, tx: Array, rx: Array, wavenumber: float) -> tuple[Array, NDArray[np.int64]]:

@@ -16,6 +16,7 @@ from rtradar.scatter.facet_mesh import mesh_scattering
 from rtradar.scatter.facet_shadows import FacetShadows
 from rtradar.scatter.facets import MAXIMUM_FACETS, Facets, ellipsoid_facets, subdivisions_for
 from rtradar.scatter.polarization import copolar
+from rtradar.scatter.target_mesh import target_mesh
 from rtradar.trace.backend import select, use
 from rtradar.trace.facet_visibility import FacetTracer
 
@@ -66,7 +67,7 @@ def facet_scattering(
     Raises
     ------
     InputError
-        Where ka is above 400 and facets are too few, or ``facets`` does not fit the target.
+        Where ka is above 400 and facets are too few, ``facets`` does not fit the target, or a mesh cannot be used.
     BackendError
         Where no backend of that kind works here.
 
@@ -75,21 +76,22 @@ def facet_scattering(
     Equations :eq:`po` and :eq:`facet` of the theory page.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
+    if not isinstance(solid, Ellipsoids) and facets is not None:
+        raise InputError("facets: a mesh brings its own triangles; leave facets out, or subdivide the mesh")
     if len(tx) == 0:
         return np.zeros(0, dtype=np.complex128)
-    if not isinstance(target, Ellipsoids):
-        if facets is not None:
-            raise InputError("facets: a mesh brings its own triangles; leave facets out, or subdivide the mesh")
-        return mesh_scattering(target, tx, rx, wavenumber, polarization, variant)
+    if not isinstance(solid, Ellipsoids):
+        return mesh_scattering(solid, tx, rx, wavenumber, polarization, variant)
     backend = select(variant)
-    surface = ellipsoid_facets(target.semi_axes, subdivisions_for(_enough_facets(target, float(wavenumber.max()), facets)))
-    shadows = FacetShadows(FacetTracer(use(backend), target.semi_axes), surface, target.semi_axes)
+    surface = ellipsoid_facets(solid.semi_axes, subdivisions_for(_enough_facets(solid, float(wavenumber.max()), facets)))
+    shadows = FacetShadows(FacetTracer(use(backend), solid.semi_axes), surface, solid.semi_axes)
     field = np.empty(len(tx), dtype=np.complex128)
-    parts = len(target.centres)
+    parts = len(solid.centres)
     block = max(1, _VIEWS_AT_ONCE // (8 * parts * len(surface.faces)))
     for first in range(0, len(tx), block):
         some = slice(first, first + block)
-        field[some] = _ellipsoids(target, surface, shadows, tx[some], rx[some], wavenumber[some], polarization)
+        field[some] = _ellipsoids(solid, surface, shadows, tx[some], rx[some], wavenumber[some], polarization)
     return field
 
 

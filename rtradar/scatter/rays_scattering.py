@@ -12,6 +12,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.footprints import radiate
 from rtradar.scatter.shooting import Grid, Shooter, exits
+from rtradar.scatter.target_mesh import target_mesh
 from rtradar.scatter.tubes import EllipsoidGrid, MeshGrid, PosedGrid
 from rtradar.trace.backend import select, use
 from rtradar.trace.bounces import BodySurfaces, MeshSurfaces, Surfaces
@@ -64,11 +65,12 @@ def rays_scattering(
     Raises
     ------
     InputError
-        Where a dial is out of range, or would take too many tubes.
+        Where a dial is out of range, or would take too many tubes, or a mesh cannot be used.
     BackendError
         Where no backend of that kind works here.
     """
     check_dials(rays_per_wavelength, bounces)
+    solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
     field = np.zeros(len(tx), dtype=np.complex128)
     if len(tx) == 0:
         return field
@@ -77,26 +79,21 @@ def rays_scattering(
     edge = 2 * np.pi / wavenumber.max() / rays_per_wavelength
     surfaces: Surfaces
     grid: Grid
-    closed = True
-    if isinstance(target, Ellipsoids):
-        pose = (target.centres, target.frames)
-        surfaces = BodySurfaces(mi, target.semi_axes)
+    if isinstance(solid, Ellipsoids):
+        pose = (solid.centres, solid.frames)
+        surfaces = BodySurfaces(mi, solid.semi_axes)
         surfaces.pose(*pose)
-        grid = PosedGrid(EllipsoidGrid.cover(target.semi_axes, edge), *pose, target.semi_axes)
+        grid = PosedGrid(EllipsoidGrid.cover(solid.semi_axes, edge), *pose, solid.semi_axes)
     else:
-        vertices, faces = np.asarray(target.vertices, dtype=np.float64), np.asarray(target.faces)
-        closed = bool(target.is_watertight and target.is_winding_consistent)
-        if closed and target.volume < 0:
-            faces = faces[:, ::-1]
-        surfaces = MeshSurfaces(mi, vertices, faces)
-        grid = MeshGrid.cover(vertices, faces, edge)
+        surfaces = MeshSurfaces(mi, solid.vertices, solid.faces)
+        grid = MeshGrid.cover(solid.vertices, solid.faces, edge)
     shooter = Shooter(
         surfaces=surfaces,
         grid=grid,
         bounces=bounces,
         wavenumber=float(wavenumber.max()),
         polarization=polarization,
-        two_sided=not closed,
+        two_sided=not (isinstance(solid, Ellipsoids) or solid.closed),
     )
     for transmitter, of_tx in _alike(tx):
         shots = shooter.shoot(transmitter)

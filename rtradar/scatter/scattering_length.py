@@ -79,7 +79,8 @@ def scattering_length(
     Raises
     ------
     InputError
-        Where shapes do not fit, an antenna is inside the target, or the rung or a dial is unknown.
+        Where shapes do not fit, an antenna is inside the target, a mesh cannot be used (`rtradar.scatter.target_mesh`), or the
+        rung or a dial is unknown.
 
     Notes
     -----
@@ -98,8 +99,6 @@ def scattering_length(
         raise InputError(
             f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it needs curvature in closed form"
         )
-    elif not (hasattr(target, "vertices") and hasattr(target, "faces")):
-        raise InputError(f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or trimesh.Trimesh")
     # On use: what traces brings Mitsuba.
     field: Field = getattr(import_module(f"rtradar.scatter.{home.module}"), home.function)
     known = [name for name in inspect.signature(field).parameters if name not in _COMMON]

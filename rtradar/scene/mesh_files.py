@@ -1,4 +1,4 @@
-"""Triangle meshes from files that may be anybody's: read by trimesh, with limits, closed or known to be open."""
+"""Triangle meshes, which may be anybody's, from files or not: checked in one place, closed or known to be open."""
 
 from __future__ import annotations
 
@@ -20,6 +20,8 @@ MOST_FACES = 2_000_000
 MOST_BYTES = 200_000_000
 _FARTHEST = 1e9
 """In units of the file: a kilometre in micrometres."""
+_MOST_INWARD = 100
+"""Pieces of a mesh that are wound the other way round than the whole, each of which is a cavity or is turned."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,14 +108,7 @@ def read_mesh(path: Path) -> Triangles:
 def _read(path: Path, changed_ns: int, size: int) -> Triangles:
     where = f"mesh '{path}'"
     refuse_hostile_header(where, path, MOST_FACES)
-    vertices, faces = _load(where, path)
-    if not np.all(np.abs(vertices) <= _FARTHEST):
-        raise InputError(f"{where}: a vertex is not finite, or more than {_FARTHEST:g} units away")
-    if len(faces) == 0:
-        raise InputError(f"{where} has no triangles")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"{where}: a triangle names a vertex that is not there")
-    return _joined(where, vertices, faces)
+    return checked_triangles(where, *_load(where, path))
 
 
 def _load(where: str, path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
@@ -160,29 +155,78 @@ def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[
     return pieces
 
 
-def _joined(where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
-    """The same surface with each place once, no triangle without area, and, where it is closed, normals outward."""
-    import trimesh
+def checked_triangles(where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
+    """A mesh, checked: each place once, no triangle without area, and, where it is closed, normals outward.
 
+    Parameters
+    ----------
+    where : str
+        What messages begin with.
+    vertices : (vertex, 3) float64
+        In any unit.
+    faces : (face, 3) int64
+        Numbers of vertices.
+
+    Returns
+    -------
+    Triangles
+        In the same unit.
+
+    Raises
+    ------
+    InputError
+        Where there are no triangles or too many, none has an area, a vertex is not finite or is not there, or faces do not
+        agree which side is outside.
+    """
+    import trimesh  # slow to import
+
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or (len(faces) and faces.shape[1] != 3):
+        raise InputError(f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) and (face, 3)")
+    if not np.all(np.abs(vertices) <= _FARTHEST):
+        raise InputError(f"{where}: a vertex is not finite, or more than {_FARTHEST:g} units away")
+    if len(faces) == 0:
+        raise InputError(f"{where} has no triangles; give a surface")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, counted from 0")
     places, which = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = which.reshape(-1)[faces]
     a, b, c = (places[faces[:, k]] for k in range(3))
     faces = faces[np.linalg.norm(np.cross(b - a, c - a), axis=1) > 0]
     if len(faces) == 0:
-        raise InputError(f"{where} has no triangle with an area")
+        raise InputError(f"{where} has no triangle with an area; give a surface")
     if len(faces) > MOST_FACES:
         raise InputError(f"{where} has {len(faces)} triangles; {MOST_FACES} are allowed")
     mesh = trimesh.Trimesh(places, faces, process=False)
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
         raise InputError(f"{where}: its triangles do not agree which side is outside; make their normals consistent")
-    if closed and mesh.volume < 0:
-        faces = faces[:, ::-1]
+    if closed:
+        faces = _outward(where, mesh)
     used, faces = np.unique(faces, return_inverse=True)
     places, faces = np.ascontiguousarray(places[used]), np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64)
     places.setflags(write=False)
     faces.setflags(write=False)
     return Triangles(places, faces, closed)
+
+
+def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
+    """Faces of a closed mesh, each of its pieces wound outward; but a piece inside another may be a cavity, and stays."""
+    from trimesh import graph
+
+    faces, corners = np.array(mesh.faces), np.asarray(mesh.triangles - mesh.vertices.mean(axis=0))
+    label: Any = graph.connected_component_labels  # has no types
+    piece = label(mesh.face_adjacency, node_count=len(faces))
+    volume = np.bincount(piece, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
+    if volume.sum() < 0:
+        faces, corners, volume = faces[:, ::-1], corners[:, ::-1], -volume
+    inward = np.flatnonzero(volume < 0)
+    if len(inward) > _MOST_INWARD:
+        raise InputError(f"{where}: {len(inward)} of its pieces are inside out; make their normals consistent")
+    for number in inward:
+        own = piece == number
+        if _winding(corners[~own] - corners[own][0, 0]) < 0.5:
+            faces[own] = faces[own, ::-1]
+    return faces
 
 
 def _winding(corners: NDArray[np.float64]) -> float:
