@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 
+_SAME = 1e-4
+"""Of its least semi-axis: where two parts are no farther apart than this anywhere, rays cannot tell which is in front."""
+
 
 @dataclass(frozen=True)
 class Ellipsoids:
@@ -53,3 +56,24 @@ class Ellipsoids:
         error = np.abs(np.swapaxes(frame_array, 1, 2) @ frame_array - np.eye(3)).max(initial=0.0)
         if error > 1e-6 or (np.linalg.det(frame_array) < 0).any():
             raise InputError("Ellipsoids.frames: not proper rotations; columns must be orthonormal and right-handed")
+
+    def without_repeats(self) -> Ellipsoids:
+        """The parts but those that fill the same place as one before them.
+
+        Two of those are one body: whichever of them rays meet first is an accident of rounding.
+
+        Returns
+        -------
+        Ellipsoids
+        """
+        # x.S^-1 x = 1 on the surface about the centre: frames that differ in signs or order of axes make the same S.
+        stretch = self.frames * self.semi_axes[:, None]
+        shape = stretch @ np.swapaxes(stretch, 1, 2)
+        kept: list[int] = []
+        for part, (centre, own, least) in enumerate(zip(self.centres, shape, self.semi_axes.min(axis=1), strict=True)):
+            away = np.linalg.norm(self.centres[kept] - centre, axis=-1)
+            # S differs by 2 a da where a semi-axis a differs by da.
+            differs = np.abs(shape[kept] - own).max(axis=(1, 2), initial=0.0)
+            if not ((away <= _SAME * least) & (differs <= 2 * _SAME * least**2)).any():
+                kept.append(part)
+        return self if len(kept) == len(self.centres) else Ellipsoids(self.centres[kept], self.frames[kept], self.semi_axes[kept])

@@ -27,6 +27,11 @@ from rtradar.threads import in_threads
 _TAPER = 0.4
 """Of the way to the rim the window stays 1."""
 
+_MOST = 2.0
+"""Bound of |V|: a round hole that leaves the first Fresnel zone alone open doubles the free field, and no single opening does
+more (a straight edge 1.17, a slit 1.34, a rectangle 1.80). More comes out for parts about as small as the wavelength: their free
+sum, by which the lost one is divided, has not settled where their lit side ends."""
+
 
 @taken_in()
 def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
@@ -143,7 +148,8 @@ def _zone_share(  # type: ignore[no-untyped-def]
             if one[4] == 0:
                 out[f, pair] = 0.0
             elif one[2] != 0 or one[3] != 0:
-                out[f, pair] = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
+                left = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
+                out[f, pair] = left / max(1.0, abs(left) / _MOST)
 
 
 @compiled()
@@ -209,7 +215,7 @@ def zone_shares(
     Returns
     -------
     (zone, frequency, pair) complex128
-        1 in full view, 0 hidden; in between its modulus may pass 1 a little, as it does beyond any edge.
+        1 in full view, 0 hidden; in between its modulus may pass 1, as it does beyond any edge, but never 2.
     """
     floats = (tx, rx, points, *poses, antennas, wavenumber, laid_for)
     tx, rx, points, centres, frames, semi_axes, antennas, wavenumber, laid_for = (

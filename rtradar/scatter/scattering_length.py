@@ -24,15 +24,16 @@ Field = Callable[..., NDArray[np.complex128]]
 
 
 class _Home(NamedTuple):
-    """Where the field of a rung is computed: module and function within this package, and whether it takes meshes."""
+    """Where the field of a rung is computed: module and function within this package; whether it takes meshes, and traces."""
 
     module: str
     function: str
     meshes: bool
+    hides: bool = True
 
 
 _HOMES = {
-    "analytic": _Home("scattering_length", "_analytic_field", meshes=False),
+    "analytic": _Home("scattering_length", "_analytic_field", meshes=False, hides=False),
     "specular": _Home("scattering_length", "_specular_field", meshes=False),
     "fresnel": _Home("fresnel", "fresnel_scattering", meshes=False),
     "physical-optics": _Home("facet_scattering", "facet_scattering", meshes=True),
@@ -56,8 +57,9 @@ def scattering_length(
     Parameters
     ----------
     target : Ellipsoids or trimesh.Trimesh
-        Its parts hide each other where the rung traces. Meshes, of perfect conductors, are for ``physical-optics``,
-        ``reference`` (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
+        Its parts hide each other where the rung traces, and of parts that fill the same place one counts. Meshes, of perfect
+        conductors, are for ``physical-optics``, ``reference`` (the same here, where nothing is interpolated) and ``rays``; an
+        open mesh is a thin sheet.
     tx, rx : (n, 3) array_like
         Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single (3,).
     frequency : float or (n,) array_like
@@ -106,6 +108,8 @@ def scattering_length(
         if dial not in known:
             allowed = ", ".join(known) or "none"
             raise InputError(f"scattering_length: '{fidelity}' has no dial '{dial}'; it has: {allowed}")
+    if isinstance(target, Ellipsoids) and home.hides:
+        target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
         _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
         wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS

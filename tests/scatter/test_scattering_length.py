@@ -102,6 +102,22 @@ def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
     assert abs(rt.scattering_length(both(plate, target), rx, rx, 12e9) - rt.scattering_length(plate, rx, rx, 12e9)) > 0.01
 
 
+@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics", "reference", "rays"])
+@pytest.mark.parametrize("copies", [2, 5])
+def test_parts_that_fill_the_same_place_are_one(copies: int, fidelity: str) -> None:
+    tx, frame = np.array([3.0, 1.0, 0.5]), Rotation.random(random_state=0).as_matrix()
+    one = rt.Ellipsoids([[0.01, 0.02, 0.03]], [frame], [[0.05, 0.06, 0.1]])
+    # The same ellipsoid again with its axes in another order and direction, and a hair away.
+    turned = np.stack([-frame[:, 2], frame[:, 1], frame[:, 0]], axis=1)
+    again = rt.Ellipsoids([[0.01, 0.02, 0.03 + 1e-7]], [turned], [[0.1, 0.06, 0.05]])
+    other = ellipsoid(0.04, 0.05, 0.05, centre=(0.0, 0.5, 0.0))
+    many = both(one, other)
+    for copy in range(copies - 1):
+        many = both(many, (one, again)[copy % 2])
+    expected = rt.scattering_length(both(one, other), tx, tx, 12e9, fidelity)
+    np.testing.assert_array_equal(rt.scattering_length(many, tx, tx, 12e9, fidelity), expected)
+
+
 def test_specular_and_analytic_meet_far_away() -> None:
     sight = directions(np.random.default_rng(3), 50)
     target = ellipsoid(0.05, 0.09, 0.2)
