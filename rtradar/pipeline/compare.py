@@ -18,7 +18,7 @@ from rtradar.output_folder import atomic_folder
 from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
 from rtradar.pipeline.chain import Result, run
 from rtradar.pipeline.output_files import comparison_files
-from rtradar.pipeline.pictures import busiest_window, thinned
+from rtradar.pipeline.pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
 from rtradar.report.comparison_page import write_comparison
 from rtradar.report.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
@@ -219,6 +219,7 @@ def _draw(results: Mapping[str, Result], folder: Path, radar: Radar, reference: 
     with h5py.File(folder / reference / "maps.h5") as maps:
         window = busiest_window(maps)
         moment, velocity = float(maps["time"][window]), maps["velocity"][:]
+        cleaned = {name: title + removed(maps[name]) for name in ("range_doppler", "spectrogram")}
         slow, times = maps["spectrogram_velocity"][:], thinned(maps, "spectrogram", "spectrogram_time")[1]
     range_doppler, spectrogram = {}, {}
     for name in results:
@@ -226,8 +227,8 @@ def _draw(results: Mapping[str, Result], folder: Path, radar: Radar, reference: 
             range_doppler[name] = maps["range_doppler"][window]
             spectrogram[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T
     across, up = ("Velocity [m/s], positive receding", velocity), ("Range [m]", radar.range_m)
-    draw_maps(next(paths), range_doppler, across, up, f"{title}, window at {moment:.2f} s")
-    draw_maps(next(paths), spectrogram, ("Time [s]", times), (across[0], slow), title)
+    draw_maps(next(paths), range_doppler, across, up, f"{cleaned['range_doppler']}, window at {moment:.2f} s")
+    draw_maps(next(paths), spectrogram, ("Time [s]", times), (across[0], slow), cleaned["spectrogram"])
     draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
     return drawn
 

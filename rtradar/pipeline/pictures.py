@@ -51,25 +51,32 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dic
 
     with h5py.File(folder / "maps.h5") as maps:
         power, times = thinned(maps, "range_time", "slow_time")
-        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, title)
+        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, title + removed(maps["range_time"]))
         if len(maps["spectrogram_time"]):
             power, times = thinned(maps, "spectrogram", "spectrogram_time")
-            velocity = maps["spectrogram_velocity"][:]
-            draw_spectrogram(to("Spectrogram", "spectrogram.png"), power, times, velocity, title)
+            velocity, what = maps["spectrogram_velocity"][:], title + removed(maps["spectrogram"])
+            draw_spectrogram(to("Spectrogram", "spectrogram.png"), power, times, velocity, what)
         window = busiest_window(maps)
-        moment = f"{title}, window at {float(maps['time'][window]):.2f} s"
+        cleaned = removed(maps["range_doppler"])
+        moment = f"{title}, window at {float(maps['time'][window]):.2f} s{cleaned}"
         power, mask = maps["range_doppler"][window], maps["detections"][window].astype(bool)
         draw_range_doppler(to("Range-Doppler map and detections", "range_doppler.png"), power, mask, radar, moment)
         angles = {angle: (maps[f"range_{angle}"][window], maps[angle][:]) for angle in ("azimuth", "elevation") if angle in maps}
     if angles:
         draw_range_angle(to("Range-azimuth and range-elevation", "range_angle.png"), angles, radar, moment)
-    draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title)
+    draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title + cleaned)
     if angles:
         shown = clouds.spatial.strongest()
         every = math.ceil(max(len(shown.points), 1) / _SPATIAL_DOTS)
         points, velocity = shown.points[::every], shown.velocity[::every]
-        draw_spatial_cloud(to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title)
+        draw_spatial_cloud(to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title + cleaned)
     return drawn
+
+
+def removed(data: Any) -> str:
+    """A further line of a title: how static clutter was removed from an open dataset of maps; empty where it was not."""
+    how = data.attrs["clutter_removal"]
+    return "" if how == "none" else f"\nstatic clutter removed: {how}"
 
 
 def busiest_window(maps: Any) -> int:

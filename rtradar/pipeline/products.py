@@ -14,12 +14,12 @@ from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     ClutterRemoval,
     Detector,
+    SlidingRangeTime,
     SlidingSpectrogram,
     angle_grid,
     power_map,
     range_azimuth,
     range_elevation,
-    range_time,
     window_cycles,
 )
 from rtradar.radar import Radar
@@ -41,7 +41,7 @@ class Products:
     title : str
         Of the file.
     removal : ClutterRemoval
-        Applied before Doppler, and to all that is made of the spectra but for the mean, which knows windows only.
+        Applied to everything that is made of the spectra.
     received : ReceivedWindow, optional
         A window whose map is kept as it was before the removal.
     doppler_device : str
@@ -68,7 +68,8 @@ class Products:
     ) -> None:
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
         self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal, doppler_device=doppler_device)
-        self._spectrogram = SlidingSpectrogram(radar)
+        self._spectrogram = SlidingSpectrogram(radar, removal=removal)
+        self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.piece = self._clouds.piece
         axes = {
             "range": radar.range_m,
@@ -79,7 +80,12 @@ class Products:
         lines = {"azimuth": radar.tx_y * radar.rx_y > 1, "elevation": radar.tx_z * radar.rx_z > 1}
         self._angle_names = [name for name, there in lines.items() if there]
         axes |= {name: angle_grid(radar) for name in self._angle_names}
-        self._store = MapStore(path, axes, {"title": title})
+        removed = {
+            "time": removal.description(radar.cycles_per_frame),
+            "slow_time": removal.description(self._range_time.window_cycles),
+            "spectrogram_time": removal.description(window_cycles(radar)),
+        }
+        self._store = MapStore(path, axes, {"title": title}, clutter_removal=removed)
 
     def take(self, spectra: NDArray[np.complex64], first: int) -> None:
         """The next chirps, ``spectra (chirp, rx, range)`` from chirp ``first`` on; whole TDM cycles.
@@ -91,7 +97,7 @@ class Products:
             self._keep_received(cube, self._received.start_cycle)
         spectra = self._clouds.without_clutter(spectra, first)
         with stages.time("range"):
-            power, times = range_time(spectra, radar, first_chirp=first, step_s=RANGE_TIME_S)
+            power, times = self._range_time.push(spectra, first)
         with stages.time("spectrogram"):
             columns = self._spectrogram.push(spectra)
         with stages.time("write"):
@@ -117,7 +123,9 @@ class Products:
             self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
 
     def finish(self) -> Clouds:
-        """Close the file and give the clouds."""
+        """Write what is held, close the file and give the clouds."""
+        power, times = self._range_time.finish()
+        self._store.extend("slow_time", times, range_time=power)
         self._store.close()
         return self._clouds.finish()
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rtradar.body import Body
 from rtradar.pipeline.indoors import Indoors, ghosts
-from rtradar.pipeline.pictures import busiest_window
+from rtradar.pipeline.pictures import busiest_window, removed
 from rtradar.radar import Radar
 from rtradar.report import draw_before_after, draw_plan, draw_range_azimuth_with_walls
 from rtradar.scene import Scene
@@ -42,9 +42,10 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
             received = maps["range_doppler_received"]
             time = float(received.attrs["time_s"])
             window = int(np.abs(maps["time"][:] - time).argmin())
+            after = removed(maps["range_doppler"]).strip().capitalize()
             panels = {
                 "As received": (received[:], maps["detections_received"][:].astype(bool)),
-                "Static clutter removed": (maps["range_doppler"][window], maps["detections"][window].astype(bool)),
+                after: (maps["range_doppler"][window], maps["detections"][window].astype(bool)),
             }
             azimuth_map = maps["range_azimuth_received"][:] if "range_azimuth_received" in maps else None
         else:

@@ -60,9 +60,18 @@ class MapStore:
         left out: a radar without a z-line has no elevation.
     attributes : mapping
         Of the file.
+    clutter_removal : mapping of str to str, optional
+        How static clutter has been removed from the maps along each growing axis; an attribute of their datasets. ``none`` if
+        left out.
     """
 
-    def __init__(self, path: Path, fixed: Mapping[str, NDArray[np.float64]], attributes: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        fixed: Mapping[str, NDArray[np.float64]],
+        attributes: Mapping[str, Any],
+        clutter_removal: Mapping[str, str] | None = None,
+    ) -> None:
         # The newest format indexes growing data in constant memory.
         self._written = LastingFile(path.open("w+b"))
         self._file = h5py.File(self._written, "w", libver="latest")
@@ -95,6 +104,7 @@ class MapStore:
                 **packed,
             )
             data.attrs["units"], data.attrs["long_name"] = unit, meaning
+            data.attrs["clutter_removal"] = "none" if clutter_removal is None else clutter_removal[axes[0]]
             for number, axis_name in enumerate(axes):
                 data.dims[number].attach_scale(self._file[axis_name])
 
@@ -112,7 +122,7 @@ class MapStore:
         for name, values in maps.items():
             axes, kind, unit, meaning = _SINGLE[name]
             data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind))
-            data.attrs.update({"units": unit, "long_name": meaning, "time_s": time})
+            data.attrs.update({"units": unit, "long_name": meaning, "clutter_removal": "none", "time_s": time})
             for number, axis_name in enumerate(axes):
                 data.dims[number].attach_scale(self._file[axis_name])
 

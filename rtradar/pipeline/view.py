@@ -138,9 +138,11 @@ def load_linked(folder: Path) -> Linked:
         raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
     parameters = summary["parameters"]
     fidelity, scene = _line(summary.get("fidelity", "")), _line(parameters.get("scene", "free-space"))
+    removal = _line(parameters.get("clutter_removal", "none"))
+    cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
     return Linked(
         heading=_line(parameters.get("motion", "Recording")),
-        subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]),
+        subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]) + cleaned,
         moments=moments,
         radar=radar,
         range_doppler=range_doppler,

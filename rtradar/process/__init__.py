@@ -10,6 +10,7 @@ from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
 from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_in_reserve
 from rtradar.process.power_maps import power_map, range_time
+from rtradar.process.sliding_range_time import SlidingRangeTime
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
@@ -26,6 +27,7 @@ __all__ = [
     "Detector",
     "FftDevices",
     "RangeDoppler",
+    "SlidingRangeTime",
     "SlidingSpectrogram",
     "SlidingWindows",
     "Spectrogram",

@@ -6,11 +6,13 @@ from cycle to cycle is taken out. T is the cycle, f the Doppler frequency:
 ``none``
     Nothing is taken out.
 ``mean``
-    The mean over each processing window. Doppler bins -1, 0 and 1 of a Hann window change, the others keep their values, for
-    a constant has no part in them. A slow echo goes with the clutter: of one of d bins of Doppler the share sinc(d) is taken
-    for standing still. That is all of a person who stands still in that window, and of the highest peak more than half below
-    0.6 bins (0.06 m/s for the paper's radar at 12 GHz, 0.011 m/s at 77 GHz). A fast echo loses nothing, but leaves up to
-    1 / (pi d) of its amplitude in the bins about zero, a ghost that no still thing made: -23 dB at 5.5 bins, -34 dB at 20.5.
+    The mean over each processing window; in the spectrogram over each of its own windows, in the range-time map over one
+    processing window about each step (`rtradar.process.SlidingRangeTime`). Doppler bins -1, 0 and 1 of a Hann window change,
+    the others keep their values, for a constant has no part in them. A slow echo goes with the clutter: of one of d bins of
+    Doppler the share sinc(d) is taken for standing still. That is all of a person who stands still in that window, and of the
+    highest peak more than half below 0.6 bins (0.06 m/s for the paper's radar at 12 GHz, 0.011 m/s at 77 GHz). A fast echo
+    loses nothing, but leaves up to 1 / (pi d) of its amplitude in the bins about zero, a ghost that no still thing made:
+    -23 dB at 5.5 bins, -34 dB at 20.5.
 ``exponential``
     A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is taken from the next. It starts
     as the first chirp and is the mean of all of them until 1 / a cycles are there: one chirp alone would leave its noise in
@@ -56,7 +58,14 @@ class ClutterRemoval:
     ----------
     radar : Radar
         Gives the schedule and the shape.
+
+    Attributes
+    ----------
+    works_by_windows : bool
+        Whether it is `window` that removes; `block` then gives what it gets.
     """
+
+    works_by_windows = False
 
     def __init__(self, radar: Radar) -> None:
         self._radar = radar
@@ -127,6 +136,21 @@ class ClutterRemoval:
             raise InputError(f"clutter removal: cycles have shape {values.shape}; a window needs at least one cycle")
         return self._window(values)
 
+    def description(self, window_cycles: int) -> str:
+        """What is removed and how, in a few words, for titles and attributes.
+
+        Parameters
+        ----------
+        window_cycles : int
+            TDM cycles in each of the windows that are made of the stream.
+
+        Returns
+        -------
+        str
+            ``none`` where nothing is removed.
+        """
+        return "none"
+
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         """``cycles (cycle, tx, rx, range)``, the next of the stream."""
         return cycles
@@ -155,6 +179,11 @@ def _without_mean(cycles, out):  # type: ignore[no-untyped-def]
 
 
 class _Mean(ClutterRemoval):
+    works_by_windows = True
+
+    def description(self, window_cycles: int) -> str:
+        return f"mean over {window_cycles} cycles ({window_cycles * self._radar.cycle_duration_s:.3g} s)"
+
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.empty(cycles.shape, dtype=cycles.dtype)
         _without_mean(np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1))
@@ -164,10 +193,14 @@ class _Mean(ClutterRemoval):
 class _Exponential(ClutterRemoval):
     def __init__(self, radar: Radar, time_constant_s: float) -> None:
         super().__init__(radar)
+        self._time_constant_s = time_constant_s
         self._share = -math.expm1(-radar.cycle_duration_s / time_constant_s)
         self._count = 0  # cycles in the background
         shape = (radar.n_tx, radar.n_rx, radar.samples_per_chirp)
         self._background = np.zeros(shape, np.complex128)  # double, for it takes steps of 1e-3 and less
+
+    def description(self, window_cycles: int) -> str:
+        return f"exponential background, time constant {self._time_constant_s:g} s"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.empty_like(cycles)
@@ -189,6 +222,9 @@ class _Mti(ClutterRemoval):
         self._order = pulses - 1
         self._gain = 1 / math.sqrt(math.comb(2 * self._order, self._order))  # the squares of the weights sum to this number
         self._held = np.empty((0, radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex64)  # the last cycles, as received
+
+    def description(self, window_cycles: int) -> str:
+        return f"MTI canceller of {self._order + 1} pulses"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
         out = np.zeros_like(cycles)

@@ -53,19 +53,31 @@ def range_time(
             f"range_time: spectra have shape {chirps.shape}; radar '{radar.name}' needs (chirp, {radar.n_rx}, range)"
         )
     together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
-    rows = max(1, round(step_s / radar.cycle_duration_s)) * radar.n_tx
+    bounds, times = range_time_steps(len(chirps), radar, first_chirp, step_s)
+    power = in_threads(lambda step: mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds)))
+    return np.array(power, dtype=chirps.real.dtype).reshape(len(power), chirps.shape[2]), times
 
-    def mean_power(begin: int) -> NDArray[np.floating]:
-        # Row by row: no squares of a whole block are kept.
-        parts = np.ascontiguousarray(chirps[begin : begin + rows]).view(chirps.real.dtype).reshape(-1, 2 * chirps.shape[2])
-        squares = np.einsum("ri,ri->i", parts, parts).reshape(-1, 2).sum(axis=1)
-        return np.asarray(squares / (len(parts) * together))
 
-    power = in_threads(mean_power, range(0, len(chirps), rows))
-    begins = np.arange(0, len(chirps), rows)
-    middles = first_chirp + (begins + np.minimum(begins + rows, len(chirps))) / 2
-    kind = chirps.real.dtype
-    return np.array(power, dtype=kind).reshape(len(power), chirps.shape[2]), middles * radar.chirp_interval_s
+def step_cycles(radar: Radar, step_s: float) -> int:
+    """TDM cycles in one step of `range_time`."""
+    return max(1, round(step_s / radar.cycle_duration_s))
+
+
+def range_time_steps(
+    n_chirps: int, radar: Radar, first_chirp: int, step_s: float
+) -> tuple[list[tuple[int, int]], NDArray[np.float64]]:
+    """First chirp of each step of `range_time` and the one after its last, and centres of the steps (step,) [s]."""
+    rows = step_cycles(radar, step_s) * radar.n_tx
+    begins = np.arange(0, n_chirps, rows)
+    ends = np.minimum(begins + rows, n_chirps)
+    return list(zip(begins.tolist(), ends.tolist(), strict=True)), (first_chirp + (begins + ends) / 2) * radar.chirp_interval_s
+
+
+def mean_power(values: NDArray[np.complexfloating]) -> NDArray[np.floating]:
+    """Squared magnitude of ``values (..., range)``, averaged over all axes but the last."""
+    # Row by row: no squares of a whole block are kept.
+    parts = np.ascontiguousarray(values).view(values.real.dtype).reshape(-1, 2 * values.shape[-1])
+    return np.asarray(np.einsum("ri,ri->i", parts, parts).reshape(-1, 2).sum(axis=1) / len(parts))
 
 
 def power_map(

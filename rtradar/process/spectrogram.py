@@ -20,6 +20,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.tapers import hann
 from rtradar.radar import Radar
@@ -115,7 +116,8 @@ def spectrogram(
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
     values = values.astype(np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False)
     starts = np.arange(0, len(values) - window + 1, hop)
-    return Spectrogram(_columns(values, starts, window, radar, tx), _times(starts, radar, tx, window), radar.velocity_mps(window))
+    power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar))
+    return Spectrogram(power, _times(starts, radar, tx, window), radar.velocity_mps(window))
 
 
 class SlidingSpectrogram:
@@ -131,6 +133,9 @@ class SlidingSpectrogram:
         tx * n_rx + rx.
     window, overlap
         As of `spectrogram`; `window_cycles` of them if left out.
+    removal : ClutterRemoval, optional
+        The removal whose `ClutterRemoval.block` the spectra have passed; each window of the spectrogram passes its
+        `ClutterRemoval.window`. Who stands still for the length of a window is then removed with the clutter.
 
     Raises
     ------
@@ -138,11 +143,19 @@ class SlidingSpectrogram:
         Where there is no such channel, or ``window`` or ``overlap`` have no meaning.
     """
 
-    def __init__(self, radar: Radar, *, channel: int = 0, window: int | None = None, overlap: float = OVERLAP) -> None:
+    def __init__(
+        self,
+        radar: Radar,
+        *,
+        channel: int = 0,
+        window: int | None = None,
+        overlap: float = OVERLAP,
+        removal: ClutterRemoval | None = None,
+    ) -> None:
         window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:
             raise InputError(f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
-        self._radar, self._window = radar, window
+        self._radar, self._window, self._removal = radar, window, removal or ClutterRemoval(radar)
         self._tx, self._rx = divmod(channel, radar.n_rx)
         self._hop = _hop(radar, self._tx, window, overlap)
         self._chirps = 0  # pushed so far
@@ -179,7 +192,7 @@ class SlidingSpectrogram:
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
-        power = _columns(cycles, starts, self._window, radar, self._tx)
+        power = _columns(cycles, starts, self._window, radar, self._tx, self._removal)
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop
@@ -207,7 +220,12 @@ def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDA
 
 
 def _columns(
-    signals: NDArray[np.complexfloating], starts: NDArray[np.int64], window: int, radar: Radar, tx: int
+    signals: NDArray[np.complexfloating],
+    starts: NDArray[np.int64],
+    window: int,
+    radar: Radar,
+    tx: int,
+    removal: ClutterRemoval,
 ) -> NDArray[np.floating]:
     """Power (time, velocity) of the windows that begin at these rows of the signals (cycle, range)."""
     real = np.float32 if signals.dtype == np.complex64 else np.float64
@@ -215,7 +233,7 @@ def _columns(
     power = np.empty((len(starts), window), dtype=real)
     # One window at a time stays in the cache of a core, and a column cannot depend on its neighbours in the stream.
     for row, start in enumerate(starts):
-        spectra = scipy.fft.fft(signals[start : start + window] * weights, axis=0, overwrite_x=True)
+        spectra = scipy.fft.fft(removal.window(signals[start : start + window]) * weights, axis=0, overwrite_x=True)
         parts = spectra.view(real)
         squares = np.square(parts, out=parts)
         if radar.multiplexing == "ddm":

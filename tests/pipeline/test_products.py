@@ -18,7 +18,8 @@ RADAR = rt.Radar(
 )
 
 
-def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("method", ["none", "mean"])
+def test_pieces_give_what_the_whole_gives(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cloud_maker, "_PIECE_BYTES", 1)
     random = np.random.default_rng(0)
     chirps = np.arange(800)
@@ -26,7 +27,7 @@ def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
     spectra = (tone + 0.01 * random.standard_normal((800, 4, 64))).astype(np.complex64)
     found = []
     for name, cut in (("whole", False), ("pieces", True)):
-        path, removal = tmp_path / f"{name}.h5", clutter_removal("none", RADAR)
+        path, removal = tmp_path / f"{name}.h5", clutter_removal(method, RADAR)
         made = products.Products(
             path,
             RADAR,
@@ -48,3 +49,41 @@ def test_pieces_give_what_the_whole_gives(tmp_path: Path, monkeypatch: pytest.Mo
     assert found[0].keys() == found[1].keys()
     for key, values in found[0].items():
         np.testing.assert_array_equal(found[1][key], values, err_msg=key)
+
+
+SAID = {
+    "none": dict.fromkeys(("range_doppler", "detections", "range_time", "spectrogram", "range_azimuth"), "none"),
+    # 100 cycles of 0.5 ms are a window; 128 one of the spectrogram.
+    "mean": dict.fromkeys(("range_doppler", "detections", "range_time", "range_azimuth"), "mean over 100 cycles (0.05 s)")
+    | {"spectrogram": "mean over 128 cycles (0.064 s)"},
+    "exponential": {"spectrogram": "exponential background, time constant 1 s"},
+    "mti": {"range_time": "MTI canceller of 2 pulses"},
+}
+
+
+@pytest.mark.parametrize("method", SAID)
+def test_clutter_is_removed_from_every_map_and_each_says_how(method: str, tmp_path: Path) -> None:
+    """A room of amplitude 1000 in one range bin, a walker of 1 in another."""
+    chirps = np.arange(1600)
+    walker = np.exp(4j * np.pi * 1.5 * (chirps // 2) * RADAR.cycle_duration_s / RADAR.wavelength_m)
+    own = 1000.0 * (np.arange(64) == 10) + walker[:, None] * (np.arange(64) == 20)
+    noise = 1e-3 * np.random.default_rng(0).standard_normal((1600, 4, 64))
+    spectra = (own[:, None] + noise).astype(np.complex64)
+    detect, removal = build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels), clutter_removal(method, RADAR)
+    made = products.Products(tmp_path / "maps.h5", RADAR, detect=detect, seed=0, stages=Stages(), title="", removal=removal)
+    for first in range(0, 1600, 100):
+        made.take(spectra[first : first + 100], first)
+    made.finish()
+    with h5py.File(tmp_path / "maps.h5") as maps:
+        zero_doppler = float(maps["spectrogram"][20:, 64].max())
+        still, moving = (float(maps["range_time"][40:, bin_].max()) for bin_ in (10, 20))
+        assert {name: maps[name].attrs["clutter_removal"] for name in SAID[method]} == SAID[method]
+        assert len(maps["slow_time"]) == 80
+        assert (np.diff(maps["slow_time"]) > 0).all()
+    if method == "none":
+        assert zero_doppler == pytest.approx(1e6, rel=0.01)
+        assert still == pytest.approx(1e6, rel=0.01)
+    else:
+        assert zero_doppler < 0.1  # of the walker's skirts
+        assert still < 1e-2
+    assert moving > 0.05  # MTI weakens 1.5 m/s by 10 dB

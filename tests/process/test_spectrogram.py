@@ -15,7 +15,7 @@ from scipy.signal import ShortTimeFFT
 from scipy.signal.windows import hann
 
 from rtradar.errors import InputError
-from rtradar.process import range_spectrum
+from rtradar.process import clutter_removal, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, spectrogram
 from rtradar.radar import Radar
 from rtradar.report.spectrogram_figure import draw_spectrogram
@@ -141,6 +141,19 @@ def test_a_column_comes_as_soon_as_its_last_chirp_is_there() -> None:
     stream = SlidingSpectrogram(TINY, channel=2, window=4, overlap=0.5)  # Tx 1: the second chirp of each cycle of three
     counts = [len(stream.push(chirp[None]).time) for chirp in stream_data(30, TINY)]
     assert np.flatnonzero(counts).tolist() == [10, 16, 22, 28]  # cycles 3, 5, 7 and 9
+
+
+def test_a_stream_without_clutter_has_columns_less_the_mean_of_their_window() -> None:
+    chirps = stream_data(90, TINY) + 100
+    stream = SlidingSpectrogram(TINY, window=8, overlap=0.5, removal=clutter_removal("mean", TINY))
+    power = np.concatenate([stream.push(part).power for part in np.split(chirps, [10, 11, 50])])
+    own = chirps[:: TINY.n_tx, 0]
+    expected = [
+        spectrogram(window - window.mean(axis=0, dtype=complex), TINY, window=8).power[0]
+        for window in (own[first : first + 8] for first in range(0, len(own) - 7, 4))
+    ]
+    # complex64 of values of 100.
+    np.testing.assert_allclose(power, expected, rtol=1e-3, atol=1e-9 * 100**2)
 
 
 def test_memory_does_not_grow() -> None:
