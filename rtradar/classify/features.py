@@ -45,7 +45,7 @@ def spatial_features(clouds: Clouds) -> NDArray[np.float64]:
     """Simple features of spatial clouds, (cloud, feature).
 
     Of x and y from the middle of the cloud, and of z: as `rdt_features`; the three correlations; the logarithm of the number of
-    points, plus 1.
+    points, plus 1. Those of a coordinate that the radar has not measured are 0.
     """
     return np.stack([_spatial(clouds.spatial(index)) for index in range(len(clouds))])
 
@@ -86,6 +86,7 @@ def _rdt(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def _spatial(points: NDArray[np.float64]) -> NDArray[np.float64]:
     number = len(points)
+    points = np.where(np.isnan(points), 0.0, points)
     if not number:
         points = np.zeros((1, 3))
     return np.append(_shape(points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]), np.log(number + 1))

@@ -116,6 +116,8 @@ class Collection:
     def spatial(self, index: int) -> NDArray[np.float64]:
         """The spatial cloud of the same capture (m, 3): x, y, z [m], in the order of time; m may be 0.
 
+        NaN throughout in a coordinate that the radar has not measured, as of `SpatialCloud`.
+
         Parameters
         ----------
         index : int

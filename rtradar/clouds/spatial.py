@@ -31,7 +31,11 @@ class SpatialCloud:
     Parameters
     ----------
     points : (n, 3) float64
-        World axes [m].
+        World axes [m]. An array on one line does not measure the coordinate across it, which is NaN in every point: z of a
+        line along y, y of a line along z. Its x then holds the distance from the line of the array, added to the radar's x:
+        all that is known of an echo is its range and the cone about that line on which it lies. For a line along y that is
+        the true x only at the height of the radar (sqrt(x^2 + z^2) elsewhere, x and z from the radar), for a line along z the
+        horizontal distance.
     velocity : (n,) float64
         Range rate [m/s], positive receding.
     power : (n,) float64
@@ -42,7 +46,7 @@ class SpatialCloud:
     Raises
     ------
     InputError
-        Where the shapes do not fit each other or a value is not finite.
+        Where the shapes do not fit each other or a value is not finite, but for a y or a z that is NaN throughout.
     """
 
     points: NDArray[np.float64]
@@ -56,13 +60,29 @@ class SpatialCloud:
             object.__setattr__(self, field, values)
             if values.shape != ((len(self.points), 3) if field == "points" else (len(self.points),)):
                 raise InputError(f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)")
-            if not np.isfinite(values).all():
-                raise InputError(f"spatial cloud: {field} holds NaN or infinity; every value must be finite")
+            if not (measured_alone(values) if field == "points" else np.isfinite(values).all()):
+                raise InputError(
+                    f"spatial cloud: {field} holds NaN or infinity; every value must be finite, but for y or z not measured"
+                )
+
+    @property
+    def measured(self) -> NDArray[np.bool_]:
+        """Which of x, y and z (3,) the radar has measured; all of them where there is no point."""
+        return np.asarray(~np.isnan(self.points).any(axis=0))
 
     def strongest(self) -> SpatialCloud:
         """Points at most `SHOWN_DB` below the strongest, which pictures show."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
         return SpatialCloud(self.points[kept], self.velocity[kept], self.power[kept], self.time[kept])
+
+
+def measured_alone(points: NDArray[np.float64]) -> bool:
+    """Whether ``points (n, 3)`` are finite but for one coordinate, y or z, that is NaN in all of them: not measured."""
+    finite = np.isfinite(points)
+    if finite.all():
+        return True
+    missing = np.asarray(np.isnan(points).all(axis=0))
+    return bool(missing.sum() == 1 and not missing[0] and finite[:, ~missing].all())
 
 
 def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> SpatialCloud:
@@ -71,7 +91,7 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
     The lines know nothing of each other: which peak of the one belongs to which of the other is not measured. They are paired by
     the rank of their power, and where one line has fewer peaks its strongest stands in. Two echoes of equal power in a cell
     may so exchange their elevations. A pair that is no direction at all (u^2 + w^2 > 1) is left out. A radar with one line
-    alone has all points in the plane of that line.
+    alone measures the cone about that line on which an echo lies: the coordinate across is NaN (see `SpatialCloud`).
 
     Parameters
     ----------
@@ -91,6 +111,9 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
     forward = 1 - y.sine**2 - z.sine**2
     cell, rank = np.nonzero((y.real | z.real) & (forward >= 0))
     direction = np.stack([np.sqrt(forward[cell, rank]), y.sine[cell, rank], z.sine[cell, rank]], axis=1)
+    for axis, power in ((1, spectra.y), (2, spectra.z)):
+        if power is None:
+            direction[:, axis] = np.nan
     return SpatialCloud(
         np.asarray(radar.position_m) + spectra.range_m[cell, None] * direction,
         spectra.velocity[cell],
@@ -101,6 +124,8 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
 
 def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     """Write a cloud as a NumPy archive: ``points (n, 3)``, ``velocity``, ``power``, ``time (n,)``, ``axes``, ``units (3,)``.
+
+    A coordinate that is not measured is NaN in every point.
 
     Parameters
     ----------

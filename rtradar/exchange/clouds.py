@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.clouds import RDT_AXES, RDT_UNITS
+from rtradar.clouds.spatial import SPATIAL_AXES, measured_alone
 from rtradar.errors import InputError
 from rtradar.files import atomic_file, read_arrays
 
@@ -48,7 +49,9 @@ class CloudTable:
 
     def _meaning(self) -> str:
         table = zip(self._fields(), self.names, self.units, strict=True)
-        return ", ".join(f"{field} = {name} [{unit}]" for field, name, unit in table)
+        meaning = ", ".join(f"{field} = {name} [{unit}]" for field, name, unit in table)
+        missing = np.flatnonzero(np.isnan(self.values).any(axis=0))
+        return meaning + "".join(f"; {self.names[column]} is not measured: NaN" for column in missing)
 
 
 def write_npz(path: Path, cloud: CloudTable) -> dict[str, Any]:
@@ -145,12 +148,14 @@ def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) 
 
 
 def checked(cloud: CloudTable, path: Path) -> CloudTable:
-    """The same, if every value is finite.
+    """The same, if every value is finite, but for a coordinate of a spatial cloud that its radar has not measured.
 
     Raises
     ------
     InputError
     """
-    if not np.isfinite(cloud.values).all():
+    places, rest = cloud.values[:, :3], cloud.values[:, 3:]
+    whole = np.isfinite(places).all() or (cloud.names[:3] == SPATIAL_AXES and measured_alone(places))
+    if not (whole and np.isfinite(rest).all()):
         raise InputError(f"'{path}' holds NaN or infinity; every value of a cloud must be finite")
     return cloud

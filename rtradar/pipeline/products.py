@@ -17,6 +17,7 @@ from rtradar.process import (
     SlidingRangeTime,
     SlidingSpectrogram,
     angle_grid,
+    measured_angles,
     power_map,
     range_azimuth,
     range_elevation,
@@ -76,9 +77,7 @@ class Products:
             "velocity": radar.velocity_mps(radar.cycles_per_frame),
             "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
         }
-        # Two channels on a line tell a direction along it.
-        lines = {"azimuth": radar.tx_y * radar.rx_y > 1, "elevation": radar.tx_z * radar.rx_z > 1}
-        self._angle_names = [name for name, there in lines.items() if there]
+        self._angle_names = measured_angles(radar)
         axes |= {name: angle_grid(radar) for name in self._angle_names}
         removed = {
             "time": removal.description(radar.cycles_per_frame),

@@ -20,7 +20,10 @@ _AXES = {
     "range": ("m", "half the path from Tx to Rx"),
     "velocity": ("m/s", "rate of range, positive receding"),
     "spectrogram_velocity": ("m/s", "rate of range, positive receding"),
-    "azimuth": ("rad", "atan2(y, x) in the radar's frame, positive to the left of its boresight"),
+    "azimuth": (
+        "rad",
+        "atan2(y, x) in the radar's frame, positive to the left; without a z-line asin(y / r), the cone angle",
+    ),
     "elevation": ("rad", "asin(z / r) in the radar's frame, positive upward"),
 }
 

@@ -115,7 +115,7 @@ def load_linked(folder: Path) -> Linked:
     summary, radar = _summary(folder / "summary.json")
     moments = load_moments(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
-    spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"))
+    spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",))
     path = folder / "maps.h5"
     try:
         check_regular(path)
@@ -168,10 +168,12 @@ def _line(value: Any) -> str:
     return "".join(letter if letter.isprintable() else "?" for letter in str(value)[:_MOST_LETTERS])
 
 
-def _archive(path: Path, names: tuple[str, ...]) -> dict[str, NDArray[Any]]:
+def _archive(path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
     try:
         arrays = read_arrays(path)
-        return {name: _finite(arrays[name]).astype(np.float64) for name in names}
+        for name in names:
+            _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
+        return {name: arrays[name].astype(np.float64) for name in names}
     except _DAMAGE as error:
         why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
         raise InputError(f"'{path}' {why}; {_MEND}") from None

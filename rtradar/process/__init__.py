@@ -14,7 +14,7 @@ from rtradar.process.sliding_range_time import SlidingRangeTime
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
-from rtradar.process.steering import measures_angle
+from rtradar.process.steering import measured_angles, measures_angle
 from rtradar.process.windows import SlidingWindows
 
 __all__ = [
@@ -41,6 +41,7 @@ __all__ = [
     "clutter_map_scale",
     "clutter_removal",
     "fastest_fft_devices",
+    "measured_angles",
     "measures_angle",
     "os_cfar",
     "os_scale",

@@ -5,7 +5,8 @@ the wavelength of the sweep centre. That is taken out with the velocity of the c
 velocity keeps a part of it, and shows in a wrong direction.
 
 The line along y gives the sine u = y / r, the line along z the sine w = z / r; azimuth = atan2(y, x) = asin(u / sqrt(1 - w^2)),
-elevation = asin(w). A radar with one line alone takes the other sine as 0.
+elevation = asin(w). A radar with one line alone measures the cone about that line: along y azimuth is asin(u), the cone angle,
+which is the true azimuth only at the height of the radar, and elevation is not measured; along z azimuth is not.
 
 Off the boresight an echo reaches the ends of the line up to several range bins before and behind its cell (12 GHz: 1 bin at
 14 degrees, 2 at 30, 3.3 at the unambiguous 59). Each element is therefore read in the bin where the echo from that direction
@@ -152,7 +153,8 @@ def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bo
     Returns
     -------
     azimuth, elevation : float
-        In the radar's frame [rad], within its unambiguous angle; an angle that the radar has no line for is 0.
+        In the radar's frame [rad], within its unambiguous angle; NaN where the radar has no line for it. Without a line along z
+        azimuth is the cone angle asin(y / r).
 
     Raises
     ------
@@ -185,8 +187,8 @@ def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bo
     values = cell_spectra(cube, radar, [row], [(column + n_cycles // 2) % n_cycles])
     found = angle_spectra(values, radar, [row * radar.range_bin_m], [column * step], focus=focus, taper="uniform")
     u, w = (_peak(found.sines, power) for power in (found.y, found.z))
-    azimuth = math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
-    return azimuth, math.asin(w)
+    azimuth = math.nan if found.y is None else math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
+    return azimuth, math.nan if found.z is None else math.asin(w)
 
 
 def _nearest(bins: float, least: float, largest: float) -> int | None:

@@ -34,6 +34,7 @@ def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     """Power over range and azimuth, summed over cells.
 
     The y-line tells u = sin(azimuth) cos(elevation); each cell's azimuths follow with the cosine of its strongest elevation.
+    Without a z-line elevation is not measured, and the map is over the cone angle asin(u) in place of azimuth.
 
     Parameters
     ----------

@@ -100,7 +100,24 @@ def measures_angle(radar: Radar) -> bool:
     -------
     bool
     """
-    return max(radar.tx_y * radar.rx_y, radar.tx_z * radar.rx_z) > 1
+    return bool(measured_angles(radar))
+
+
+def measured_angles(radar: Radar) -> tuple[str, ...]:
+    """Which of ``azimuth`` and ``elevation`` the radar measures: two channels on a line tell the angle along it.
+
+    Without a line along z, azimuth is the cone angle asin(y / r).
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    tuple of str
+    """
+    lines = {"azimuth": radar.tx_y * radar.rx_y, "elevation": radar.tx_z * radar.rx_z}
+    return tuple(name for name, channels in lines.items() if channels > 1)
 
 
 def _line(radar: Radar, axis: int) -> Line | None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.process import measured_angles
 from rtradar.radar import Radar
 from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 
@@ -33,39 +34,48 @@ def draw_range_angle(
         extent = (*bin_edges(np.degrees(angles)), *bin_edges(radar.range_m))
         low = max(low, high - 40)  # cells that were not detected are zero, and zero has no decibels
         image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
-        axes.set(xlabel=f"{name.capitalize()} [°]", title=f"Range-{name}")
+        axes.set(xlabel=angle_label(name, radar), title=f"Range-{name}")
         figure.colorbar(image, ax=axes, label="Power of detected cells [dB re 1 m²]")
     panels[0].set_ylabel("Range [m]")
     figure.suptitle(title)
     save_figure(figure, path)
 
 
+def angle_label(name: str, radar: Radar) -> str:
+    """Label of an axis of ``azimuth`` or ``elevation``: without a line along z, azimuth is the angle of a cone."""
+    cone = name == "azimuth" and measured_angles(radar) == ("azimuth",)
+    return "Azimuth [°] (cone angle; elevation is not measured)" if cone else f"{name.capitalize()} [°]"
+
+
 def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str) -> None:
-    """Points in the room from the side and from above, coloured by velocity.
+    """Points in the room from the side and from above, coloured by velocity; of an array on one line the view that it measures.
 
     Parameters
     ----------
     path : path
         PNG file.
     points : (point, 3) float64
-        World [m].
+        World [m]; NaN in a coordinate that is not measured.
     velocity : (point,) float64
         [m/s].
     radar : Radar
         Drawn where it stands.
     title : str
     """
-    figure = new_figure(11, 4.8)
+    names = measured_angles(radar)
+    views = [axis for axis, name in ((2, "elevation"), (1, "azimuth")) if name in names]
+    figure = new_figure(1 + 5 * len(views), 4.8)
     largest = float(np.abs(velocity).max(initial=1e-9))
-    for axes, (across, up) in zip(figure.subplots(1, 2), ((0, 2), (0, 1)), strict=True):
-        dots = axes.scatter(
-            points[:, across], points[:, up], c=velocity, s=2, alpha=0.6, cmap="coolwarm", vmin=-largest, vmax=largest
-        )
-        axes.plot(radar.position_m[across], radar.position_m[up], "k^", label="radar")
-        axes.set(xlabel=f"{'xyz'[across]} [m]", ylabel=f"{'xyz'[up]} [m]", title="From the side" if up == 2 else "From above")
+    x_label = "x [m]" if len(views) == 2 else "x [m], by the distance from the line of the array"
+    for axes, up in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        dots = axes.scatter(points[:, 0], points[:, up], c=velocity, s=2, alpha=0.6, cmap="coolwarm", vmin=-largest, vmax=largest)
+        axes.plot(radar.position_m[0], radar.position_m[up], "k^", label="radar")
+        view = "From the side" if up == 2 else "From above"
+        missing = "" if len(views) == 2 else f"; {'azimuth' if up == 2 else 'elevation'} is not measured"
+        axes.set(xlabel=x_label, ylabel=f"{'xyz'[up]} [m]", title=view + missing)
         axes.set_aspect("equal", adjustable="datalim")
         axes.grid(alpha=0.3)
         axes.legend(loc="upper right")
-    figure.colorbar(dots, ax=figure.axes, label="Velocity [m/s], positive receding")
+    figure.colorbar(dots, ax=figure.axes, label="Velocity [m/s] (positive: receding)")
     figure.suptitle(f"{title}: {len(points)} points")
     save_figure(figure, path)

@@ -102,9 +102,12 @@ def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
 def _clouds(data: Mapping[str, Any]) -> str:
     views = [("rdt", "Range-Doppler-time cloud", "The surface about the detections of all windows, sampled.")]
     if "spatial" in data:
-        views.append(
-            ("spatial", "Spatial cloud", f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes.")
-        )
+        note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
+        measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
+        if not all(measured.values()):
+            angle = "azimuth" if measured["z"] else "elevation"
+            note += f" An array on one line does not measure {angle}: x is the distance from that line, added to the radar's x."
+        views.append(("spatial", "Spatial cloud", note))
     parts = []
     for name, title, note in views:
         cloud = data[name]

@@ -142,33 +142,6 @@ function echoMarks(mode, step, direct) {
   };
 }
 
-const flatConfig = { ...config, modeBarButtons: [["toImage", "zoom2d", "pan2d", "resetScale2d"]] };
-
-/** A view with two axes that follows the page's colours. */
-async function drawFlat(id, traces, layout, restyleTheme) {
-  const node = document.getElementById(id);
-  if (!node) return null;
-  const side = (text) => ({ title: { text, standoff: 6 }, ticks: "outside", ticklen: 4, zeroline: false });
-  await Plotly.newPlot(node, traces, {
-    margin: { l: 52, r: 8, t: 8, b: 44 }, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
-    font: { family: getComputedStyle(document.body).fontFamily, size: 12 }, modebar: { bgcolor: "rgba(0,0,0,0)" },
-    ...layout, xaxis: { ...side(layout.xaxis.text), ...layout.xaxis }, yaxis: { ...side(layout.yaxis.text), ...layout.yaxis },
-  }, flatConfig);
-  const follow = async () => {
-    const changes = { "font.color": colour("--ink"), "modebar.color": colour("--faint"), "modebar.activecolor": colour("--accent") };
-    for (const axisName of ["xaxis", "yaxis"]) {
-      changes[`${axisName}.gridcolor`] = colour("--line");
-      changes[`${axisName}.linecolor`] = changes[`${axisName}.tickcolor`] = colour("--faint");
-    }
-    await Plotly.relayout(node, changes);
-    if (restyleTheme) await restyleTheme(node);
-  };
-  await follow();
-  window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", follow);
-  node.dataset.drawn = "true";
-  return node;
-}
-
 // -- the cloud -----------------------------------------------------------------------------------------------------------
 
 const cloud = data.rdt.count ? {

@@ -5,6 +5,20 @@ const paint = figure.power_db
   ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar("Mean echo power [dB re 1 m²]") }
   : { color: "#4c8fd6" };
 
+/** The cloud of an array on one line: x and the coordinate along the line, which are all that it measures. */
+async function plan() {
+  const points = floats(data.spatial.points);
+  const along = data.spatial.measured[1] ? 1 : 2;
+  const velocity = floats(data.spatial.velocity);
+  await drawFlat("scene-spatial", [{
+    type: "scatter", mode: "markers", x: component(points, 0), y: component(points, along), marker: velocityMarkers(velocity, 3),
+    customdata: floats(data.spatial.time), hovertemplate: "(%{x:.2f}, %{y:.2f}) m<br>%{customdata:.2f} s<extra></extra>",
+  }], {
+    xaxis: { text: "x [m], by the distance from the line of the array" },
+    yaxis: { text: `${"xyz"[along]} [m]`, scaleanchor: "x" },
+  });
+}
+
 async function main() {
   const [x, y, z] = figure.ranges;
   const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? "<br>%{intensity:.1f} dB re 1 m²" : ""), ...pointsTraces()], {
@@ -36,6 +50,8 @@ async function main() {
       domain, aspectmode: "data", xaxis: axis("x [m]"), yaxis: axis("y [m]"), zaxis: axis("z [m]"),
       camera: { eye: { x: -1.6, y: -1.3, z: 0.7 }, center: { x: 0, y: 0, z: -0.1 } },
     }, 1.6);
+  } else if (data.spatial && data.spatial.count) {
+    await plan();
   }
   document.documentElement.dataset.ready = "true";
 }

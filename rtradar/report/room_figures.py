@@ -12,6 +12,7 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
+from rtradar.report.angle_figures import angle_label
 from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
 from rtradar.scene import Scene
 
@@ -167,7 +168,7 @@ def draw_range_azimuth_with_walls(
             middle = inside[len(inside) // 2]
             axes.annotate(name, (angle[middle], distance[middle]), fontsize=8, color="white")
     _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
-    axes.set(xlabel="Azimuth [°]", ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
+    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")

@@ -138,10 +138,11 @@ def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
     Returns
     -------
     dict
-        Ready for JSON: ``count``, ``shown``, and as float32 ``points`` (point, 3), ``velocity`` and ``time`` (point,).
+        Ready for JSON: ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points`` (point, 3), ``velocity``
+        and ``time`` (point,).
     """
     cloud = cloud.strongest()
-    return _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
+    return {"measured": cloud.measured.tolist()} | _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
 
 
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:

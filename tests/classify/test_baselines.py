@@ -89,6 +89,22 @@ def test_features_by_the_book(made_up: Callable[..., Any]) -> None:
     np.testing.assert_allclose(spatial_features(clouds)[2], [*shape_of(centred), math.log(121)], rtol=1e-9, atol=1e-12)
 
 
+def test_a_coordinate_that_is_not_measured_has_no_features(made_up: Callable[..., Any]) -> None:
+    points = np.random.default_rng(5).normal(size=(50, 3))
+    clouds = made_up(per_class=1)
+    clouds.spatial = lambda index: points
+    whole = spatial_features(clouds)
+    flat = points.copy()
+    flat[:, 2] = np.nan
+    clouds.spatial = lambda index: flat
+    found = spatial_features(clouds)
+    assert np.isfinite(found).all()
+    # Spread, ends and five percentiles are of x, y and z in turn; then the correlations xy, xz and yz, and the number of points.
+    of_z = np.array([*([False, False, True] * 8), False, True, True, False])
+    np.testing.assert_array_equal(found[:, of_z], 0)
+    np.testing.assert_array_equal(found[:, ~of_z], whole[:, ~of_z])
+
+
 def test_metadata_are_numbers_as_they_are_and_names_a_column_each(made_up: Callable[..., Any]) -> None:
     clouds = made_up(per_class=1)
     told = [(math.inf, [1.0, 2.0], "rays"), (None, [3.0, 4.0], "auto"), (12.5, [5.0, 6.0], "rays")]

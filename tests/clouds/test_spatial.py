@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import numpy as np
@@ -59,11 +60,14 @@ def test_no_direction_no_point() -> None:
 
 
 @pytest.mark.parametrize("line", ["y", "z"])
-def test_one_line_alone_stays_in_its_plane(line: str) -> None:
+def test_one_line_alone_invents_no_coordinate_across_it(line: str) -> None:
     power = hills({0.6: 2.0})
     seen = spectra(power if line == "y" else None, power if line == "z" else None, [5.0], [0.0])
     cloud = spatial_points(seen, RADAR, 0.0)
-    expected = [4.0, 3.0, 0.0] if line == "y" else [4.0, 0.0, 3.0]
+    # Range 5, 3 along the line, so 4 from the line in whatever direction.
+    expected = [4.0, 3.0, math.nan] if line == "y" else [4.0, math.nan, 3.0]
+    assert cloud.measured.tolist() == [True, line == "y", line == "z"]
+    assert cloud.strongest().measured.tolist() == cloud.measured.tolist()
     np.testing.assert_allclose(cloud.points - RADAR.position_m, [expected], atol=1e-4)
     np.testing.assert_allclose(cloud.power, [2.0], rtol=1e-4)
     with pytest.raises(InputError, match="no line"):
@@ -103,6 +107,11 @@ def test_the_file_holds_the_cloud(tmp_path: Path) -> None:
         (np.zeros((2, 2)), np.zeros(2), "points has shape"),
         (np.zeros((2, 3)), np.zeros(3), "velocity has shape"),
         (np.full((1, 3), np.nan), np.zeros(1), "NaN or infinity"),
+        (np.array([[math.nan, 0, 0]]), np.zeros(1), "NaN or infinity"),  # x is always measured
+        (np.array([[0, math.nan, math.nan]]), np.zeros(1), "NaN or infinity"),
+        (np.array([[0, 0, math.nan], [0, 0, 0]]), np.zeros(2), "NaN or infinity"),
+        (np.array([[0, 0, math.inf]]), np.zeros(1), "NaN or infinity"),
+        (np.zeros((1, 3)), np.array([math.nan]), "NaN or infinity"),
     ],
 )
 def test_clouds_that_do_not_fit(points: np.ndarray, velocity: np.ndarray, message: str) -> None:

@@ -109,6 +109,21 @@ def test_what_is_no_cloud_is_refused(tmp_path: Path) -> None:
     assert not (tmp_path / "out.ply").exists()
 
 
+@pytest.mark.parametrize("axis", [1, 2])
+@pytest.mark.parametrize("suffix", CLOUD_FORMATS)
+def test_a_coordinate_that_is_not_measured_stays_so(tmp_path: Path, suffix: str, axis: int) -> None:
+    places = np.arange(12.0).reshape(4, 3)
+    places[:, axis] = np.nan
+    save_spatial_npz(tmp_path / "cloud_xyz.npz", SpatialCloud(places, np.arange(4.0), np.ones(4), np.zeros(4)))
+    export(tmp_path / "cloud_xyz.npz", tmp_path / f"out{suffix}")
+    np.testing.assert_array_equal(read_cloud(tmp_path / f"out{suffix}").values[:, :3], places)
+    if suffix != ".npz":
+        said = f"{'xyz'[axis]} is not measured: NaN"
+        assert said.encode() in (tmp_path / f"out{suffix}").read_bytes()
+    if suffix == ".ply":
+        np.testing.assert_array_equal(trimesh.load(tmp_path / "out.ply").vertices, places)
+
+
 @given(data=st.data())
 def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
     suffix = data.draw(st.sampled_from(list(CLOUD_FORMATS)))

@@ -157,12 +157,12 @@ def test_one_line_alone(channels: str) -> None:
     radar = dataclasses.replace(SHORT, tx_z=0, rx_z=0, channels=channels)
     assert virtual_lines(radar)[1] is None
     azimuth, elevation = angle(echo(radar, place_of(4.0, 20.0, 0.0)), radar, 4.0, 0.0)
-    assert elevation == 0
+    assert math.isnan(elevation)
     assert math.degrees(azimuth) == pytest.approx(20, abs=0.05)
     upright = dataclasses.replace(SHORT, tx_y=0, rx_y=0, channels=channels)
     assert virtual_lines(upright)[0] is None
     azimuth, elevation = angle(echo(upright, place_of(4.0, 0.0, -15.0)), upright, 4.0, 0.0)
-    assert azimuth == 0
+    assert math.isnan(azimuth)
     assert math.degrees(elevation) == pytest.approx(-15, abs=0.05)
 
 
