@@ -205,7 +205,7 @@ def run(
             save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
             save_spatial_npz(folder / "cloud_xyz.npz", clouds.spatial)
         with stages.time("pictures"):
-            pictures = draw_pictures(folder, radar, clouds, title)
+            pictures = draw_pictures(folder, radar, clouds, title, spreading=spreading)
             if inside:
                 pictures |= draw_room_pictures(folder, radar, body, scene, inside, title)
         give_back_memory()  # what pictures took, before the view and the report take theirs

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,6 +21,7 @@ from rtradar.pipeline.output_files import comparison_files
 from rtradar.pipeline.pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
 from rtradar.report.comparison_page import write_comparison
+from rtradar.report.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
 from rtradar.scatter import RUNGS
 from rtradar.scene import Scene
@@ -125,8 +126,10 @@ def compare(
             shared = {"noise_power_m2": results[names[0]].summary["noise_power_m2"]} if results else {}
             results[name] = run(motion, radar, scene, out=folder / name, fidelity=name, **options, **shared)
         summary = _summary(results, folder, radar, names[-1])
-        pictures = _draw(results, folder, radar, names[-1])
-        write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures)
+        mean_power = {name: result.survey.power_at.mean(axis=0) for name, result in results.items()}
+        unit = _unit(radar, summary, mean_power.values())
+        pictures = _draw(results, mean_power, unit, folder, radar, names[-1])
+        write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures, unit)
         summary["files"] = kind.list_of(folder)
         (folder / "compare.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return Comparison(summary, Path(out))
@@ -199,8 +202,21 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
         return levels, both / either if either else 1.0, alike
 
 
-def _draw(results: Mapping[str, Result], folder: Path, radar: Radar, reference: str) -> dict[str, Path]:
+def _unit(radar: Radar, said: Mapping[str, Any], powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
+    """The unit of powers that sum over ranges, by the strongest of them; ``said`` is a summary with the parameters of the run."""
+    return field_unit(radar, spreading=said["parameters"]["spreading"], strongest_m2=max(float(one.max()) for one in powers))
+
+
+def _draw(
+    results: Mapping[str, Result],
+    mean_power: Mapping[str, NDArray[np.float64]],
+    unit: FieldUnit,
+    folder: Path,
+    radar: Radar,
+    reference: str,
+) -> dict[str, Path]:
     any_result = next(iter(results.values()))
+    said = any_result.summary
     title = f"{any_result.summary['parameters']['motion']}, {radar.name}"
     drawn = {
         "Echo power over time": folder / "compare_power.png",
@@ -212,10 +228,9 @@ def _draw(results: Mapping[str, Result], folder: Path, radar: Radar, reference: 
     paths = iter(drawn.values())
     surveys = {name: result.survey for name, result in results.items()}
     power = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
-    draw_power_over_time(next(paths), any_result.survey.times, power, reference, title)
-    mean_power = {name: survey.power_at.mean(axis=0) for name, survey in surveys.items()}
+    draw_power_over_time(next(paths), any_result.survey.times, power, _unit(radar, said, power.values()), reference, title)
     hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
-    draw_part_power(next(paths), list(any_result.summary["part_power_m2"]), mean_power, hidden, title)
+    draw_part_power(next(paths), list(said["part_power_m2"]), mean_power, hidden, unit, title)
     with h5py.File(folder / reference / "maps.h5") as maps:
         window = busiest_window(maps)
         moment, velocity = float(maps["time"][window]), maps["velocity"][:]
@@ -225,10 +240,15 @@ def _draw(results: Mapping[str, Result], folder: Path, radar: Radar, reference: 
     for name in results:
         with h5py.File(folder / name / "maps.h5") as maps:
             range_doppler[name] = maps["range_doppler"][window]
-            spectrogram[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T
-    across, up = ("Velocity [m/s], positive receding", velocity), ("Range [m]", radar.range_m)
-    draw_maps(next(paths), range_doppler, across, up, f"{cleaned['range_doppler']}, window at {moment:.2f} s")
-    draw_maps(next(paths), spectrogram, ("Time [s]", times), (across[0], slow), cleaned["spectrogram"])
+            spectrogram[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / HANN_BINS
+    across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
+    by_range = field_unit(radar, spreading=said["parameters"]["spreading"], range_m=radar.range_m[:, None])
+    levels = {name: by_range.level(power / radar.n_channels) for name, power in range_doppler.items()}
+    label = by_range.label("mean of channels")
+    draw_maps(next(paths), levels, label, across, up, f"{cleaned['range_doppler']}, window at {moment:.2f} s")
+    summed = _unit(radar, said, spectrogram.values())
+    levels = {name: summed.level(power) for name, power in spectrogram.items()}
+    draw_maps(next(paths), levels, summed.label("one channel"), ("Time [s]", times), (across[0], slow), cleaned["spectrogram"])
     draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
     return drawn
 

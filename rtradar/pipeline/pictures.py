@@ -27,7 +27,7 @@ _COLUMNS = 600
 _SPATIAL_DOTS = 20_000
 
 
-def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dict[str, Path]:
+def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str, *, spreading: bool = True) -> dict[str, Path]:
     """Draw what ``maps.h5`` in this folder holds, and the clouds, into the same folder.
 
     Parameters
@@ -37,6 +37,8 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dic
     clouds : Clouds
     title : str
         Of the run.
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
 
     Returns
     -------
@@ -51,19 +53,23 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str) -> dic
 
     with h5py.File(folder / "maps.h5") as maps:
         power, times = thinned(maps, "range_time", "slow_time")
-        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, title + removed(maps["range_time"]))
+        what = title + removed(maps["range_time"])
+        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, what, spreading=spreading)
         if len(maps["spectrogram_time"]):
             power, times = thinned(maps, "spectrogram", "spectrogram_time")
             velocity, what = maps["spectrogram_velocity"][:], title + removed(maps["spectrogram"])
-            draw_spectrogram(to("Spectrogram", "spectrogram.png"), power, times, velocity, what)
+            file = to("Spectrogram", "spectrogram.png")
+            draw_spectrogram(file, power, times, velocity, radar, what, spreading=spreading)
         window = busiest_window(maps)
         cleaned = removed(maps["range_doppler"])
         moment = f"{title}, window at {float(maps['time'][window]):.2f} s{cleaned}"
         power, mask = maps["range_doppler"][window], maps["detections"][window].astype(bool)
-        draw_range_doppler(to("Range-Doppler map and detections", "range_doppler.png"), power, mask, radar, moment)
+        file = to("Range-Doppler map and detections", "range_doppler.png")
+        draw_range_doppler(file, power, mask, radar, moment, spreading=spreading)
         angles = {angle: (maps[f"range_{angle}"][window], maps[angle][:]) for angle in ("azimuth", "elevation") if angle in maps}
     if angles:
-        draw_range_angle(to("Range-azimuth and range-elevation", "range_angle.png"), angles, radar, moment)
+        panels = " and ".join(f"range-{angle}" for angle in angles).capitalize()
+        draw_range_angle(to(panels, "range_angle.png"), angles, radar, moment, spreading=spreading)
     draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title + cleaned)
     if angles:
         shown = clouds.spatial.strongest()

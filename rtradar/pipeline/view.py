@@ -16,6 +16,7 @@ from rtradar.files import check_regular, read_arrays, read_json, stored
 from rtradar.output_folder import check_whole
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
+from rtradar.report.field_units import HANN_BINS, FieldUnit, field_unit
 from rtradar.report.levels import MOST_LEVEL, Levels
 from rtradar.report.linked import Linked
 from rtradar.report.linked_page import COLOURS, write_view
@@ -113,6 +114,8 @@ def load_linked(folder: Path) -> Linked:
     if not (folder / "summary.json").is_file():
         raise InputError(f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named")
     summary, radar = _summary(folder / "summary.json")
+    parameters = summary["parameters"]
+    spreading = parameters.get("spreading", True) is not False
     moments = load_moments(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
     spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",))
@@ -123,10 +126,10 @@ def load_linked(folder: Path) -> Linked:
             maps = _maps(file)
             if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
-            range_doppler = _range_doppler(maps, moments, radar)
-            spectrogram = _spectrogram(maps)
+            range_doppler = _range_doppler(maps, moments, radar, spreading)
+            spectrogram = _spectrogram(maps, radar, spreading)
             points = rdt["points"].reshape(-1, 3)
-            rdt_power_db = _at_points(maps, points, radar)
+            rdt_power_db = _at_points(maps, points, radar, spreading)
     except InputError:
         raise
     except _DAMAGE as error:
@@ -136,7 +139,6 @@ def load_linked(folder: Path) -> Linked:
         cloud = SpatialCloud(**spatial)
     except (InputError, TypeError) as error:
         raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
-    parameters = summary["parameters"]
     fidelity, scene = _line(summary.get("fidelity", "")), _line(parameters.get("scene", "free-space"))
     removal = _line(parameters.get("clutter_removal", "none"))
     cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
@@ -150,6 +152,7 @@ def load_linked(folder: Path) -> Linked:
         rdt_points=points,
         rdt_power_db=rdt_power_db,
         spatial=cloud,
+        spreading=spreading,
     )
 
 
@@ -201,10 +204,10 @@ def _maps(file: h5py.File) -> dict[str, Any]:
     return maps
 
 
-def _decibels(power: NDArray[np.floating]) -> NDArray[np.float64]:
+def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
     if not np.isfinite(power).all():
         raise ValueError("a power is not finite")
-    return np.asarray(10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny)))
+    return power.astype(np.float64)
 
 
 def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDArray[np.uint8]:
@@ -217,14 +220,16 @@ def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
     return low, (top_db - low) / MOST_LEVEL
 
 
-def _range_doppler(maps: Any, moments: Moments, radar: Radar) -> Levels:
+def _range_doppler(maps: Any, moments: Moments, radar: Radar, spreading: bool) -> Levels:
     """Maps of the moments' windows, mean of the channels."""
     power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
-    per_channel_db = 10 * math.log10(radar.n_channels)
+    unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
+    scale = np.asarray(unit.scale) / radar.n_channels
     windows = moments.window.tolist()
-    top = max(float(power[window].max()) for window in windows)
-    noise = [float(np.median(power[window])) for window in windows[:: math.ceil(len(windows) / _SAMPLED)]]
-    low_db, step_db = _scale(*(_decibels(np.array([top, np.median(noise)])) - per_channel_db).tolist())
+    top = max(float((power[window] * scale).max()) for window in windows)
+    noise = [float(np.median(power[window] * scale)) for window in windows[:: math.ceil(len(windows) / _SAMPLED)]]
+    scaled = FieldUnit(unit.name, 1.0)
+    low_db, step_db = _scale(*scaled.level(_powers(np.array([top, np.median(noise)]))).tolist())
     rows, columns = math.ceil(len(distance) / _MOST_ROWS), math.ceil(len(velocity) / _MOST_COLUMNS)
 
     def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -236,30 +241,34 @@ def _range_doppler(maps: Any, moments: Moments, radar: Radar) -> Levels:
         return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
 
     return Levels(
-        level=np.stack([_levels(_decibels(pooled(power[window])) - per_channel_db, low_db, step_db) for window in windows]),
+        level=np.stack([_levels(scaled.level(_powers(pooled(power[window] * scale))), low_db, step_db) for window in windows]),
         low_db=low_db,
         step_db=step_db,
+        label=unit.label("mean of channels"),
         across=centres(velocity, columns),
         up=centres(distance, rows),
     )
 
 
-def _spectrogram(maps: Any) -> Levels:
+def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
     """Velocity up, time across."""
     velocity = maps["spectrogram_velocity"][:]
     up = (float(velocity[0]), float(velocity[1] - velocity[0]))
     if not len(maps["spectrogram_time"]):
-        return Levels(level=np.zeros((1, len(velocity), 0), dtype=np.uint8), low_db=0.0, step_db=1.0, across=(0.0, 1.0), up=up)
-    power, times = thinned(maps, "spectrogram", "spectrogram_time")
-    level_db = _decibels(power.T)
+        none = np.zeros((1, len(velocity), 0), dtype=np.uint8)
+        return Levels(level=none, low_db=0.0, step_db=1.0, label="", across=(0.0, 1.0), up=up)
+    found, times = thinned(maps, "spectrogram", "spectrogram_time")
+    power = _powers(found.T) / HANN_BINS
+    unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
+    level_db = unit.level(power)
     low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     level, across = _levels(level_db, low_db, step_db)[None], (float(times[0]), step_s)
-    return Levels(level=level, low_db=low_db, step_db=step_db, across=across, up=up)
+    return Levels(level=level, low_db=low_db, step_db=step_db, label=unit.label("one channel"), across=across, up=up)
 
 
-def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
-    """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB re 1 m^2]."""
+def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool) -> NDArray[np.float64]:
+    """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB]."""
     if not len(points):
         return np.zeros(0)
     nearest = []
@@ -270,4 +279,5 @@ def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar) -> NDArray[
     for window in np.unique(nearest[0]).tolist():
         own = nearest[0] == window
         found[own] = maps["range_doppler"][window][nearest[1][own], nearest[2][own]]
-    return _decibels(found) - 10 * math.log10(radar.n_channels)
+    unit = field_unit(radar, spreading=spreading, range_m=maps["range"][:][nearest[1]])
+    return unit.level(_powers(found) / radar.n_channels)

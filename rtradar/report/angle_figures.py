@@ -10,11 +10,17 @@ from numpy.typing import NDArray
 
 from rtradar.process import measured_angles
 from rtradar.radar import Radar
-from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
+from rtradar.report.field_units import HANN_BINS, VELOCITY_LABEL, field_unit
+from rtradar.report.figures import bin_edges, colour_limits, new_figure, save_figure
 
 
 def draw_range_angle(
-    path: Path, maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.float64]]], radar: Radar, title: str
+    path: Path,
+    maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.float64]]],
+    radar: Radar,
+    title: str,
+    *,
+    spreading: bool = True,
 ) -> None:
     """Power over range and angle, a panel each.
 
@@ -23,19 +29,22 @@ def draw_range_angle(
     path : path
         PNG file.
     maps : mapping of str to ((range, angle) float, (angle,) float64)
-        By the name of the angle: power [m^2], and the angles [rad].
+        By the name of the angle: power summed over detected cells [m^2], and the angles [rad].
     radar : Radar
     title : str
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
     """
     figure = new_figure(1 + 5 * len(maps), 4.5)
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
+    unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
     for axes, (name, (power, angles)) in zip(panels, maps.items(), strict=True):
-        values, low, high = decibels(power)
+        values = unit.level(power / HANN_BINS)  # what one echo gives is spread over as many velocities
         extent = (*bin_edges(np.degrees(angles)), *bin_edges(radar.range_m))
-        low = max(low, high - 40)  # cells that were not detected are zero, and zero has no decibels
+        low, high = colour_limits(values, 40)  # cells that were not detected are zero, and zero has no decibels
         image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
         axes.set(xlabel=angle_label(name, radar), title=f"Range-{name}")
-        figure.colorbar(image, ax=axes, label="Power of detected cells [dB re 1 m²]")
+        figure.colorbar(image, ax=axes, label=unit.label("detected cells"))
     panels[0].set_ylabel("Range [m]")
     figure.suptitle(title)
     save_figure(figure, path)
@@ -76,6 +85,6 @@ def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArra
         axes.set_aspect("equal", adjustable="datalim")
         axes.grid(alpha=0.3)
         axes.legend(loc="upper right")
-    figure.colorbar(dots, ax=figure.axes, label="Velocity [m/s] (positive: receding)")
+    figure.colorbar(dots, ax=figure.axes, label=VELOCITY_LABEL)
     figure.suptitle(f"{title}: {len(points)} points")
     save_figure(figure, path)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -10,6 +9,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from rtradar.report.field_units import FieldUnit
 from rtradar.report.sections import mapping_table, picture, table
 
 _PAGE = Template("""<!doctype html>
@@ -36,7 +36,7 @@ either rung detects, spectrograms in the cells 10 dB above the median of either.
 sample. Echo power is of one chirp every 10 ms, each from another Tx, which makes it saw.</p></section>
 <section id="maps"><h2>Side by side</h2><div class="pictures">$pictures</div></section>
 <div class="tables"><section><h2>Seconds a stage</h2>$stages</section>
-<section><h2>Mean echo power by part [dB re 1 m²]</h2>$parts</section>
+<section><h2>Mean echo power by part: $unit</h2>$parts</section>
 <section><h2>Parameters</h2>$parameters</section></div>
 </main>
 </body>
@@ -44,7 +44,9 @@ sample. Echo power is of one chirp every 10 ms, each from another Tx, which make
 """)
 
 
-def write_comparison(path: Path, summary: Mapping[str, Any], rows: Sequence[Sequence[str]], pictures: Mapping[str, Path]) -> None:
+def write_comparison(
+    path: Path, summary: Mapping[str, Any], rows: Sequence[Sequence[str]], pictures: Mapping[str, Path], unit: FieldUnit
+) -> None:
     """Write a comparison as a page with its table and its pictures.
 
     Parameters
@@ -57,6 +59,8 @@ def write_comparison(path: Path, summary: Mapping[str, Any], rows: Sequence[Sequ
         The table: a heading row, then a row a measure.
     pictures : mapping of title to path
         PNG files, in the order in which they shall stand.
+    unit : FieldUnit
+        In which the echo power of parts is given.
     """
     fidelities = summary["fidelities"]
     names = list(fidelities)
@@ -74,8 +78,9 @@ def write_comparison(path: Path, summary: Mapping[str, Any], rows: Sequence[Sequ
             [[stage, *(_figure(fidelities[name]["stages"].get(stage)) for name in names)] for stage in stages], ["", *names]
         ),
         parts=table(
-            [[part, *(_level(fidelities[name]["part_power_m2"][part]) for name in names)] for part in parts], ["", *names]
+            [[part, *(_level(fidelities[name]["part_power_m2"][part], unit) for name in names)] for part in parts], ["", *names]
         ),
+        unit=escape(unit.label()),
         parameters=mapping_table(parameters),
     )
     path.write_text(page, encoding="utf-8", newline="\n")
@@ -85,5 +90,5 @@ def _figure(value: float | None) -> str:
     return "-" if value is None else f"{value:.3f}"
 
 
-def _level(power: float) -> str:
-    return f"{10 * math.log10(power):.1f}" if power > 0 else "hidden"
+def _level(power: float, unit: FieldUnit) -> str:
+    return f"{float(unit.level(power)):.1f}" if power > 0 else "hidden"

@@ -10,8 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
-
-_DYNAMIC_RANGE_DB = 60.0
+from rtradar.report.field_units import VELOCITY_LABEL, field_unit
 
 
 def new_figure(width: float, height: float) -> Figure:
@@ -29,11 +28,10 @@ def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
     figure.clear()
 
 
-def decibels(power: NDArray[np.floating]) -> tuple[NDArray[np.float64], float, float]:
-    """Power in dB, and the limits of its colours: the peak, and the noise floor or 60 dB less."""
-    values = 10 * np.log10(np.maximum(power.astype(np.float64), np.finfo(np.float32).tiny))
-    top = float(values.max())
-    return values, max(top - _DYNAMIC_RANGE_DB, float(np.median(values)) - 3), top
+def colour_limits(level_db: NDArray[np.float64], below_peak_db: float = 60.0) -> tuple[float, float]:
+    """Least and greatest level that colours show: 3 dB below the median, or ``below_peak_db`` below the peak; and the peak."""
+    top = float(level_db.max())
+    return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
 
 
 def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
@@ -42,7 +40,15 @@ def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
     return float(centres[0] - half), float(centres[-1] + half)
 
 
-def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[np.float64], radar: Radar, title: str) -> None:
+def draw_range_time(
+    path: Path,
+    power: NDArray[np.floating],
+    slow_time: NDArray[np.float64],
+    radar: Radar,
+    title: str,
+    *,
+    spreading: bool = True,
+) -> None:
     """Range-time picture.
 
     Parameters
@@ -55,10 +61,14 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
         [s].
     radar : Radar
     title : str
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
     """
     figure = new_figure(8, 4.5)
     axes = figure.subplots()
-    values, low, high = decibels(power)
+    unit = field_unit(radar, spreading=spreading, range_m=radar.range_m)
+    values = unit.level(power)
+    low, high = colour_limits(values)
     image = axes.imshow(
         values.T,
         origin="lower",
@@ -69,11 +79,13 @@ def draw_range_time(path: Path, power: NDArray[np.floating], slow_time: NDArray[
         extent=(*bin_edges(slow_time), *bin_edges(radar.range_m)),
     )
     axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
-    figure.colorbar(image, label="Power, mean of channels [dB re 1 m²]")
+    figure.colorbar(image, label=unit.label("mean of channels"))
     save_figure(figure, path)
 
 
-def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np.bool_], radar: Radar, title: str) -> None:
+def draw_range_doppler(
+    path: Path, power: NDArray[np.floating], mask: NDArray[np.bool_], radar: Radar, title: str, *, spreading: bool = True
+) -> None:
     """Range-Doppler map beside itself with its detections.
 
     Parameters
@@ -81,15 +93,19 @@ def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np
     path : path
         PNG file.
     power : (range, velocity)
-        [m^2].
+        Sum over all channels [m^2].
     mask : (range, velocity) bool
         Detections.
     radar : Radar
     title : str
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
     """
     figure = new_figure(11, 4.5)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    values, low, high = decibels(power)
+    unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
+    values = unit.level(power / radar.n_channels)
+    low, high = colour_limits(values)
     velocity, distance = radar.velocity_mps(power.shape[1]), radar.range_m
     extent = (*bin_edges(velocity), *bin_edges(distance))
     image = left.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
@@ -98,9 +114,9 @@ def draw_range_doppler(path: Path, power: NDArray[np.floating], mask: NDArray[np
     right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections")
     right.legend(loc="upper right")
     for axes, name in ((left, "Power"), (right, "Detections, over the map in grey")):
-        axes.set(xlabel="Velocity [m/s], positive receding", title=name)
+        axes.set(xlabel=VELOCITY_LABEL, title=name)
     left.set_ylabel("Range [m]")
-    figure.colorbar(image, ax=[left, right], label="Power, all channels [dB re 1 m²]")
+    figure.colorbar(image, ax=[left, right], label=unit.label("mean of channels"))
     figure.suptitle(title)
     save_figure(figure, path)
 
@@ -121,7 +137,7 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
     time, distance, velocity = points.T
     largest = float(np.abs(velocity).max(initial=1e-9))
     dots = axes.scatter(time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest)
-    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"{title}: {len(points)} points")
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{title}: {len(points)} points")
     axes.set_box_aspect((1.6, 1, 1))
-    figure.colorbar(dots, label="Velocity [m/s], positive receding", shrink=0.6, pad=0.1)
+    figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
     save_figure(figure, path)

@@ -68,7 +68,9 @@ def write_report(
     InputError
         Where a picture is missing or no PNG, or ``rdt_points`` has a wrong shape or values that are not finite.
     """
-    data = {"figure": figure_data(body, radar, summary.get("part_power_m2")), "rdt": rdt_data(rdt_points)}
+    spreading = bool(summary.get("parameters", {}).get("spreading", True))
+    figure = figure_data(body, radar, summary.get("part_power_m2"), spreading=spreading)
+    data = {"figure": figure, "rdt": rdt_data(rdt_points)}
     if spatial is not None:
         data["spatial"] = spatial_data(spatial)
     parameters = summary.get("parameters", {})

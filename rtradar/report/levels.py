@@ -23,7 +23,9 @@ class Levels:
     level : (map, row, column) uint8
         Power is ``low_db + step_db level``.
     low_db, step_db : float
-        [dB re 1 m^2]
+        Lowest level and step from one level to the next [dB].
+    label : str
+        What they are levels of, with the unit: the label of a colour bar.
     across, up : (float, float)
         Value of the first column or row, and from one to the next.
     """
@@ -31,12 +33,13 @@ class Levels:
     level: NDArray[np.uint8]
     low_db: float
     step_db: float
+    label: str
     across: tuple[float, float]
     up: tuple[float, float]
 
     @property
     def high_db(self) -> float:
-        """Of the highest level that colours reach."""
+        """Power of the highest level that colours reach [dB]."""
         return self.low_db + self.step_db * MOST_LEVEL
 
     def packed(self) -> dict[str, Any]:
@@ -49,4 +52,5 @@ class Levels:
             "low_db": self.low_db,
             "high_db": self.high_db,
             "step_db": self.step_db,
+            "label": self.label,
         }

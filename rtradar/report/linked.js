@@ -23,8 +23,8 @@ const stepped = groups.colours.flatMap((tint, k) => [[k / groups.colours.length,
 const fromGrey = [[0, hiddenColour], [0.02, hiddenColour], ...viridis.map((tint, k) => [0.021 + 0.979 * k / (viridis.length - 1), tint])];
 const modes = {
   part: { colorscale: stepped, cmin: 0, cmax: groups.names.length, title: "" },
-  power: { colorscale: fromGrey, cmin: data.power_range_db[0], cmax: data.power_range_db[1], title: "Echo power [dB re 1 m²]" },
-  velocity: { colorscale: data.velocity_colours, cmin: -data.fastest_mps, cmax: data.fastest_mps, title: "Rate of range [m/s], + receding" },
+  power: { colorscale: fromGrey, cmin: data.power_range_db[0], cmax: data.power_range_db[1], title: data.power_label },
+  velocity: { colorscale: data.velocity_colours, cmin: -data.fastest_mps, cmax: data.fastest_mps, title: velocityLabel },
 };
 
 /** A number for the colour of an echo at a step. */
@@ -80,7 +80,7 @@ function pathLines(mode, step, direct) {
     const real = places.filter((place) => !Number.isNaN(place[0]));
     if (!real.length) continue;
     const value = echoValue(mode, step, echo);
-    const text = `${label(echo)}<br>${range[step * nEchoes + echo].toFixed(3)} m, ${velocity[step * nEchoes + echo].toFixed(2)} m/s, ${power[step * nEchoes + echo].toFixed(1)} dB`;
+    const text = `${label(echo)}<br>${range[step * nEchoes + echo].toFixed(3)} m, ${velocity[step * nEchoes + echo].toFixed(2)} m/s, ${power[step * nEchoes + echo].toFixed(1)} ${data.power_unit}`;
     // There and back over the same corner is one line.
     for (const place of [echoes.radar_m, ...real, ...(real.length > 1 ? [echoes.radar_m] : [])]) put(place, value, text);
     put([null, null, null], value, "");
@@ -138,7 +138,7 @@ function echoMarks(mode, step, direct) {
   return {
     x: own.map((echo) => folded(velocity[step * nEchoes + echo])), y: own.map((echo) => range[step * nEchoes + echo]),
     color: own.map((echo) => echoValue(mode, step, echo)),
-    text: own.map((echo) => `${label(echo)}<br>${velocity[step * nEchoes + echo].toFixed(2)} m/s, ${power[step * nEchoes + echo].toFixed(1)} dB re 1 m²`),
+    text: own.map((echo) => `${label(echo)}<br>${velocity[step * nEchoes + echo].toFixed(2)} m/s, ${power[step * nEchoes + echo].toFixed(1)} ${data.power_unit}`),
   };
 }
 
@@ -262,18 +262,18 @@ async function main() {
     }),
     marks(true), marks(false),
   ], {
-    xaxis: { text: "Velocity [m/s], positive receding", range: data.map.box[0] },
+    xaxis: { text: velocityLabel, range: data.map.box[0] },
     yaxis: { text: "Range [m]", range: data.map.box[1] },
   }, (node) => Plotly.restyle(node, { colorscale: [greys()] }, [0]));
-  await Plotly.restyle(map, { "colorbar.title.text": "Power, mean of channels [dB re 1 m²]" }, [0]);
+  await Plotly.restyle(map, { "colorbar.title.text": data.map.label }, [0]);
 
   const cursor = (time) => ({ type: "line", x0: time, x1: time, y0: 0, y1: 1, yref: "paper", line: { color: now, width: 2 } });
   const spectrogram = await drawFlat("scene-spectrogram", [heat(data.spectrogram, mapRows(data.spectrogram, spectrogramLevels, 0), {
-    colorscale: "Viridis", colorbar: { ...scaleBar("power"), title: { text: "Power, one channel [dB re 1 m²]", side: "right" } },
+    colorscale: "Viridis", colorbar: { ...scaleBar("power"), title: { text: data.spectrogram.label, side: "right" } },
     hovertemplate: "%{x:.2f} s, %{y:.2f} m/s<br>%{z:.1f} dB<extra></extra>",
   })], {
     xaxis: { text: "Time [s]", range: edge(data.spectrogram, "x", data.spectrogram.shape[1]) },
-    yaxis: { text: "Velocity [m/s], positive receding", range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
+    yaxis: { text: velocityLabel, range: edge(data.spectrogram, "y", data.spectrogram.shape[0]) },
     shapes: [cursor(figure.times[0])],
   });
 
@@ -291,7 +291,7 @@ async function main() {
       { type: "scatter3d", mode: "lines", name: "now", ...frameAt(figure.times[0]), showlegend: false, hoverinfo: "skip", line: { width: 3, color: now } },
     ], {
       domain: { x: [0, 1], y: [0, 1] }, aspectmode: "manual", aspectratio: { x: 1.6, y: 1, z: 0.9 },
-      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis("Velocity [m/s]"),
+      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis(velocityLabel),
       camera: { eye: { x: -1.0, y: -1.9, z: 0.8 }, center: { x: 0, y: 0, z: -0.2 } },
     }, 1.5);
   }
@@ -308,7 +308,7 @@ async function main() {
 
     const [values, levels, rates] = [mode, "power", "velocity"].map((which) => partValues(which, step));
     const said = figure.parts.map((part, index) => [
-      part, levels[index] > modes.power.cmin ? `${levels[index].toFixed(1)} dB re 1 m²` : "hidden", `${rates[index].toFixed(2)} m/s`,
+      part, levels[index] > modes.power.cmin ? `${levels[index].toFixed(1)} ${data.power_unit}` : "hidden", `${rates[index].toFixed(2)} m/s`,
     ].join("<br>"));
     const [figurePart, ...others] = placesAt(step, pointsTrace);
     await move(body, [

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
+from rtradar.report.field_units import FieldUnit, field_unit
 from rtradar.report.levels import Levels
 from rtradar.report.moments import Moments
 from rtradar.report.part_groups import GROUPS, group_of_parts
@@ -34,8 +35,10 @@ class Linked:
     rdt_points : (point, 3) float64
         Time [s], range [m], velocity [m/s].
     rdt_power_db : (point,) float64
-        Of the range-Doppler map there [dB re 1 m^2].
+        Power of the range-Doppler map there, in the unit of that map [dB].
     spatial : SpatialCloud
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
     """
 
     heading: str
@@ -47,12 +50,18 @@ class Linked:
     rdt_points: NDArray[np.float64]
     rdt_power_db: NDArray[np.float64]
     spatial: SpatialCloud
+    spreading: bool = True
+
+    @property
+    def power_unit(self) -> FieldUnit:
+        """The unit of the power of each echo (step, echo), by its range; that of the range-Doppler map."""
+        return field_unit(self.radar, spreading=self.spreading, range_m=self.moments.range_m)
 
     @property
     def power_db(self) -> NDArray[np.float64]:
-        """Power of each echo (step, echo) [dB re 1 m^2]; NaN where hidden."""
+        """Power of each echo (step, echo) in `power_unit` [dB]; NaN where hidden."""
         power = self.moments.power_m2
-        return np.asarray(np.where(power > 0, 10 * np.log10(np.where(power > 0, power, 1.0)), np.nan))
+        return np.where(power > 0, self.power_unit.level(power), np.nan)
 
     @property
     def seen(self) -> NDArray[np.bool_]:
@@ -61,7 +70,7 @@ class Linked:
 
     @property
     def power_range_db(self) -> tuple[float, float]:
-        """Of colours, from the floor of the maps to the strongest echo [dB re 1 m^2]."""
+        """Of colours, from the floor of the maps to the strongest echo [dB]."""
         low_db = self.range_doppler.low_db
         return low_db, float(np.nanmax(self.power_db, initial=low_db + 1.0))
 

@@ -120,6 +120,8 @@ def linked_data(linked: Linked) -> dict[str, Any]:
             "of_part": group_of_parts(moments.part_names.tolist()),
         },
         "velocity_colours": VELOCITY_COLOURS,
+        "power_label": linked.power_unit.label("of an echo"),
+        "power_unit": linked.power_unit.name,
         "power_range_db": list(linked.power_range_db),
         "fastest_mps": linked.fastest_mps,
         "max_velocity_mps": radar.max_velocity_mps,

@@ -6,6 +6,7 @@ const config = {
   displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
   modeBarButtons: [["toImage", "orbitRotation", "pan3d", "zoom3d", "resetCameraDefault3d"]],
 };
+const velocityLabel = "Velocity [m/s] (positive: receding)";
 // Visible on white and on black, its middle too.
 const velocityColours = [[0, "#1f6fd6"], [0.5, "#9a9aa2"], [1, "#d9371f"]];
 
@@ -75,7 +76,7 @@ function bar(title) {
 function velocityMarkers(velocity, size) {
   const largest = velocity.reduce((most, value) => Math.max(most, Math.abs(value)), 1e-3);
   return {
-    size, color: velocity, cmin: -largest, cmax: largest, colorscale: velocityColours, colorbar: bar("Velocity [m/s], positive receding"),
+    size, color: velocity, cmin: -largest, cmax: largest, colorscale: velocityColours, colorbar: bar(velocityLabel),
   };
 }
 

@@ -2,7 +2,7 @@
 
 /** Each part in the colour of its mean power, where it is known. */
 const paint = figure.power_db
-  ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar("Mean echo power [dB re 1 m²]") }
+  ? { intensity: each((_, index) => figure.power_db[index]), colorscale: "Viridis", colorbar: bar(figure.power_label) }
   : { color: "#4c8fd6" };
 
 /** The cloud of an array on one line: x and the coordinate along the line, which are all that it measures. */
@@ -21,7 +21,7 @@ async function plan() {
 
 async function main() {
   const [x, y, z] = figure.ranges;
-  const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? "<br>%{intensity:.1f} dB re 1 m²" : ""), ...pointsTraces()], {
+  const node = await draw("scene-figure", [...figureTraces(paint, figure.power_db ? `<br>%{intensity:.1f} ${figure.power_unit}` : ""), ...pointsTraces()], {
     aspectmode: "data", domain,
     xaxis: metres("x [m]", x), yaxis: metres("y [m]", y), zaxis: metres("z [m]", z),
     camera: { eye: { x: -0.45, y: -1.65, z: 0.5 }, center: { x: -0.12, y: 0, z: -0.1 } },
@@ -37,7 +37,7 @@ async function main() {
       hovertemplate: "%{x:.2f} s<br>%{y:.2f} m<br>%{z:.2f} m/s<extra></extra>",
     }], {
       domain, aspectmode: "manual", aspectratio: { x: 1.5, y: 1, z: 1 },
-      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis("Velocity [m/s]"),
+      xaxis: axis("Time [s]"), yaxis: axis("Range [m]"), zaxis: axis(velocityLabel),
       camera: { eye: { x: -1.0, y: -1.75, z: 0.75 }, center: { x: 0, y: 0, z: -0.15 } },
     }, 1.6);
   }

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from rtradar.radar import Radar
 from rtradar.report.angle_figures import angle_label
-from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
+from rtradar.report.field_units import HANN_BINS, VELOCITY_LABEL, field_unit
+from rtradar.report.figures import bin_edges, colour_limits, new_figure, save_figure
 from rtradar.scene import Scene
 
 _UPRIGHT = 0.5
@@ -91,7 +92,7 @@ def draw_before_after(
     path : path
         PNG file.
     maps : mapping of str to ((range, velocity) float, (range, velocity) bool)
-        Power [m^2] and detections by panel.
+        Power summed over all channels [m^2], and detections, by panel.
     ghosts : sequence of (str, float, float)
         Path over walls, range [m] and velocity [m/s].
     radar : Radar
@@ -99,20 +100,22 @@ def draw_before_after(
     """
     figure = new_figure(1 + 5.5 * len(maps), 5)
     panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
-    levels = {name: decibels(power) for name, (power, _) in maps.items()}
-    low, high = min(level[1] for level in levels.values()), max(level[2] for level in levels.values())
+    unit = field_unit(radar, range_m=radar.range_m[:, None])
+    levels = {name: unit.level(power / radar.n_channels) for name, (power, _) in maps.items()}
+    limits = [colour_limits(level) for level in levels.values()]
+    low, high = min(low for low, _ in limits), max(high for _, high in limits)
     for axes, (name, (power, mask)) in zip(panels, maps.items(), strict=True):
         velocity = radar.velocity_mps(power.shape[1])
         extent = (*bin_edges(velocity), *bin_edges(radar.range_m))
-        image = axes.imshow(levels[name][0], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+        image = axes.imshow(levels[name], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
         rows, columns = np.nonzero(mask)
         axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected")
         _mark(axes, ghosts, radar)
-        axes.set(xlabel="Velocity [m/s], positive receding", title=f"{name}: {len(rows)} detections")
+        axes.set(xlabel=VELOCITY_LABEL, title=f"{name}: {len(rows)} detections")
         axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
     panels[0].set_ylabel("Range [m]")
     panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
-    figure.colorbar(image, ax=list(panels), label="Power, all channels [dB re 1 m²]")
+    figure.colorbar(image, ax=list(panels), label=unit.label("mean of channels"))
     figure.suptitle(title)
     save_figure(figure, path)
 
@@ -154,9 +157,10 @@ def draw_range_azimuth_with_walls(
     """
     figure = new_figure(8, 5.5)
     axes = figure.subplots()
-    values, low, high = decibels(power)
+    unit = field_unit(radar, range_m=radar.range_m[:, None])
+    values = unit.level(power / HANN_BINS)
     extent = (*bin_edges(np.degrees(azimuth)), *bin_edges(radar.range_m))
-    low = max(low, high - 50)  # cells that were not detected are zero, and zero has no decibels
+    low, high = colour_limits(values, 50)  # cells that were not detected are zero, and zero has no decibels
     image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
     place = np.asarray(radar.position_m)
     for first, last, name in walls_in_plan(scene):
@@ -171,5 +175,5 @@ def draw_range_azimuth_with_walls(
     axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
-    figure.colorbar(image, label="Power of detected cells [dB re 1 m²]")
+    figure.colorbar(image, label=unit.label("detected cells"))
     save_figure(figure, path)

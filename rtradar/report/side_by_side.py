@@ -8,11 +8,17 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.report.figures import bin_edges, decibels, new_figure, save_figure
+from rtradar.report.field_units import VELOCITY_LABEL, FieldUnit
+from rtradar.report.figures import bin_edges, colour_limits, new_figure, save_figure
 
 
 def draw_power_over_time(
-    path: Path, times: NDArray[np.float64], power: Mapping[str, NDArray[np.float64]], reference: str, title: str
+    path: Path,
+    times: NDArray[np.float64],
+    power: Mapping[str, NDArray[np.float64]],
+    unit: FieldUnit,
+    reference: str,
+    title: str,
 ) -> None:
     """Echo power of each rung over time, and how far it is from the reference.
 
@@ -24,21 +30,22 @@ def draw_power_over_time(
         [s].
     power : mapping of str to (time,) float64
         By rung [m^2].
+    unit : FieldUnit
+        In which they are drawn.
     reference : str
         One of the rungs.
     title : str
     """
     figure = new_figure(9, 5.5)
     above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    floor = np.finfo(np.float64).tiny
     for name, values in power.items():
-        level = 10 * np.log10(np.maximum(values, floor))
+        level = unit.level(values)
         above.plot(times, level, label=name, linewidth=1.2)
         if name != reference:
-            below.plot(times, level - 10 * np.log10(np.maximum(power[reference], floor)), linewidth=1.2)
+            below.plot(times, level - unit.level(power[reference]), linewidth=1.2)
         else:
             below.plot(times, np.zeros(len(times)), linewidth=1.2)
-    above.set(ylabel="Echo power [dB re 1 m²]", title=title)
+    above.set(ylabel=unit.label("all parts"), title=title)
     above.legend()
     below.set(xlabel="Time [s]", ylabel=f"Less {reference} [dB]")
     for axes in (above, below):
@@ -51,6 +58,7 @@ def draw_part_power(
     parts: Sequence[str],
     power: Mapping[str, NDArray[np.float64]],
     hidden: Mapping[str, NDArray[np.float64]],
+    unit: FieldUnit,
     title: str,
 ) -> None:
     """Mean echo power of each body part by rung, and how much of the time it is hidden.
@@ -65,6 +73,8 @@ def draw_part_power(
         By rung [m^2].
     hidden : mapping of str to (part,) float64
         By rung: share of time and channels, 0 to 1.
+    unit : FieldUnit
+        In which power is drawn.
     title : str
     """
     figure = new_figure(11, 6.5)
@@ -72,11 +82,11 @@ def draw_part_power(
     places, height = np.arange(len(parts)), 0.8 / len(power)
     for number, name in enumerate(power):
         seen = power[name] > 0
-        level = 10 * np.log10(np.where(seen, power[name], 1.0))
+        level = unit.level(power[name])
         offset = places + (number - (len(power) - 1) / 2) * height
         left.plot(level[seen], offset[seen], "o", markersize=4, label=name)
         right.barh(offset, 100 * hidden[name], height)
-    left.set(yticks=places, yticklabels=parts, xlabel="Mean echo power [dB re 1 m²]", title=title)
+    left.set(yticks=places, yticklabels=parts, xlabel=unit.label("mean over time"), title=title)
     left.invert_yaxis()
     left.legend()
     right.set(xlabel="Hidden [% of time and channels]", xlim=(0, 100))
@@ -87,7 +97,8 @@ def draw_part_power(
 
 def draw_maps(
     path: Path,
-    maps: Mapping[str, NDArray[np.floating]],
+    maps: Mapping[str, NDArray[np.float64]],
+    label: str,
     across: tuple[str, NDArray[np.float64]],
     up: tuple[str, NDArray[np.float64]],
     title: str,
@@ -98,24 +109,25 @@ def draw_maps(
     ----------
     path : path
         PNG file.
-    maps : mapping of str to (up, across) float
-        By rung [m^2].
+    maps : mapping of str to (up, across) float64
+        By rung: levels [dB].
+    label : str
+        Of their colour bar, with its unit.
     across, up : (str, (n,) float64)
         Label with its unit, and values, of the two axes.
     title : str
     """
     figure = new_figure(1.5 + 4.2 * len(maps), 4.6)
     columns = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
-    _, low, high = decibels(np.concatenate([np.ravel(values) for values in maps.values()]))
+    low, high = colour_limits(np.concatenate([np.ravel(level) for level in maps.values()]))
     extent = (*bin_edges(across[1]), *bin_edges(up[1]))
-    for axes, (name, values) in zip(columns, maps.items(), strict=True):
-        level = decibels(values)[0]
+    for axes, (name, level) in zip(columns, maps.items(), strict=True):
         image = axes.imshow(
             level, origin="lower", aspect="auto", interpolation="nearest", cmap="viridis", vmin=low, vmax=high, extent=extent
         )
         axes.set(xlabel=across[0], title=name)
     columns[0].set_ylabel(up[0])
-    figure.colorbar(image, ax=list(columns), label="Power [dB re 1 m²]")
+    figure.colorbar(image, ax=list(columns), label=label)
     figure.suptitle(title)
     save_figure(figure, path)
 
@@ -137,7 +149,7 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
     for number, (name, points) in enumerate(clouds.items(), start=1):
         axes = figure.add_subplot(1, len(clouds), number, projection="3d")
         axes.scatter(*points.T, c=points[:, 2], s=3, cmap="coolwarm", vmin=-largest, vmax=largest)
-        axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"{name}: {len(points)} points")
+        axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{name}: {len(points)} points")
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
 from rtradar.files import atomic_file
+from rtradar.report.field_units import VELOCITY_LABEL
 from rtradar.report.figures import new_figure, save_figure
 from rtradar.report.levels import Levels
 from rtradar.report.linked import Linked
@@ -119,7 +120,7 @@ class _Paint:
             patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
             figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
             return
-        label = {"power": "Echo power [dB re 1 m²]", "velocity": "Rate of range [m/s], positive receding"}[self.colour]
+        label = {"power": self._linked.power_unit.label("of an echo"), "velocity": VELOCITY_LABEL}[self.colour]
         bar = figure.colorbar(
             ScalarMappable(self.norm, self.map), ax=views, location="bottom", shrink=0.4, aspect=50, pad=0.02, label=label
         )
@@ -191,15 +192,15 @@ def _draw_map(figure: Any, axes: Any, linked: Linked, step: int, paint: _Paint) 
         given = style | ({"color": rgba[own]} if direct else {})
         axes.scatter(velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given)
     across, up = linked.shown_box()
-    axes.set(xlim=across, ylim=up, xlabel="Velocity [m/s], positive receding", ylabel="Range [m]")
+    axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
     axes.set_title("Range-Doppler map of this window, and where echoes are")
-    figure.colorbar(image, ax=axes, label="Power, mean of channels [dB re 1 m²]")
+    figure.colorbar(image, ax=axes, label=linked.range_doppler.label)
 
 
 def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
     points, time = linked.rdt_points, linked.moments.times[step]
     axes.set(
-        xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"Range-Doppler-time cloud: {len(points)} points"
+        xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"Range-Doppler-time cloud: {len(points)} points"
     )
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
@@ -213,10 +214,10 @@ def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
 
 
 def _draw_spectrogram(figure: Any, axes: Any, linked: Linked, step: int) -> None:
-    axes.set(xlabel="Time [s]", ylabel="Velocity [m/s], positive receding", title="Spectrogram")
+    axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
     if not linked.spectrogram.level.size:
         axes.text(0.5, 0.5, "The capture is too short for one.", ha="center", va="center", transform=axes.transAxes)
         return
     image = _image(axes, linked.spectrogram, 0, "viridis")
     axes.axvline(linked.moments.times[step], color=_NOW, linewidth=1.5)
-    figure.colorbar(image, ax=axes, label="Power, one channel [dB re 1 m²]")
+    figure.colorbar(image, ax=axes, label=linked.spectrogram.label)

@@ -14,6 +14,7 @@ from rtradar.body import Body, unit_sphere
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.report.field_units import field_unit
 
 FRAME_RATE_HZ = 20.0
 """Poses a second of the moving figure."""
@@ -29,7 +30,9 @@ _DYNAMIC_RANGE_DB = 30.0
 _MARGIN_M = 0.4
 
 
-def figure_data(body: Body, radar: Radar, part_power_m2: Mapping[str, float] | None = None) -> dict[str, Any]:
+def figure_data(
+    body: Body, radar: Radar, part_power_m2: Mapping[str, float] | None = None, *, spreading: bool = True
+) -> dict[str, Any]:
     """The recording as poses of ellipsoids, with the radar and the floor.
 
     Parameters
@@ -39,18 +42,25 @@ def figure_data(body: Body, radar: Radar, part_power_m2: Mapping[str, float] | N
     radar : Radar
     part_power_m2 : mapping of part name to float, optional
         Mean echo power of each part [m^2], for its colour.
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
 
     Returns
     -------
     dict
         Ready for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three semi-axes of each part [m], world;
         ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m];
-        ``power_db`` of each part, at most 30 dB below the strongest, or None.
+        ``power_db`` of each part, at most 30 dB below the strongest, or None; its ``power_label`` and ``power_unit``.
     """
     intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
     times = np.linspace(0.0, body.duration_s, intervals + 1)
     figure = posed_figure(body.part_names, times, semi_axis_poses(body, times), radar)
-    return figure | {"power_db": _power_db(body.part_names, part_power_m2 or {})}
+    power = np.array([(part_power_m2 or {}).get(part, 0.0) for part in body.part_names])
+    strongest = float(power.max())
+    unit = field_unit(radar, spreading=spreading, strongest_m2=strongest)
+    levels = unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10))).round(2).tolist()
+    label = unit.label("mean of the part")
+    return figure | {"power_db": levels if strongest > 0 else None, "power_label": label, "power_unit": unit.name}
 
 
 def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -166,11 +176,3 @@ def _ranges(low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDA
     least[2] = 0.0 if least[2] > -0.1 else least[2]
     box = np.stack([np.floor(2 * least) / 2, np.ceil(2 * most) / 2], axis=1)
     return [[float(a), float(b)] for a, b in box]
-
-
-def _power_db(parts: tuple[str, ...], power: Mapping[str, float]) -> list[float] | None:
-    values = np.array([power.get(part, 0.0) for part in parts])
-    if not values.max() > 0:
-        return None
-    decibels = 10 * np.log10(np.maximum(values, values.max() * 10 ** (-_DYNAMIC_RANGE_DB / 10)))
-    return [round(float(value), 2) for value in decibels]

@@ -34,8 +34,10 @@ def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
     with h5py.File(made / "maps.h5") as maps:
         assert linked.moments.times.tolist() == pytest.approx(maps["time"][linked.moments.window])
         power, velocity = maps["range_doppler"][:][linked.moments.window], maps["velocity"][:]
-    # Of 8 channels, 9.03 dB
-    level = np.maximum(10 * np.log10(power) - 10 * np.log10(8), linked.range_doppler.low_db)
+        distance = maps["range"][:]
+    # Mean of 8 channels, with R^4 for the loss over distance; the first bin's centre is at 0 m, its end at half a bin.
+    loss_db = 40 * np.log10(np.maximum(distance, distance[1] / 2))[:, None]
+    level = np.maximum(10 * np.log10(power / 8) + loss_db, linked.range_doppler.low_db)
     assert np.abs(shown - level).max() <= linked.range_doppler.step_db / 2 * 1.001
     assert linked.range_doppler.across == pytest.approx((velocity[0], velocity[1] - velocity[0]))
 
@@ -64,7 +66,9 @@ def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
             cell = maps["range_doppler"][
                 int(abs(time - t).argmin()), int(abs(distance - r).argmin()), int(abs(velocity - v).argmin())
             ]
-            assert linked.rdt_power_db[point] == pytest.approx(10 * np.log10(cell / 8), abs=1e-4)
+            # With R^4 for the loss over distance; the first bin, at 0 m, ends at half a bin.
+            place = max(distance[abs(distance - r).argmin()], distance[1] / 2)
+            assert linked.rdt_power_db[point] == pytest.approx(10 * np.log10(cell / 8 * place**4), abs=1e-4)
 
 
 @pytest.mark.parametrize("colour", COLOURS)

@@ -213,7 +213,7 @@ def test_a_block_of_another_radar_is_refused() -> None:
 
 def test_the_picture_shows_the_echo_where_it_is(tmp_path: Path) -> None:
     found = spectrogram(turning(LOW, 4.0, 600), LOW)
-    draw_spectrogram(tmp_path / "s.png", found.power, found.time, found.velocity, "receding at 4 m/s")
+    draw_spectrogram(tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s")
     shown = imread(tmp_path / "s.png")[:, :, :3]
     # The brightest yellow of the colours, left of the colour bar, stands in the upper half: velocity rises upward.
     rows, columns = np.nonzero(np.abs(shown - [0.993, 0.906, 0.144]).max(axis=2) < 0.02)

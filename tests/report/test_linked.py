@@ -20,7 +20,7 @@ from rtradar.report.part_groups import GROUPS, group_of_parts
 from rtradar.report.viewer import semi_axis_poses
 
 RADAR = rt.Radar.preset("paper-12ghz")
-LOW_DB = -90.0
+LOW_DB = -60.0
 
 
 def linked(points: list[tuple[float, float, float]], power_db: tuple[float, float] = (-40.0, -50.0)) -> Linked:
@@ -53,8 +53,10 @@ def linked(points: list[tuple[float, float, float]], power_db: tuple[float, floa
         subtitle="",
         moments=moments,
         radar=RADAR,
-        range_doppler=Levels(level=level, low_db=LOW_DB, step_db=0.2, across=(-7.0, 3.5), up=(0.0, 3.0)),
-        spectrogram=Levels(level=level[:1], low_db=-60.0, step_db=0.2, across=(0.1, 0.1), up=(-7.0, 3.5)),
+        range_doppler=Levels(level=level, low_db=LOW_DB, step_db=0.2, label="RCS [dBsm]", across=(-7.0, 3.5), up=(0.0, 3.0)),
+        spectrogram=Levels(
+            level=level[:1], low_db=-60.0, step_db=0.2, label="Power [dB re maximum]", across=(0.1, 0.1), up=(-7.0, 3.5)
+        ),
         rdt_points=np.array(points).reshape(-1, 3),
         rdt_power_db=np.full(len(points), -60.0),
         spatial=SpatialCloud(np.zeros((0, 3)), np.zeros(0), np.zeros(0), np.zeros(0)),
@@ -73,7 +75,7 @@ def test_every_part_has_its_group() -> None:
 
 def test_levels_unpack_to_decibels() -> None:
     level = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
-    packed = Levels(level=level, low_db=-80.0, step_db=0.5, across=(0.0, 1.0), up=(2.0, 3.0)).packed()
+    packed = Levels(level=level, low_db=-80.0, step_db=0.5, label="", across=(0.0, 1.0), up=(2.0, 3.0)).packed()
     unpacked = np.frombuffer(zlib.decompress(base64.b64decode(packed["levels"])), dtype=np.uint8)
     np.testing.assert_array_equal(unpacked.reshape(2, *packed["shape"]), level)
     assert (packed["low_db"], packed["high_db"]) == (-80.0, -80.0 + 250 * 0.5)
@@ -101,6 +103,13 @@ def test_the_box_holds_what_is_seen_with_a_margin() -> None:
     (slow, fast), (near, far) = linked([(0.1, 4.5, 0.5)]).shown_box()
     assert (slow, fast) == pytest.approx((8.0 - 2 * 7.138 - 1.0, 1.5), abs=1e-3)
     assert (near, far) == pytest.approx((3.5, 5.5))
+
+
+def test_echoes_read_their_cross_section() -> None:
+    # 40 log10 of 4 m and of 5 m: 24.08 and 27.96 dB above -40 and -50 dB.
+    found = linked([])
+    np.testing.assert_allclose(found.power_db, [[-15.918, -22.041]] * 2, atol=1e-3)
+    assert linked_data(found)["power_label"] == "RCS, of an echo [dBsm]"
 
 
 def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
