@@ -3,22 +3,33 @@
 from __future__ import annotations
 
 import gc
+import multiprocessing
+import warnings
 from collections.abc import Callable
-from pathlib import Path
+from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, types
 from numba.core import event
+from numba.core.caching import CompileResultCacheImpl, IndexDataCacheFile, NullCache
 from numba.extending import register_jitable
 
+from rtradar.code_stamp import note_options, stamp_of
+
 _Function = Callable[..., Any]
+
+
+class CacheWarning(UserWarning):
+    """Compiled code cannot be kept on disk: what is done is right, but the next process compiles again."""
 
 
 def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
-    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does.
+    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code is loaded again for as long as
+    all that went into it is the same, functions and constants of other modules included. Where it cannot be kept, a
+    `CacheWarning` says so once.
 
     Parameters
     ----------
@@ -31,13 +42,12 @@ def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Ca
     -------
     decorator
     """
-    numba_decorator: Callable[[_Function], Any] = njit(
-        cache=True, nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
-    )
+    numba_decorator: Callable[[_Function], Any] = njit(nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath)
 
     def decorator(function: _Function) -> _Function:
         dispatcher = numba_decorator(function)
         if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
+            dispatcher._cache = _CodeOnDisk(dispatcher)
             dispatcher.compile = _with_room(dispatcher.compile)
         return dispatcher
 
@@ -59,7 +69,13 @@ def taken_in(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Fun
     -------
     decorator
     """
-    decorator: Callable[[_Function], _Function] = register_jitable(forceinline=True, error_model="numpy", fastmath=fastmath)
+    options = {"forceinline": True, "error_model": "numpy", "fastmath": fastmath}
+    numba_decorator: Callable[[_Function], _Function] = register_jitable(**options)
+
+    def decorator(function: _Function) -> _Function:
+        note_options(function, options)
+        return numba_decorator(function)
+
     return decorator
 
 
@@ -92,8 +108,106 @@ def _with_room(call: _Function) -> _Function:
     return in_a_chunk_of_its_own
 
 
+class _CodeOnDisk(NullCache):
+    """Machine code of one function on disk. Numba asks for it before it compiles, and hands over what it has compiled.
+
+    Numba's own cache looks only at the file in which a function stands, not at what the function takes in from others. Here code
+    is kept under the function's stamp (`code_stamp`), taken whenever code is needed. Places and formats are Numba's.
+
+    Whatever goes wrong, be it a damaged file, a full disk or a Numba that does this otherwise, the function is compiled.
+    """
+
+    def __init__(self, dispatcher: Any) -> None:
+        self.trouble = ""
+        self._dispatcher = dispatcher
+        self._stamp = ""
+        self._file: Any = None
+
+    @cached_property
+    def _format(self) -> Any:
+        """Where this function's code is kept, and how it is written; None where no folder can be written."""
+        try:
+            return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
+        except Exception as error:
+            self._tell("no folder for it can be written" if "no locator available" in str(error) else error)
+            return None
+
+    @property
+    def cache_path(self) -> Any:
+        return None if self._format is None else self._format.locator.get_cache_path()
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        file = self._take_stamp()
+        try:
+            found = None if file is None else file.load(self._key(sig))
+            if found is None:
+                return None
+            # Processes that compile for other arguments, or from another text, may have written the same file at the same time.
+            stamp, arguments, code = found
+            return self._format.rebuild(target_context, code) if (stamp, arguments) == (self._stamp, sig) else None
+        except Exception:  # a damaged file raises almost anything
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        file = self._file
+        try:
+            if file is None or not self._format.check_cachable(data):
+                return
+            self._format.locator.ensure_cache_path()
+            entry = self._stamp, sig, self._format.reduce(data)
+            try:
+                file.save(self._key(sig), entry)
+            except OSError:
+                raise
+            except Exception:  # a damaged index
+                file.flush()
+                file.save(self._key(sig), entry)
+        except Exception as error:
+            self._tell(error)
+
+    def has_code(self) -> bool:
+        """Whether there is code of the function as it stands now."""
+        file = self._take_stamp()
+        try:
+            return file is not None and bool(file._load_index())
+        except Exception:
+            return False
+
+    def _take_stamp(self) -> Any:
+        """File of the function as it stands now; None where it has none."""
+        self._file = None
+        if self._format is not None:
+            try:
+                self._stamp = stamp_of(self._dispatcher)
+                self._file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
+                    cache_path=self.cache_path, filename_base=self._format.filename_base, source_stamp=self._stamp
+                )
+            except Exception as error:
+                self._tell(error)
+        return self._file
+
+    def _key(self, sig: Any) -> Any:
+        return sig, self._dispatcher.targetctx.codegen().magic_tuple()
+
+    def _tell(self, why: object) -> None:
+        """Tell once a process that code is not kept. Of workers, the process that starts them tells."""
+        global _told
+        told = why.strerror if isinstance(why, OSError) and why.strerror else str(why)
+        self.trouble = " ".join(told.split()) or type(why).__name__
+        if not _told and multiprocessing.parent_process() is None:
+            _told = True
+            warnings.warn(f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}", CacheWarning, stacklevel=2)
+
+
+_told = False
+
+CACHE_ADVICE = "every process compiles anew, for a minute or so: name a folder that can be written in NUMBA_CACHE_DIR"
+"""What it means that compiled code is not kept, and what helps."""
+
+
 def is_on_disk(function: _Function) -> bool:
-    """Whether any process here has compiled it before, or none ever will (``NUMBA_DISABLE_JIT``).
+    """Whether any process here has compiled it before, or none can do so for this one.
 
     Parameters
     ----------
@@ -103,9 +217,47 @@ def is_on_disk(function: _Function) -> bool:
     Returns
     -------
     bool
+        True, too, where code is not kept and where nothing is compiled (``NUMBA_DISABLE_JIT``).
     """
-    stats = getattr(function, "stats", None)
-    return stats is None or any(Path(stats.cache_path).glob(f"*.{function.__qualname__}-*.nbi"))
+    cache = getattr(function, "_cache", None)
+    return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
+
+
+def cache_folder() -> str | None:
+    """Where code of this module is kept; None, with a `CacheWarning`, where no folder can be written.
+
+    Returns
+    -------
+    str or None
+        None, too, where nothing is compiled (``NUMBA_DISABLE_JIT``).
+    """
+    cache = getattr(compiled()(_increment), "_cache", None)
+    return cache.cache_path if cache else None
+
+
+def try_cache() -> str:
+    """Compile a function, keep its code and load it again.
+
+    Returns
+    -------
+    str
+        What went wrong; empty where nothing did.
+    """
+    dispatcher: Any = compiled()(_increment)
+    if not hasattr(dispatcher, "compile"):
+        return "nothing is compiled: NUMBA_DISABLE_JIT is set"
+    cache, sig = dispatcher._cache, (types.int64,)
+    cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first; what is there is written anew
+    dispatcher._cache = NullCache()
+    dispatcher.compile(sig)
+    cache.save_overload(sig, dispatcher.overloads[sig])
+    if not cache.trouble and cache.load_overload(sig, dispatcher.targetctx) is None:
+        return "what was written could not be loaded again"
+    return str(cache.trouble)
+
+
+def _increment(number):  # type: ignore[no-untyped-def]
+    return number + 1
 
 
 class _CollectorAtRest(event.Listener):

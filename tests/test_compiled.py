@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numba import config
 from numba.core import event
+from numba.core.caching import NullCache
 from numba.core.errors import TypingError
 
 from rtradar.compiled import compiled, is_on_disk, on_cache_lines, taken_in
@@ -28,7 +29,7 @@ def double(number: float) -> float:
 # Not kept on disk, unlike those of the package: each is compiled when it is first called.
 def uncached(function: Callable[..., Any]) -> Any:
     made: Any = compiled()(function)
-    made._cache.disable()
+    made._cache = NullCache()
     return made
 
 

@@ -19,12 +19,13 @@ import sys
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-import numba
 import numpy as np
+from numba import prange
 from numpy.typing import NDArray
 from rows import Row, judged, main, reported
 from scipy.special import gammaincc
 
+from rtradar.compiled import compiled
 from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, range_spectrum
 from rtradar.process.cfar_law import order_rank
 from rtradar.process.tapers import hann
@@ -51,12 +52,12 @@ class Rate(NamedTuple):
     conditional_error: float | None
 
 
-@numba.njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def noise_levels(power, ranks, guard, reach):  # type: ignore[no-untyped-def]
     """Order statistic and mean of the training cells of every cell, by sorting as the text book has it, and their number."""
     n_range, n_velocity = power.shape
     ordered, averaged, counts = np.empty(power.shape), np.empty(power.shape), np.empty(power.shape, np.int64)
-    for i in numba.prange(n_range):
+    for i in prange(n_range):
         ring = np.empty((2 * reach + 1) ** 2)
         for j in range(n_velocity):
             n = 0

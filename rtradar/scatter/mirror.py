@@ -33,7 +33,7 @@ ROOT_PI = math.sqrt(math.pi)
 
 
 # Inlined, for only so do loops over it run in vector lanes.
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, inline="always")
 def _newton(x, y, z, tx0, tx1, tx2, rx0, rx1, rx2, inv_a, inv_b, inv_c):  # type: ignore[no-untyped-def]
     """One step toward the mirror point, from a point on the surface, all in the ellipsoid's axes.
 
@@ -68,7 +68,7 @@ def _newton(x, y, z, tx0, tx1, tx2, rx0, rx1, rx2, inv_a, inv_b, inv_c):  # type
     return range_t + range_r, drop, d0, d1, d2, size, determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, range_t * range_r
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"}, inline="always")
+@njit(error_model="numpy", fastmath={"contract"}, inline="always")
 def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, horizontal):  # type: ignore[no-untyped-def]
     """Co-polar return: the field is E_r = 2 (n.E) n - E_i, each polarisation drawn across its own line of sight."""
     along_t, along_r = up0 * t0 + up1 * t1 + up2 * t2, up0 * r0 + up1 * r1 + up2 * r2
