@@ -1,0 +1,47 @@
+"""For `mutation.py`: a plug-in of pytest that writes down which functions of rtradar each test calls, and how long it takes.
+
+Only calls are traced, not lines, so a run is hardly slower. What Numba compiled is not seen.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from types import CodeType, FrameType
+
+import pytest
+
+ROOT = str(Path.cwd() / "rtradar") + os.sep
+_seen: set[CodeType] = set()
+_found: dict[str, dict[str, object]] = {}
+
+
+def _called(frame: FrameType, event: str, argument: object) -> None:
+    _seen.add(frame.f_code)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    _seen.clear()
+    threading.settrace(_called)
+    sys.settrace(_called)
+    yield
+    sys.settrace(None)
+    threading.settrace(None)  # type: ignore[arg-type]
+    names = {f"{code.co_filename[len(ROOT) :]}::{code.co_qualname}" for code in _seen if code.co_filename.startswith(ROOT)}
+    _found.setdefault(item.nodeid, {})["calls"] = sorted(name.replace(".<locals>", "") for name in names)
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    about = _found.setdefault(report.nodeid, {})
+    about["seconds"] = float(about.get("seconds", 0.0)) + report.duration  # type: ignore[arg-type]
+    if report.when == "call":
+        about["outcome"] = report.outcome
+
+
+def pytest_sessionfinish() -> None:
+    Path(os.environ["MUTATION_TRACE"]).write_text(json.dumps(_found))
