@@ -1,6 +1,6 @@
 """For `mutation.py`: a plug-in of pytest that writes down which functions of rtradar each test calls, and how long it takes.
 
-Only calls are traced, not lines, so a run is hardly slower. What Numba compiled is not seen.
+Only calls are traced, not lines, and not while Numba compiles, so a run is hardly slower. What Numba compiled is not seen.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from pathlib import Path
 from types import CodeType, FrameType
 
 import pytest
+from numba.core import event
 
 ROOT = str(Path.cwd() / "rtradar") + os.sep
 _seen: set[CodeType] = set()
@@ -22,6 +23,19 @@ _found: dict[str, dict[str, object]] = {}
 
 def _called(frame: FrameType, event: str, argument: object) -> None:
     _seen.add(frame.f_code)
+
+
+class _WhileCompiling(event.Listener):
+    """Of the compiler's millions of calls none is rtradar's."""
+
+    def on_start(self, _: event.Event) -> None:
+        sys.settrace(None)
+
+    def on_end(self, _: event.Event) -> None:
+        sys.settrace(_called if threading.gettrace() else None)
+
+
+event.register("numba:compile", _WhileCompiling())
 
 
 @pytest.hookimpl(hookwrapper=True)
