@@ -18,6 +18,7 @@ from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion
 from rtradar.radar import Radar
+from rtradar.seeds import stream
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _BODY = ("build", "height_m")
@@ -147,7 +148,7 @@ def _radar_parameters(radar: Radar) -> dict[str, Any]:
 
 def _draw(spec: Spec, seed: int) -> dict[str, float]:
     """One value of every range; each from its own place in the stream, so that a range does not move the others."""
-    places = np.random.default_rng([seed, 0]).random(len(DRAWN))
+    places = np.random.default_rng(stream(seed, 0)).random(len(DRAWN))
     # Four decimals say it all, and read the same everywhere.
     return {
         key: round(low + (high - low) * float(place), 4)
@@ -156,7 +157,7 @@ def _draw(spec: Spec, seed: int) -> dict[str, float]:
 
 
 def _side(seed: int) -> bool:
-    return bool(np.random.default_rng([seed, 1]).integers(2))
+    return bool(np.random.default_rng(stream(seed, 1)).integers(2))
 
 
 def _seed(*told: object) -> int:

@@ -22,6 +22,7 @@ from rtradar.motion import Motion, cut, synthetic_motion
 from rtradar.pipeline import clouds_of
 from rtradar.radar import Radar
 from rtradar.scene import Scene
+from rtradar.seeds import stream
 
 SPATIAL_POINTS = 3000
 """Most points kept of the spatial cloud, as many as the RDT cloud has; of more a uniform sample."""
@@ -127,7 +128,7 @@ def make(recipe: Recipe) -> Made:
     }
     places = clouds.spatial.points
     if len(places) > SPATIAL_POINTS:
-        random = np.random.default_rng([told["seed"], _SPATIAL_STREAM])
+        random = np.random.default_rng(stream(told["seed"], _SPATIAL_STREAM))
         places = places[np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))]
     sample = Sample(clouds.rdt.points, recipe.label, {**told, **found})
     return Made(sample, places, time.perf_counter() - began - warmup_s)

@@ -18,6 +18,7 @@ from rtradar.process import CLUTTER_REMOVALS
 from rtradar.radar import Radar
 from rtradar.scatter import RUNGS
 from rtradar.scene import Scene
+from rtradar.seeds import check_seed
 from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 _TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
@@ -71,7 +72,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     if removal not in CLUTTER_REMOVALS:
         raise InputError(f"clutter_removal = {shown(removal)}; allowed: {', '.join(CLUTTER_REMOVALS)}")
     return Spec(
-        seed=_whole("", "seed", table.get("seed", 0)),
+        seed=check_seed("", table.get("seed", 0)),
         pfa=check_number("data set", "pfa", table.get("pfa", 1e-6), 1e-15, 0.5),
         clutter_removal=removal,
         windows=windows,

@@ -20,6 +20,7 @@ from rtradar.classify.source import Clouds
 from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.errors import InputError
+from rtradar.seeds import word
 
 
 def _centroid(seed: int) -> BaseEstimator:
@@ -27,7 +28,7 @@ def _centroid(seed: int) -> BaseEstimator:
 
 
 def _forest(seed: int) -> BaseEstimator:
-    return RandomForestClassifier(n_estimators=300, random_state=seed)
+    return RandomForestClassifier(n_estimators=300, random_state=word(seed))
 
 
 BASELINES: dict[str, tuple[Callable[[Clouds], NDArray[np.float64]], Callable[[int], BaseEstimator]]] = {

@@ -22,6 +22,7 @@ from torch import Tensor
 from rtradar.classify.recipes import Augmentation, Scaling
 from rtradar.classify.source import Clouds
 from rtradar.errors import InputError
+from rtradar.seeds import stream
 
 PHYSICAL_SCALES = (0.5, 0.5, 2.5)
 """Time [s], range [m], velocity [m/s] that become 1: about the spread of a person's motion, so that all axes count alike."""
@@ -84,7 +85,7 @@ def stack_clouds(clouds: Clouds, *, seed: int = 0) -> Tensor:
     stacked = np.zeros((len(each), n_points, 3), dtype=np.float32)
     for index, points in enumerate(each):
         if len(points):
-            random = np.random.default_rng([seed, index])
+            random = np.random.default_rng(stream(seed, index))
             order = random.permutation(len(points))
             filled = np.concatenate([order, random.integers(len(points), size=n_points - len(points))])
             stacked[index] = (points - [points[:, 0].mean(), 0, 0])[filled]

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from rtradar.classify.source import Clouds
 from rtradar.errors import InputError
+from rtradar.seeds import word
 
 SCHEMES = ("folds", "recording", "subject", "recorded", "across:COLUMN")
 """Folds over clouds (the paper's), recordings, subjects; synthetic to recorded; each value of a column to every other."""
@@ -181,7 +182,7 @@ def _folds(clouds: Clouds, what: str, groups: NDArray[np.int64], folds: int | No
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class", category=UserWarning)
-        parts = list(StratifiedGroupKFold(n_folds, shuffle=True, random_state=seed).split(labels, labels, groups))
+        parts = list(StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed)).split(labels, labels, groups))
     return [
         Split(f"fold {number}", np.sort(train).astype(np.int64), np.sort(test).astype(np.int64))
         for number, (train, test) in enumerate(parts, start=1)

@@ -19,6 +19,7 @@ from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import drawn, for_training, scaled
 from rtradar.classify.recipes import Precision, Recipe
 from rtradar.errors import BackendError, InputError
+from rtradar.seeds import stream
 
 SKEWNESS_WEIGHT = 1e-3
 """Of the feature transform's distance from a rotation, in the loss (Qi et al.)."""
@@ -234,7 +235,7 @@ def _restore(path: Path, network: PointNet, optimiser: torch.optim.Optimizer, re
 
 def _number(seed: int, epoch: int) -> int:
     """One number for a seed and an epoch, unlike any other's."""
-    return int(np.random.SeedSequence([seed, epoch]).generate_state(1, np.uint64)[0] >> np.uint64(1))
+    return int(stream(seed, epoch).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.seeds import check_seed, stream
 
 _WITH_REPLACEMENT = 1
 """Marks the random stream that draws with replacement, apart from that of the keys."""
@@ -37,12 +38,11 @@ class UniformSample:
     """
 
     def __init__(self, n_rows: int, seed: int, columns: int = 3) -> None:
-        for name, value, least in (("n_points", n_rows, 1), ("seed", seed, 0)):
-            if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
-                raise InputError(f"cloud: {name} = {value!r}; it must be a whole number, at least {least}")
+        if isinstance(n_rows, bool) or not isinstance(n_rows, int | np.integer) or n_rows < 1:
+            raise InputError(f"cloud: n_points = {n_rows!r}; it must be a whole number, at least 1")
         self._n_rows = int(n_rows)
-        self._seed = int(seed)
-        self._random = np.random.default_rng(self._seed)
+        self._seed = check_seed("cloud: ", seed)
+        self._random = np.random.default_rng(stream(self._seed))
         self._keys = np.full(self._n_rows, np.inf)  # of places that no row has taken yet
         self._rows = np.full((self._n_rows, columns), np.nan)
         self.n_seen = 0
@@ -72,4 +72,4 @@ class UniformSample:
         rows = self.rows()
         if not 0 < len(rows) < self._n_rows:
             return rows
-        return rows[np.random.default_rng([self._seed, _WITH_REPLACEMENT]).integers(len(rows), size=self._n_rows)]
+        return rows[np.random.default_rng(stream(self._seed, _WITH_REPLACEMENT)).integers(len(rows), size=self._n_rows)]

@@ -16,6 +16,7 @@ from rtradar.motion.motion import Motion
 from rtradar.motion.names import NODE_PARENT, NODES
 from rtradar.motion.strikes import kick, punch
 from rtradar.motion.traits import Traits, draw_traits
+from rtradar.seeds import check_seed, stream
 from rtradar.spool import Spool, in_blocks
 
 ACTIVITIES: Mapping[str, Callable[[float, Traits], PosesAt]] = {
@@ -90,9 +91,9 @@ def synthetic_motion(
         raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
     if side not in ("left", "right"):
         raise InputError(f"side {side!r}; allowed are left and right")
-    for name, number in (("seed", seed), ("take", take)):
-        if isinstance(number, bool) or not isinstance(number, (int, np.integer)) or number < 0:
-            raise InputError(f"{name} {number!r}; it must be a whole number, zero or more")
+    own = check_seed("", seed), list(ACTIVITIES).index(activity)
+    if isinstance(take, bool) or not isinstance(take, (int, np.integer)) or take < 0:
+        raise InputError(f"take {take!r}; it must be a whole number, zero or more")
     given = {
         "duration_s": duration_s,
         "height_m": height_m,
@@ -105,10 +106,9 @@ def synthetic_motion(
         low, high = _RANGES[name]
         if not (math.isfinite(value) and low <= value <= high) or value == 0:
             raise InputError(f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}")
-    own = [int(seed), list(ACTIVITIES).index(activity)]
-    traits = draw_traits(np.random.default_rng(own), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
+    traits = draw_traits(np.random.default_rng(stream(*own)), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
     if take:
-        traits = dataclasses.replace(traits, phase=float(np.random.default_rng([*own, int(take)]).uniform()))
+        traits = dataclasses.replace(traits, phase=float(np.random.default_rng(stream(*own, int(take))).uniform()))
     # Asked for twice: how far down all must come is not known before the last, and too many would have to be kept.
     poses_at = ACTIVITIES[activity](duration_s, traits)
     times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz

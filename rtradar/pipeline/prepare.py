@@ -26,6 +26,7 @@ from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.mirror import mirror
 from rtradar.scatter.multipath import Multipath
 from rtradar.scene import Scene
+from rtradar.seeds import check_seed
 from rtradar.signal import Noise
 from rtradar.trace.backend import select
 
@@ -170,5 +171,4 @@ def _check(snr_db: float | Literal["physical"], pfa: float, seed: int, noise_pow
         raise InputError(f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0")
     if not 0 < pfa < 1:
         raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
-    if seed < 0:
-        raise InputError(f"seed = {seed}; it must be a whole number, at least 0 (--seed)")
+    check_seed("", seed)

@@ -29,6 +29,7 @@ from rtradar.scatter.clutter_returns import RoomEchoes
 from rtradar.scatter.footprints import across
 from rtradar.scatter.room_walls import height, reflect, through_walls
 from rtradar.scene import Scene, Wall
+from rtradar.seeds import stream
 from rtradar.trace.room_tracer import RoomTracer
 
 Array = NDArray[np.float64]
@@ -59,7 +60,7 @@ def rough_returns(radar: Radar, scene: Scene, tracer: RoomTracer, seed: int) -> 
             continue
         for back in (False, True):
             if (height(wall, radar.tx, back=back) > 0).any() and (height(wall, radar.rx, back=back) > 0).any():
-                rng = np.random.default_rng([seed, number, back])
+                rng = np.random.default_rng(stream(seed, number, int(back)))
                 points, area, phase = _points(wall, back, min(CELL_BINS * radar.range_bin_m, CELL_M), rng)
                 echoes = _echoes(wall, back, points, area, phase, radar, scene, tracer)
                 if echoes.n_echoes:

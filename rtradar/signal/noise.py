@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.compiled import compiled
 from rtradar.radar import Radar
+from rtradar.seeds import check_seed, stream
 from rtradar.threads import in_threads
 
 _CYCLES_AT_ONCE = 16
@@ -26,10 +27,18 @@ class Noise:
         Of one complex sample [m^2]; 0 is none.
     seed : int
         The same seed, the same noise.
+
+    Raises
+    ------
+    InputError
+        Where the seed is not allowed.
     """
 
     power: float
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        check_seed("noise: ", self.seed)
 
     @classmethod
     def for_snr(cls, signal_power: float, snr_db: float, seed: int = 0) -> Noise:
@@ -92,7 +101,7 @@ class Noise:
 def _stream(seed: int, cycle: int) -> NDArray[np.uint64]:
     """State (4,) of the random bits of a cycle."""
     # Of plain numbers NumPy would make a sequence of seeds first, the long way.
-    return np.asarray(np.random.SFC64(np.random.SeedSequence([seed, cycle])).state["state"]["state"])
+    return np.asarray(np.random.SFC64(stream(seed, cycle)).state["state"]["state"])
 
 
 # Compiled arithmetic stays in float32, and so in twice as many vector lanes, where every constant of it is one.
