@@ -108,7 +108,7 @@ def prepare(
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
-        surveyed = survey(rung, radar, body, n_chirps, spreading=spreading)
+        surveyed = survey(rung, radar, body, n_chirps, spreading=spreading, scene=scene)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     if noise_power_m2 is not None:

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.pipeline.inside import Inside
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter import Rung
 from rtradar.scatter.poses import anchor_step
+from rtradar.scene import Scene
 from rtradar.signal import in_band
 from rtradar.spool import Spool, let_go
 
@@ -76,7 +78,7 @@ class Survey:
     limits: tuple[Limit, ...]
 
 
-def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bool = True) -> Survey:
+def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bool = True, scene: Scene | None = None) -> Survey:
     """Look at one chirp every 10 ms.
 
     Parameters
@@ -89,6 +91,8 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         In the capture.
     spreading : bool
         As of the rung; only for the reference where nobody is visible.
+    scene : Scene, optional
+        What the person must not stand in; nothing if left out.
 
     Returns
     -------
@@ -97,7 +101,8 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     Raises
     ------
     InputError
-        Where a part comes within 0.3 m of an antenna, or nothing of the person is ever within the radar's range.
+        Where a part comes within 0.3 m of an antenna, nothing of the person is ever within the radar's range, or the pelvis, or a
+        part with more than 5 % of the echo power, is inside a wall.
 
     Warns
     -----
@@ -110,6 +115,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts: set[str] = set()
     seen_in_band = False
+    solid = Inside(scene or Scene(), body.part_names)
     for first in range(0, len(chirps), _CHIRPS_AT_ONCE):
         chosen = chirps[first : first + _CHIRPS_AT_ONCE]
         times = np.minimum(radar.centres_of(chosen), body.duration_s)
@@ -122,6 +128,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         by_part = np.zeros((len(chosen), n_parts))
         np.add.at(by_part.T, echoes.part, power.mean(axis=1).T)
         powers.append(by_part)
+        solid.look(times, body.at(times), by_part)
         seen = np.zeros((len(chosen), echoes.length.shape[1], n_parts), dtype=bool)
         for echo, part in enumerate(echoes.part):
             seen[..., part] |= power[..., echo] > 0
@@ -139,6 +146,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
     looked_at = radar.centres_of(chirps)
     power = float(power_at.sum())
+    indoors = solid.found(power_at.sum(axis=0))
     let_go(power_at)
     if power == 0:
         # A point of 1 m^2 at the world's origin stands in for the person.
@@ -157,7 +165,8 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         "it shows at another velocity",
         "beyond_range": f"echo power from beyond {radar.max_range_m:.2f} m, removed by the ideal IF low-pass",
     }
-    limits = tuple(Limit(name, value / power, messages[name]) for name, value in concerned.items() if value > 0)
+    found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
+    limits = tuple(Limit(name, value / power, message) for name, value, message in [*found, *indoors])
     for limit in limits:
         if limit.share > _WARN_SHARE:
             warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=2)

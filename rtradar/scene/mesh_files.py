@@ -47,6 +47,25 @@ class Triangles:
         """Corners of each triangle, (face, 3, 3) [m]."""
         return self.vertices[self.faces]
 
+    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Whether points (..., 3) lie inside a closed mesh; shape (...).
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            World [m].
+
+        Returns
+        -------
+        (...) bool
+        """
+        low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
+        inside = np.asarray(self.closed & ((points >= low) & (points <= high)).all(axis=-1))
+        corners = self.corners
+        for place in np.argwhere(inside):
+            inside[tuple(place)] = _winding(corners - points[tuple(place)]) > 0.5
+        return inside
+
     def distance_m(self, point: NDArray[np.float64]) -> float:
         """From a point (3,) to the nearest point of the surface [m]; 0 inside a closed mesh.
 

@@ -93,6 +93,26 @@ class Wall:
         """Of one face [m^2]."""
         return float(np.linalg.norm(self.edge_u_m) * np.linalg.norm(self.edge_v_m))
 
+    def depth_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """How far points (..., 3) [m] lie behind the front face, NaN beside the rectangle; shape (...).
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            World [m].
+
+        Returns
+        -------
+        (...) float64
+            [m]; from 0 to `thickness_m` inside the slab.
+        """
+        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
+        before = np.ones(away.shape[:-1], dtype=bool)
+        for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
+            share = away @ edge / (edge @ edge)
+            before &= (share >= 0) & (share <= 1)
+        return np.where(before, -(away @ self.normal), np.nan)
+
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Whether points (..., 3) [m] lie inside the slab; shape (...).
 
@@ -105,13 +125,8 @@ class Wall:
         -------
         (...) bool
         """
-        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
-        inside = np.ones(away.shape[:-1], dtype=bool)
-        for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
-            share = away @ edge / (edge @ edge)
-            inside &= (share >= 0) & (share <= 1)
-        depth = -(away @ self.normal)
-        return inside & (depth >= 0) & (depth <= self.thickness_m)
+        depth = self.depth_m(points)
+        return np.asarray((depth >= 0) & (depth <= self.thickness_m))
 
 
 @dataclass(frozen=True, kw_only=True)
