@@ -12,6 +12,7 @@ from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline.inside import Inside
+from rtradar.process.angle import folded_angle_deg
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter import Rung
@@ -162,7 +163,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         "small_curvature": f"echo power from places whose wavenumber times radius of curvature is below "
         f"{MINIMUM_KA:g}, where optics is off by decibels: {', '.join(name for name in body.part_names if name in small_parts)}",
         "velocity_ambiguous": f"echo power from parts faster than the unambiguous {radar.max_velocity_mps:.2f} m/s: "
-        "it shows at another velocity",
+        f"it shows at another velocity{_and_direction(radar)}",
         "beyond_range": f"echo power from beyond {radar.max_range_m:.2f} m, removed by the ideal IF low-pass",
     }
     found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
@@ -171,6 +172,11 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         if limit.share > _WARN_SHARE:
             warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=2)
     return Survey(power / len(chirps), True, part_power, looked_at, power_at, hidden_at, limits)
+
+
+def _and_direction(radar: Radar) -> str:
+    angle_deg = folded_angle_deg(radar)
+    return f" and, ahead, {angle_deg:.1f} degrees beside its direction, more to the sides" if angle_deg > 0 else ""
 
 
 def _refuse_too_near(radar: Radar, body: Body, times: NDArray[np.float64]) -> None:

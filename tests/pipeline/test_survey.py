@@ -109,6 +109,18 @@ def test_what_is_faster_than_the_radar_can_tell_is_warned_of() -> None:
         assert limit.share > 0.4  # the ball straight ahead; the other one's range rate is 0.8 % less
 
 
+def test_what_shows_at_another_velocity_shows_in_another_direction_too() -> None:
+    # By hand: two Tx four wavelengths of 12 GHz apart that take turns, and a wavelength of 14 GHz: a sine of 12 / 14 / 8.
+    fast = dataclasses.replace(Balls(), semi_axes=np.full((2, 3), 0.1), speed=2.8)
+    with pytest.warns(ValidityWarning, match=r"at another velocity and, ahead, 6\.2 degrees beside its direction"):
+        look(fast)
+    # One Tx alone turns all of its channels alike, and Tx at once are not turned at all.
+    for radar in (dataclasses.replace(RADAR, tx_y=1, chirp_duration_s=2e-3), dataclasses.replace(RADAR, multiplexing="fdm")):
+        quick = dataclasses.replace(fast, speed=1.05 * radar.max_velocity_mps)
+        with pytest.warns(ValidityWarning, match="at another velocity$"):
+            look(quick, radar)
+
+
 def test_what_is_out_of_range_is_counted_and_refused_where_it_is_all() -> None:
     plump = dataclasses.replace(Balls(), semi_axes=np.full((2, 3), 0.1))
     edge = RADAR.max_range_m - 4.0  # the ball's near side reaches the range bins; the other one is farther

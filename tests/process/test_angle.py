@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.process import range_spectrum
-from rtradar.process.angle import angle, angle_spectra
+from rtradar.process.angle import angle, angle_spectra, folded_angle_deg
 from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
 from rtradar.process.cells import cell_spectra
 from rtradar.process.peaks import find_peaks
@@ -97,6 +97,27 @@ def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
     for velocity, sine in ((0.0, -0.003753 * 0.9727), (3.0, 0.0)):
         seen = angle_spectra(values, LOW, LOW.range_m[[107]], [velocity], taper="uniform")
         assert find_peaks(seen.sines, seen.y).sine[0, 0] == pytest.approx(sine, abs=5e-5)
+
+
+@pytest.mark.parametrize(("radar", "beside"), [(LOW, 1.02), (HIGH, 1.16)])
+@pytest.mark.parametrize("side", [1, -1])
+def test_an_echo_that_is_folded_shows_beside_its_direction(radar: Radar, beside: float, side: int) -> None:
+    # One Tx is 1 / 12 of a turn after the other, which is a sine of lambda / (12 x 4 lambda of the start).
+    assert folded_angle_deg(radar) == pytest.approx(beside, abs=0.005)
+    fast, unambiguous = 1.2 * side * radar.max_velocity_mps, 2 * radar.max_velocity_mps
+    found = np.degrees(angle(echo(radar, place_of(5.0, 0, 0), fast), radar, 5.0, fast - side * unambiguous))
+    # A Tx sees through eight Rx, whose own beam draws it back by some hundredths.
+    np.testing.assert_allclose(found, -side * beside, atol=0.05)
+
+
+def test_what_is_not_turned_shows_where_it_is() -> None:
+    for fields in (
+        {"tx_y": 1, "tx_z": 1},
+        {"multiplexing": "fdm"},
+        {"tx_y": 6, "rx_y": 1, "tx_z": 0, "rx_z": 0, "multiplexing": "fdm"},
+    ):
+        assert folded_angle_deg(Radar(**fields)) == 0
+    assert folded_angle_deg(Radar(tx_y=0)) > 0
 
 
 def test_focusing_gains_and_sharpens() -> None:
