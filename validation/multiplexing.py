@@ -248,7 +248,7 @@ def figure(rows: list[Row], path: Path) -> None:
         axes.set_title(f"{NAMES[kind]}: ±{made.max_velocity_mps:.2f} m/s", fontsize=9)
         axes.set_xlim(-20, 20)
         axes.set_ylim(2, 6)
-        axes.set_xlabel("velocity [m/s]")
+        axes.set_xlabel("velocity [m/s] (positive: receding)")
         axes.set_facecolor("0.85")
     panels[0].set_ylabel("range [m]")
     drawn.colorbar(shown, ax=panels, label="power below the peak [dB]")

@@ -19,9 +19,10 @@ import rtradar as rt
 from rtradar.body import Body, Ellipsoids
 from rtradar.body.meshes import ellipsoid_meshes
 from rtradar.motion import place
+from rtradar.report.field_units import VELOCITY_LABEL, field_unit
 
 MOMENT_S = 1.3
-LOW, HIGH = -75.0, -15.0  # colours of the maps [dB]
+LOW, HIGH = -65.0, -5.0  # colours of the maps [dBsm]
 
 
 def draw_body(axes: Any, body: Body, radar: rt.Radar, time_s: float) -> None:
@@ -56,21 +57,24 @@ def main() -> None:
             result = rt.run(motion, radar, out=Path(folder, fidelity), fidelity=fidelity)
             with xarray.open_dataset(Path(folder, fidelity, "maps.h5"), engine="h5netcdf") as maps:
                 axes = figure.add_subplot(grid[0, column])
-                power = 10 * np.log10(maps.range_doppler.sel(time=MOMENT_S, method="nearest").sel(range=slice(2, 7)))
-                image = axes.pcolormesh(maps.velocity, power.range, power, cmap="viridis", vmin=LOW, vmax=HIGH, rasterized=True)
-                axes.set(xlabel="Velocity [m/s], positive receding", ylabel="Range [m]", title=f"{fidelity}, {MOMENT_S:.2f} s")
+                near = maps.range_doppler.sel(time=MOMENT_S, method="nearest").sel(range=slice(2, 7))
+                unit = field_unit(radar, range_m=near.range.values[:, None])
+                level = unit.level(near.values / radar.n_channels)
+                image = axes.pcolormesh(maps.velocity, near.range, level, cmap="viridis", vmin=LOW, vmax=HIGH, rasterized=True)
+                axes.set(xlabel=VELOCITY_LABEL, ylabel="Range [m]", title=f"{fidelity}, {MOMENT_S:.2f} s")
                 if fidelity == "specular":
-                    figure.colorbar(image, label="Power, 96 channels [dB re 1 m²]")
+                    figure.colorbar(image, label=unit.label("mean of channels"))
                     axes = figure.add_subplot(grid[1, 0])
-                    power = 10 * np.log10(maps.range_time.sel(range=slice(2, 7)))
-                    image = axes.pcolormesh(maps.slow_time, power.range, power.T, cmap="viridis", rasterized=True)
-                    image.set_clim(float(power.median()) - 3, None)
+                    near = maps.range_time.sel(range=slice(2, 7))
+                    level = field_unit(radar, range_m=near.range.values).level(near.values)
+                    image = axes.pcolormesh(maps.slow_time, near.range, level.T, cmap="viridis", rasterized=True)
+                    image.set_clim(float(np.median(level)) - 3, None)
                     axes.set(xlabel="Time [s]", ylabel="Range [m]", title="specular, range over time")
-                    figure.colorbar(image, label="Power, mean of channels [dB re 1 m²]")
+                    figure.colorbar(image, label=unit.label("mean of channels"))
             axes = figure.add_subplot(grid[1, column], projection="3d")
             time, distance, velocity = result.points.T
             axes.scatter(time, distance, velocity, c=velocity, s=3, cmap="coolwarm", vmin=-5, vmax=5)
-            axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s]", title=f"{fidelity}, RDT cloud")
+            axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{fidelity}, RDT cloud")
             axes.set_box_aspect((1.5, 1, 1))
     figure.savefig(options.out)
     print(options.out)

@@ -28,5 +28,5 @@ time, distance, velocity = result.points.T
 figure = plt.figure(figsize=(7, 5), layout="constrained")
 axes = figure.add_subplot(projection="3d")
 axes.scatter(time, distance, velocity, c=velocity, s=3, cmap="coolwarm", vmin=-5, vmax=5)
-axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s], positive receding", title="A walk towards the radar")
+axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel="Velocity [m/s] (positive: receding)", title="A walk towards the radar")
 figure.savefig(OUT / "1_first_run.png")

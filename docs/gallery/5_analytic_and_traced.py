@@ -27,10 +27,15 @@ print(found.table())
 # %%
 # Each rung's run lies in a folder of its name. Power is summed over range and velocity, of all channels.
 figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained")
+power = {}
 for rung in ("analytic", "specular"):
     with h5py.File(found.out / rung / "maps.h5") as maps:
-        above.plot(maps["time"][:], 10 * np.log10(maps["range_doppler"][:].sum(axis=(1, 2))), label=rung)
-above.set(xlabel="Time [s]", ylabel="Power [dB re 1 m²]", title="Power of the range-Doppler maps")
+        power[rung] = maps["range_doppler"][:].sum(axis=(1, 2))
+        times = maps["time"][:]
+strongest = max(one.max() for one in power.values())
+for rung, one in power.items():
+    above.plot(times, 10 * np.log10(one / strongest), label=rung)
+above.set(xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps")
 above.legend()
 hidden = found.summary["fidelities"]["specular"]["part_hidden_share"]
 below.barh(list(hidden), [100 * share for share in hidden.values()])

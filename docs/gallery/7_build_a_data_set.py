@@ -53,5 +53,5 @@ for place in range(len(clouds)):
     axes.scatter(*cloud.points.T, c=cloud.points[:, 2], s=1, cmap="coolwarm", vmin=-5, vmax=5)
     axes.set_title(f"{cloud.label}, {cloud.provenance['subject']}", fontsize=9)
     axes.tick_params(labelsize=6)
-figure.suptitle("Time [s], range [m], velocity [m/s]")
+figure.suptitle("Time [s], range [m], velocity [m/s] (positive: receding)")
 figure.savefig(OUT / "7_build_a_data_set.png")

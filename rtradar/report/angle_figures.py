@@ -46,7 +46,7 @@ def draw_range_angle(
         axes.set(xlabel=angle_label(name, radar), title=f"Range-{name}")
         figure.colorbar(image, ax=axes, label=unit.label("detected cells"))
     panels[0].set_ylabel("Range [m]")
-    figure.suptitle(title)
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)
 
 
@@ -86,5 +86,5 @@ def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArra
         axes.grid(alpha=0.3)
         axes.legend(loc="upper right")
     figure.colorbar(dots, ax=figure.axes, label=VELOCITY_LABEL)
-    figure.suptitle(f"{title}: {len(points)} points")
+    figure.suptitle(f"{title}\n{len(points)} points", wrap=True)
     save_figure(figure, path)

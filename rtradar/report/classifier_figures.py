@@ -80,7 +80,7 @@ def draw_learning(path: Path, histories: Sequence[History], title: str) -> None:
         axes.set(xlabel="Epoch", ylabel=label)
         axes.grid(alpha=0.3)
         axes.legend()
-    figure.suptitle(title)
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)
 
 

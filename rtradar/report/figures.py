@@ -24,6 +24,8 @@ def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
     Figure and axes refer to each other. Were that left to Python's collector of cycles, what one picture takes would by chance
     still be there with the next.
     """
+    for axes in figure.axes:
+        axes.title.set_wrap(True)
     figure.savefig(file, format=None if isinstance(file, Path) else "png")
     figure.clear()
 
@@ -113,11 +115,11 @@ def draw_range_doppler(
     rows, columns = np.nonzero(mask)
     right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections")
     right.legend(loc="upper right")
-    for axes, name in ((left, "Power"), (right, "Detections, over the map in grey")):
+    for axes, name in ((left, "Range-Doppler map"), (right, "Detections, over the map in grey")):
         axes.set(xlabel=VELOCITY_LABEL, title=name)
     left.set_ylabel("Range [m]")
     figure.colorbar(image, ax=[left, right], label=unit.label("mean of channels"))
-    figure.suptitle(title)
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)
 
 
@@ -137,7 +139,7 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
     time, distance, velocity = points.T
     largest = float(np.abs(velocity).max(initial=1e-9))
     dots = axes.scatter(time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest)
-    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{title}: {len(points)} points")
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{title}\n{len(points)} points")
     axes.set_box_aspect((1.6, 1, 1))
     figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
     save_figure(figure, path)

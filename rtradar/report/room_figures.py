@@ -46,10 +46,16 @@ def draw_plan(
     """
     figure = new_figure(10, 6)
     axes = figure.subplots()
-    for first, last, name in walls_in_plan(scene):
+    walls = walls_in_plan(scene)
+    corners = np.array([corner for first, last, _ in walls for corner in (first, last)])
+    for first, last, name in walls:
         axes.plot(*zip(first, last, strict=True), color="black", linewidth=2.5)
-        box = {"facecolor": "white", "edgecolor": "none", "pad": 1}
-        axes.annotate(name, tuple((first + last) / 2), fontsize=7, color="dimgrey", ha="center", va="center", bbox=box)
+        middle = (first + last) / 2
+        # Outside the room, where no furniture has its name.
+        across = np.abs(last - first) < np.abs(last - first).max()
+        outward = 9 * across * np.sign(middle - corners.mean(axis=0))
+        text = axes.annotate(name, tuple(middle), xytext=tuple(outward), textcoords="offset points", fontsize=7, color="dimgrey")
+        text.set(ha="center", va="center")
     for piece in scene.furniture:
         corners = piece.triangles().corners[..., :2]
         axes.add_collection(PolyCollection(list(corners), color="tan", alpha=0.5, linewidth=0))
@@ -110,24 +116,45 @@ def draw_before_after(
         image = axes.imshow(levels[name], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
         rows, columns = np.nonzero(mask)
         axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected")
-        _mark(axes, ghosts, radar)
-        axes.set(xlabel=VELOCITY_LABEL, title=f"{name}: {len(rows)} detections")
+        axes.set(xlabel=VELOCITY_LABEL, title=f"{name}\n{len(rows)} detections")
         axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
+        _mark(axes, ghosts, radar)
     panels[0].set_ylabel("Range [m]")
     panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, ax=list(panels), label=unit.label("mean of channels"))
-    figure.suptitle(title)
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
-    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range; one for a legend."""
+    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range; one for a legend.
+
+    Names stand beside them toward the middle of the axes, far enough apart to be read.
+    """
     label = "ghost over a wall, predicted"
-    for name, distance, across in ghosts:
-        if distance < radar.max_range_m:
-            axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9, label=label)
-            label = ""
-            axes.annotate(name, (across, distance), xytext=(6, 3), textcoords="offset points", fontsize=6, color="red")
+    inside = sorted((ghost for ghost in ghosts if ghost[1] < radar.max_range_m), key=lambda ghost: ghost[1])
+    (left, right), gap = axes.get_xlim(), 0.035 * radar.max_range_m
+    placed: list[tuple[float, float]] = []
+    for name, distance, across in inside:
+        axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9, label=label)
+        label = ""
+        toward = 1 if across < (left + right) / 2 else -1
+        beside, place = across + 0.08 * toward * (right - left), distance
+        for other, taken in placed:
+            if abs(other - beside) < 0.25 * (right - left):
+                place = max(place, taken + gap)
+        placed.append((beside, place))
+        axes.annotate(
+            name,
+            (across, distance),
+            xytext=(beside, place),
+            fontsize=7,
+            color="white",
+            ha="left" if toward > 0 else "right",
+            va="center",
+            bbox={"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1},
+            arrowprops={"arrowstyle": "-", "color": "red", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4},
+        )
 
 
 def draw_range_azimuth_with_walls(
@@ -169,10 +196,10 @@ def draw_range_azimuth_with_walls(
         axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
         inside = np.flatnonzero((angle > extent[0]) & (angle < extent[1]) & (distance < radar.max_range_m))
         if len(inside):
-            middle = inside[len(inside) // 2]
-            axes.annotate(name, (angle[middle], distance[middle]), fontsize=8, color="white")
-    _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
+            near = inside[len(inside) // 6]  # beside the middle, where names of ghosts stand
+            axes.annotate(name, (angle[near], distance[near]), fontsize=8, color="white")
     axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
+    _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
     figure.colorbar(image, label=unit.label("detected cells"))

@@ -128,7 +128,7 @@ def draw_maps(
         axes.set(xlabel=across[0], title=name)
     columns[0].set_ylabel(up[0])
     figure.colorbar(image, ax=list(columns), label=label)
-    figure.suptitle(title)
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)
 
 
@@ -153,6 +153,6 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-        axes.set_box_aspect((1.5, 1, 1))
-    figure.suptitle(title)
+        axes.set_box_aspect((1.5, 1, 1), zoom=0.85)  # room for the labels at its right
+    figure.suptitle(title, wrap=True)
     save_figure(figure, path)

@@ -40,7 +40,7 @@ def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "pa
     """
     figure = new_figure(15, 9.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
-    figure.suptitle(f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s")
+    figure.suptitle(f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s", wrap=True)
     paint = _Paint(linked, colour)
     views = [figure.add_subplot(grid[row, column], projection=None if column else "3d") for row, column in np.ndindex(2, 2)]
     _draw_body(views[0], linked, step, paint)
