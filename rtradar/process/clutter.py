@@ -185,6 +185,9 @@ class _Mean(ClutterRemoval):
         return f"mean over {window_cycles} cycles ({window_cycles * self._radar.cycle_duration_s:.3g} s)"
 
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
+        if cycles.size <= len(cycles) * _CELLS_AT_ONCE:
+            # Such as a window of the spectrogram: threads would be woken for longer than they work.
+            return cycles - cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
         out = np.empty(cycles.shape, dtype=cycles.dtype)
         _without_mean(np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1))
         return out

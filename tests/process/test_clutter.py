@@ -60,6 +60,17 @@ def test_of_a_still_room_nothing_is_left(method: str, options: dict[str, Any], k
         assert abs(left).max() <= 64 * 2**-53 * abs(still).max() * math.sqrt(2)
 
 
+@pytest.mark.parametrize("cells", [1, 1024, 1025, 5000])
+@pytest.mark.parametrize("kind", [np.complex64, np.complex128])
+def test_the_mean_of_few_and_of_many_cells(cells: int, kind: type) -> None:
+    rng = np.random.default_rng(0)
+    cycles = (rng.standard_normal((CYCLES, cells)) + 1j * rng.standard_normal((CYCLES, cells))).astype(kind)
+    left = clutter_removal("mean", RADAR).window(cycles)
+    assert left.dtype == kind
+    # Some roundings of values up to 5.
+    np.testing.assert_allclose(left, cycles - cycles.mean(axis=0, dtype=complex), atol=20 * np.finfo(kind).eps)
+
+
 @pytest.mark.parametrize("pulses", [2, 3])
 @given(turns=st.floats(-0.5, 0.5))
 @settings(max_examples=50, deadline=None)
