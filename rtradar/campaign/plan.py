@@ -14,13 +14,16 @@ from tqdm import tqdm
 
 from rtradar import __version__
 from rtradar.campaign.sample import Recipe, digest, scene_digest
-from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec
+from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec, check_samples
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion
 from rtradar.radar import Radar
 from rtradar.seeds import stream
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
+_PATIENCE_S = 2.0
+"""What lasts longer shows a bar."""
+
 _BODY = ("build", "height_m")
 """What a synthetic subject has for life, and is drawn with the subject."""
 _LATER = (
@@ -51,14 +54,19 @@ def recipes(spec: Spec) -> list[Recipe]:
     Raises
     ------
     InputError
-        Where a recording cannot be read or is too short, or two samples are the same.
+        Where a recording cannot be read or is too short, two samples are the same, or there are too many.
     """
     intervals = [*(interval for actor in spec.actors for interval in _takes(spec, actor))]
     # Reading takes a second for a long recording.
     for recorded in tqdm(spec.recordings, desc="reading recordings", unit="file", disable=None if spec.recordings else True):
-        intervals += _intervals(spec, recorded)
+        motion = load_motion(recorded.path, skeleton=recorded.skeleton)
+        check_samples(len(intervals) + recorded.windows.count(motion.duration_s), len(spec.settings))
+        intervals += _intervals(spec, recorded, motion)
     common = {"pfa": spec.pfa, "clutter_removal": spec.clutter_removal, "version": __version__}
-    found = [_recipe(interval, setting, common) for interval in intervals for setting in spec.settings]
+    combinations = ((interval, setting) for interval in intervals for setting in spec.settings)
+    total = len(intervals) * len(spec.settings)
+    bar = tqdm(combinations, desc="planning samples", unit="sample", total=total, disable=None, leave=False, delay=_PATIENCE_S)
+    found = [_recipe(interval, setting, common) for interval, setting in bar]
     twice = [identity for identity, count in Counter(recipe.identity for recipe in found).items() if count > 1]
     if twice:
         told = next(recipe.parameters for recipe in found if recipe.identity == twice[0])
@@ -99,8 +107,7 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
             yield _Interval(actor.label, {**motion, "start_s": start_s, "duration_s": duration_s}, drawn, None)
 
 
-def _intervals(spec: Spec, recorded: Recorded) -> Iterator[_Interval]:
-    motion = load_motion(recorded.path, skeleton=recorded.skeleton)
+def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Interval]:
     content = digest([path for path in (recorded.path, recorded.skeleton) if path is not None])
     for start_s, duration_s in recorded.windows.of(recorded.name, motion.duration_s):
         seed = _seed(spec.seed, content, start_s)

@@ -53,6 +53,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rtradar.campaign.windows import Windows
+from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 
@@ -67,6 +68,32 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "height_m": ((1.55, 1.95), 0.8, 2.5),
 }
 """What is drawn: the range where the file gives none, and the least and the most that it may give."""
+
+
+MOST_SAMPLES = 1_000_000
+"""Of one data set. The plan of as many takes 2 GB of memory and half an hour, and each sample is a file of one folder."""
+
+
+def check_samples(intervals: int, settings: int) -> None:
+    """Refuse a data set of more samples than `MOST_SAMPLES`, before any of them takes memory.
+
+    Parameters
+    ----------
+    intervals : int
+        Intervals of recordings and of synthetic takes.
+    settings : int
+        Combinations of what stands under ``[each]``; every interval meets each.
+
+    Raises
+    ------
+    InputError
+        The message tells both numbers, and how to go on.
+    """
+    if intervals * settings > MOST_SAMPLES:
+        raise InputError(
+            f"these are {intervals * settings} samples, {intervals} intervals under {settings} combinations of [each]; "
+            f"{MOST_SAMPLES} are allowed: split the file, each part into a folder of its own, as rtradar train takes several"
+        )
 
 
 @dataclass(frozen=True)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import math
 import os
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec
+from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec, check_samples
 from rtradar.campaign.windows import WINDOW_KEYS, Windows
 from rtradar.checks import check_number, check_text, check_vector, inside, shown
 from rtradar.errors import InputError
@@ -22,7 +24,17 @@ from rtradar.seeds import check_seed
 from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 _TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
-_EACH = ("radar", "scene", "fidelity", "heading_deg", "snr_db", "person_position_m", "radar_position_m")
+_EACH: Mapping[str, list[Any]] = {
+    "radar": ["paper-12ghz"],
+    "scene": ["free-space"],
+    "fidelity": ["specular"],
+    "heading_deg": [None],
+    "snr_db": [None],
+    "person_position_m": [None],
+    "radar_position_m": [None],
+}
+"""What may stand under ``[each]``, and what holds where it does not; None: drawn, or as the scene says."""
+
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *WINDOW_KEYS)
 _MOST = 1_000_000
@@ -50,24 +62,24 @@ def _spec(table: Table, folder: Path) -> Spec:
     check_keys("", table, (), _TOP)
     drawn_table, each = table_at("drawn", table), table_at("each", table)
     check_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
-    check_keys("[each] ", each, (), _EACH)
+    check_keys("[each] ", each, (), tuple(_EACH))
     for key in drawn_table:
         if key in each:
             raise InputError(f"{key} stands under [each] and under [drawn]; give it once")
     windows_table = table_at("windows", table)
     check_keys("[windows] ", windows_table, (), WINDOW_KEYS)
     windows = Windows.read("[windows]", windows_table)
-    actors = tuple(_actor(where, piece) for where, piece in tables_at("synthetic", table))
+    actors = _actors(table)
     beside = _folder(table, folder)
     recordings = tuple(_recorded(where, piece, windows_table, beside) for where, piece in tables_at("recordings", table))
     if not actors and not recordings:
         raise InputError("there is neither [[synthetic]] nor [[recordings]]; give one of them")
-    labels = [actor.label for actor in actors]
-    if len(set(labels)) < len(labels):
-        twice = next(label for label in labels if labels.count(label) > 1)
-        raise InputError(f"[[synthetic]] label = '{twice}' stands there twice; give its takes together")
     if actors and windows.needed_s is None:
         raise InputError("[windows] duration_s is missing; synthetic actors have no end of their own")
+    lists = {key: _several(each, key, usual) for key, usual in _EACH.items()}
+    takes = sum(len(actor.seeds) for actor in actors)
+    intervals = takes * windows.count(windows.needed_s) + sum(recorded.windows.count() for recorded in recordings)
+    check_samples(intervals, math.prod(map(len, lists.values())))  # before combinations are made
     removal = table.get("clutter_removal", "none")
     if removal not in CLUTTER_REMOVALS:
         raise InputError(f"clutter_removal = {shown(removal)}; allowed: {', '.join(CLUTTER_REMOVALS)}")
@@ -76,7 +88,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         pfa=check_number("data set", "pfa", table.get("pfa", 1e-6), 1e-15, 0.5),
         clutter_removal=removal,
         windows=windows,
-        settings=_settings(each, folder),
+        settings=_settings(lists, folder),
         drawn={key: _range(key, drawn_table.get(key, usual), least, most) for key, (usual, least, most) in DRAWN.items()},
         actors=actors,
         recordings=recordings,
@@ -102,20 +114,19 @@ def _folder(table: Table, beside: Path) -> Path:
     return there
 
 
-def _settings(each: Table, folder: Path) -> tuple[Setting, ...]:
-    radars = [_loaded("radar", value, folder, Radar.load) for value in _several(each, "radar", ["paper-12ghz"])]
-    scenes = [_loaded("scene", value, folder, Scene.load) for value in _several(each, "scene", ["free-space"])]
-    rungs = [check_text("[each]", "fidelity", value) for value in _several(each, "fidelity", ["specular"])]
+def _settings(each: Mapping[str, list[Any]], folder: Path) -> tuple[Setting, ...]:
+    radars = [_loaded("radar", value, folder, Radar.load) for value in each["radar"]]
+    scenes = [_loaded("scene", value, folder, Scene.load) for value in each["scene"]]
+    rungs = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
     for rung in rungs:
         if rung not in RUNGS:
             raise InputError(f"[each] fidelity = {shown(rung)} is unknown; allowed: {', '.join(RUNGS)}")
     numbers: dict[str, list[float | None]] = {}
     for key in ("heading_deg", "snr_db"):
         _, least, most = DRAWN[key]
-        given = _several(each, key, [None])
-        numbers[key] = [None if value is None else check_number("[each]", key, value, least, most) for value in given]
+        numbers[key] = [None if value is None else check_number("[each]", key, value, least, most) for value in each[key]]
     people, radar_places = (
-        [None if value is None else check_vector("[each]", key, value, size, 100.0) for value in _several(each, key, [None])]
+        [None if value is None else check_vector("[each]", key, value, size, 100.0) for value in each[key]]
         for key, size in (("person_position_m", 2), ("radar_position_m", 3))
     )
     placed = [
@@ -134,9 +145,15 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
     values = each.get(key, usual)
     if not isinstance(values, list) or not values:
         raise InputError(f"[each] {key} = {shown(values)}; it must be a list, not empty")
-    if any(value in values[:number] for number, value in enumerate(values)):
+    different = {tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value) for value in values}
+    if len(different) < len(values):
         raise InputError(f"[each] {key} = {shown(values)}; a value stands there twice")
     return values
+
+
+def _comparable(value: object) -> object:
+    """The same where it is a number or a text; a table or a list, which is refused later, becomes its text."""
+    return value if isinstance(value, int | float | str | None) else repr(value)
 
 
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
@@ -147,6 +164,16 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
         return load(folder / source if source.endswith(".toml") else source)
     except InputError as error:
         raise InputError(f"[each] {key}: {error}") from None
+
+
+def _actors(table: Table) -> tuple[Actor, ...]:
+    found: dict[str, Actor] = {}
+    for where, piece in tables_at("synthetic", table):
+        actor = _actor(where, piece)
+        if actor.label in found:
+            raise InputError(f"[[synthetic]] label = '{actor.label}' stands there twice; give its takes together")
+        found[actor.label] = actor
+    return tuple(found.values())
 
 
 def _actor(where: str, table: Table) -> Actor:

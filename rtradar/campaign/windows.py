@@ -60,6 +60,13 @@ class Windows:
             return self.end_s
         return None if self.duration_s is None else self.start_s + self.duration_s
 
+    def count(self, length_s: float | None = None) -> int:
+        """How many intervals a recording of that length [s] gives; at least how many where the length is not known."""
+        end = length_s if self.end_s is None else self.end_s
+        if self.hop_s is None or self.duration_s is None or end is None:
+            return 1
+        return 1 + math.floor((end - self.start_s - self.duration_s + _SLACK_S) / self.hop_s)
+
     def of(self, name: str, length_s: float) -> list[tuple[float, float]]:
         """Start and duration [s] of each interval of a recording of that length [s].
 
@@ -77,5 +84,5 @@ class Windows:
             )
         if self.duration_s is None:
             return [(self.start_s, round(end - self.start_s, 6))]
-        count = 1 if self.hop_s is None else 1 + math.floor((end - self.start_s - self.duration_s + _SLACK_S) / self.hop_s)
-        return [(round(self.start_s + number * (self.hop_s or 0.0), 6), self.duration_s) for number in range(count)]
+        starts = (self.start_s + number * (self.hop_s or 0.0) for number in range(self.count(length_s)))
+        return [(round(start, 6), self.duration_s) for start in starts]

@@ -205,6 +205,15 @@ def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
         planned(tmp_path, HEAD + recording(tmp_path) * 2)
 
 
+def test_a_recording_of_too_many_intervals_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rtradar.campaign.spec.MOST_SAMPLES", 20)
+    text = "[windows]\nduration_s = 1.0\nhop_s = 0.1\n" + recording(tmp_path)
+    with pytest.raises(InputError, match="these are 21 samples, 21 intervals under 1 combinations"):
+        planned(tmp_path, text)
+    monkeypatch.setattr("rtradar.campaign.spec.MOST_SAMPLES", 21)
+    assert len(planned(tmp_path, text)) == 21
+
+
 def test_a_recording_that_cannot_be_read_is_named(tmp_path: Path) -> None:
     text = HEAD + recording(tmp_path)
     (tmp_path / "walk.bvh").write_text("nothing")

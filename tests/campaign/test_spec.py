@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import copy
+import time
+import tracemalloc
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +46,44 @@ def test_what_is_left_out_has_a_value(tmp_path: Path) -> None:
     assert spec.drawn["snr_db"] == (20.0, 20.0)
     assert spec.actors[0].seeds == (0, 1, 2)
     assert spec.actors[0].subjects == tuple(range(10))
+
+
+LISTS = {
+    "heading_deg": [number / 10 for number in range(1000)],
+    "snr_db": [number / 100 for number in range(10_000)],
+    "person_position_m": [[number / 1000, 0] for number in range(10_000)],
+}
+"""1e11 combinations; to compare each value with each other, let alone to make them, takes minutes."""
+
+
+@pytest.mark.parametrize(
+    ("text", "count"),
+    [
+        (SMALL + f"[each]\nheading_deg = {LISTS['heading_deg']}\n", 0),
+        (SMALL + "[each]\n" + "".join(f"{key} = {values}\n" for key, values in LISTS.items()), 3 * 10**11),
+        (SMALL.replace("count = 3", "count = 1000000"), 0),
+        (SMALL.replace("count = 3", "count = 1000000") + '[each]\nfidelity = ["specular", "analytic"]', 2 * 10**6),
+        (SMALL.replace("duration_s = 2.0", "duration_s = 1\nhop_s = 1e-3\nend_s = 1e5"), 3 * (99_999_000 + 1)),
+        ("[windows]\nduration_s = 1\nhop_s = 1e-3\nend_s = 1e5" + RECORDING, 99_999_001),
+    ],
+    ids=["a thousand", "combinations", "a million takes", "two million takes", "windows of takes", "windows of a recording"],
+)
+def test_samples_are_counted_before_they_are_made(tmp_path: Path, text: str, count: int) -> None:
+    (tmp_path / "walk.bvh").write_text("")
+    path = write(tmp_path, text)
+    tracemalloc.start()
+    began = time.perf_counter()
+    try:
+        if count:
+            with pytest.raises(InputError, match=rf"these are {count} samples, .* 1000000 are allowed: split the file"):
+                read_spec(path)
+        else:
+            read_spec(path)
+        peak = tracemalloc.get_traced_memory()[1]
+    finally:
+        tracemalloc.stop()
+    assert peak < 200e6
+    assert time.perf_counter() - began < 30  # some seconds with the memory watched; hours without the count
 
 
 def test_every_combination_is_a_setting(tmp_path: Path) -> None:
