@@ -6,11 +6,12 @@ theirs by an entry point of the registry's group, found when a name is asked for
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from functools import cached_property
 from importlib import import_module
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions, entry_points
 from typing import Any
 
 from rtradar.errors import BackendError, ExtensionError, InputError
@@ -36,7 +37,11 @@ class Registry(Mapping[str, Callable[..., Any]]):
     @cached_property
     def _installed(self) -> dict[str, list[EntryPoint]]:
         found: dict[str, list[EntryPoint]] = {}
-        for entry in entry_points(group=self.group):
+        try:
+            entries = list(entry_points(group=self.group))
+        except Exception:  # of any package of the environment; what its file holds decides the type
+            entries = _readable_entries(self.group)
+        for entry in entries:
             found.setdefault(entry.name, []).append(entry)
         return found
 
@@ -121,16 +126,17 @@ class Registry(Mapping[str, Callable[..., Any]]):
         Raises
         ------
         ExtensionError
-            In place of any error but those that have a meaning to the user already.
+            In place of any error but those that have a meaning to the user already; a class of its own makes none of them.
         """
         try:
             yield
         except (InputError, BackendError, ExtensionError, MemoryError):
             raise
-        except (Exception, SystemExit) as error:
-            if name in self.built_in:
-                raise  # a fault of rtradar's own shows where it is
-            said = (str(error).splitlines() or [""])[0]
+        except BaseException as error:
+            # A fault of rtradar's own shows where it is, and Ctrl-C ends the process; what is derived from it is not Ctrl-C.
+            if name in self.built_in or type(error) is KeyboardInterrupt:
+                raise
+            said = _first_line(error)
             raise ExtensionError(
                 f"{self.owner(name)} failed: {type(error).__name__}{f': {said}' if said else ''}; mend or uninstall it"
             ) from error
@@ -138,6 +144,26 @@ class Registry(Mapping[str, Callable[..., Any]]):
     def refuse(self, name: str, why: str) -> ExtensionError:
         """The error to raise where one gave what it must not."""
         return ExtensionError(f"{self.owner(name)} {why}; see docs/extending.md")
+
+
+def _first_line(error: BaseException) -> str:
+    try:
+        return (str(error).splitlines() or [""])[0]
+    except BaseException:  # it is not rtradar's code that makes the text either
+        return ""
+
+
+def _readable_entries(group: str) -> list[EntryPoint]:
+    """Entry points of all packages but those whose files cannot be read, each of which is named by a warning."""
+    found: dict[str, list[EntryPoint]] = {}
+    for package in distributions():
+        name = "of unknown name"
+        try:
+            name = package.name
+            found.setdefault(name, list(package.entry_points.select(group=group)))  # of two of one name the first is imported
+        except Exception as error:
+            warnings.warn(f"package {name}: its entry points cannot be read ({_first_line(error)}); reinstall it", stacklevel=2)
+    return [entry for entries in found.values() for entry in entries]
 
 
 def _package(entry: EntryPoint) -> str:

@@ -147,6 +147,74 @@ def test_a_broken_package_is_one_line(
     assert not (tmp_path / "out").exists()
 
 
+PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
+    # The name, the function, and the words that ask for it.
+    "rung": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
+    "reader": ("npz", "read(path)", ()),
+    "radar": ("lane-60ghz", "lane()", USED[2:4]),
+    "detector": ("threshold", "threshold(power, *, pfa, looks)", ("--radar", "lane-60ghz", *USED[4:])),
+}
+ENDS = ["SystemExit('gone')", "BaseException('gone')", "Ended('gone')", "Stopped('gone')", "Silent()", "GeneratorExit('gone')"]
+CLASSES = """
+class Ended(BaseException): pass
+class Stopped(KeyboardInterrupt): pass
+class Silent(BaseException):
+    def __str__(self): raise BaseException('not even that')
+"""
+
+
+@pytest.mark.parametrize("called", [False, True], ids=["imported", "called"])
+@pytest.mark.parametrize("raised", ENDS)
+@pytest.mark.parametrize("place", PLACES)
+def test_a_package_may_raise_what_it_likes(
+    tmp_path: Path, here: Install, capsys: Capture, recording: Path, place: str, raised: str, called: bool
+) -> None:
+    named, head, asked = PLACES[place]
+    text = f"def {head}:\n    raise {raised}\n" if called else f"raise {raised}\n"
+    here(tmp_path / "site", {f"outside_{place}.py": CLASSES + text})
+    motion = str(recording) if place == "reader" else "synthetic:walk"
+    assert main(["run", motion, "--fidelity", "analytic", *asked, "--duration", "0.2", "--out", str(tmp_path / "out")]) == 1
+    said = [line for line in capsys.readouterr().err.splitlines() if line and not line.startswith("rtradar: warning")]
+    assert len(said) == 1
+    assert f"'{named}' of package 'outside' failed: {raised.partition('(')[0]}" in said[0]
+    # The others of its kind still work.
+    for registry in REGISTRIES:
+        assert all(callable(registry[name]) for name in registry.built_in)
+
+
+def test_ctrl_c_is_still_ctrl_c(tmp_path: Path, here: Install, capsys: Capture) -> None:
+    here(tmp_path / "site", {"outside_radar.py": "raise KeyboardInterrupt"})
+    assert main(["run", "synthetic:walk", "--radar", "lane-60ghz", "--out", str(tmp_path / "out")]) == 1
+    assert "stopped by the user" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("text", [b"[rtradar.radars]\nno equals sign\n", b"[rtradar.radars]\n\xe9 = x:y\n"])
+def test_entry_points_that_cannot_be_read_are_left_out(tmp_path: Path, here: Install, text: bytes) -> None:
+    here(tmp_path / "site", {})
+    about = tmp_path / "broken" / "broken-1.dist-info"
+    about.mkdir(parents=True)
+    (about / "METADATA").write_text("Metadata-Version: 2.1\nName: broken\nVersion: 1\n")
+    (about / "entry_points.txt").write_bytes(text)
+    sys.path.insert(0, str(tmp_path / "broken"))
+    try:
+        with pytest.warns(UserWarning, match="package broken: its entry points cannot be read"):
+            assert rt.Radar.load("lane-60ghz").name == "lane-60ghz"
+    finally:
+        sys.path.remove(str(tmp_path / "broken"))
+
+
+def test_an_account_that_no_file_can_hold(registered: None) -> None:
+    class Accounted(Wrong):
+        def account(self) -> dict[str, object]:
+            return {"power": object()}
+
+    rt.register_rung("wrong", Accounted)
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
+    rung = build_rung("wrong", rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0), body, spoil="nothing")
+    with pytest.raises(rt.ExtensionError, match="'wrong' failed: TypeError"):
+        rung.account()  # type: ignore[attr-defined]
+
+
 @pytest.fixture
 def registered() -> Iterator[None]:
     """Takes out again what a test registers."""

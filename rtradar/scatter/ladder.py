@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -104,9 +105,18 @@ class _Checked:
 
     def __init__(self, name: str, rung: Rung, radar: Radar, body: Body) -> None:
         self._name, self._rung, self._radar, self._parts = name, rung, radar, len(body.part_names)
-        self.variant: str | None = getattr(rung, "variant", None)
-        if isinstance(rung, Accountable):
-            self.account = rung.account
+        with RUNGS.guarded(name):
+            self.variant: str | None = getattr(rung, "variant", None)
+            if isinstance(rung, Accountable):
+                self.account = self._account
+        if not isinstance(self.variant, str | None):
+            raise RUNGS.refuse(name, f"has a variant that is a {type(self.variant).__name__}, not a string or None")
+
+    def _account(self) -> dict[str, Any]:
+        with RUNGS.guarded(self._name):
+            told: dict[str, Any] = self._rung.account()  # type: ignore[attr-defined]
+            json.dumps(told, allow_nan=False)  # as it will be written
+        return told
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
