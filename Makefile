@@ -1,5 +1,6 @@
 # make demo    a 3 s synthetic walk by both models, pictures in out/demo/
 # make test    the tests
+# make test-fresh    the property tests alone, on new random examples each time (TESTS=tests/motion: those of one folder)
 # make lint    ruff, mypy and the import contract
 # make docs    theory, conventions, gallery and Python interface, in out/docs/; the gallery takes minutes the first time
 # make clean   removes all that these made, .venv/ included
@@ -12,7 +13,7 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt
 RUN := $(BIN)/rtradar run synthetic:walk --duration 3
 
-.PHONY: demo test lint docs clean
+.PHONY: demo test test-fresh lint docs clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
@@ -22,6 +23,10 @@ demo: $(VENV)/.installed
 
 test: $(VENV)/.installed-test
 	$(BIN)/python -m pytest -q
+
+TESTS ?= tests
+test-fresh: $(VENV)/.installed-test
+	RTRADAR_HYPOTHESIS=fresh RTRADAR_EXAMPLES=10 $(BIN)/python -m pytest -q -m hypothesis $(TESTS)
 
 lint: $(VENV)/.installed-lint
 	$(BIN)/ruff check .

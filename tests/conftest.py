@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import os
 from collections.abc import Iterator
 from functools import cache
@@ -17,7 +18,19 @@ from rtradar.trace.backend import Backend, available, select, use
 
 # The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
 hypothesis.settings.register_profile("rtradar", deadline=None, derandomize=True, database=None)
-hypothesis.settings.load_profile("rtradar")
+# New examples in every run, those that failed before first, and more of them: `make test-fresh`.
+hypothesis.settings.register_profile("fresh", deadline=None, derandomize=False, print_blob=True)
+hypothesis.settings.load_profile(os.environ.get("RTRADAR_HYPOTHESIS", "rtradar"))
+_MORE = float(os.environ.get("RTRADAR_EXAMPLES", "1"))
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Give every property test ``RTRADAR_EXAMPLES`` times as many examples as it has, also where it names their number."""
+    if _MORE == 1:
+        return
+    for test in {id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)}.values():
+        if (own := getattr(test, "_hypothesis_internal_use_settings", None)) is not None:  # there is no public way to it
+            test._hypothesis_internal_use_settings = hypothesis.settings(own, max_examples=math.ceil(_MORE * own.max_examples))
 
 
 @cache
