@@ -24,8 +24,13 @@ def shown(value: object) -> str:
     except (ValueError, RecursionError):  # an integer of very many digits, a table nested very deep
         text = f"a {type(value).__name__}"
     text = " ".join(text.split())
-    text = "".join(letter if letter.isprintable() else "?" for letter in text)
+    text = printable(text)
     return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def printable(text: str) -> str:
+    """The same with ``?`` for what no page can hold: line ends, and bytes of a file's name that are not UTF-8."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def inside(folder: Path, name: str) -> Path | None:

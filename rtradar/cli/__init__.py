@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import argparse
 import errno
+import io
 import os
 import sys
 import warnings
@@ -33,6 +34,8 @@ def main(arguments: list[str] | None = None) -> int:
 
     options = argparse.Namespace(stopped=_WHOLE)
     if arguments is None:
+        if isinstance(sys.stdout, io.TextIOWrapper):
+            sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: names of files may be any bytes
         end_well(lambda: options.stopped.format(**vars(options)))
     status = _flushed(_main(arguments, options))
     stay_if_ending()

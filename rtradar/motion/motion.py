@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
+from rtradar.checks import printable
 from rtradar.errors import InputError
 from rtradar.motion.quaternions import rotate, sign_continuous
 from rtradar.spool import in_blocks, let_go, spooled
@@ -75,6 +76,7 @@ class Motion:
     girth: float = 1.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes
         for field in ("offsets", "root_positions", "rotations"):
             array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
             if not all(np.isfinite(rows).all() for (rows,) in in_blocks(array)):

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from rtradar.antenna import Antenna
+from rtradar.checks import printable
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_array, check_multiplexing, checked_values
@@ -167,7 +168,7 @@ class Radar(Schedule):
         table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
         try:
             check_keys("", table, (), tuple(sorted(field.name for field in dataclasses.fields(cls))))
-            return cls(**{"name": path.stem, **table})
+            return cls(**{"name": printable(path.stem), **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None
 

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from rtradar.checks import printable
 from rtradar.classify.outcome import Outcome
 from rtradar.classify.scores import (
     TABLE_4,
@@ -99,7 +100,7 @@ def _titles(studies: Sequence[Study]) -> list[str]:
     """A name for each, unlike the others: the folder is added where recipe and points are not enough."""
     plain = [study.title for study in studies]
     return [
-        title if plain.count(title) == 1 else f"{title} ({study.folder.name}, {study.plan['split']})"
+        title if plain.count(title) == 1 else f"{title} ({printable(study.folder.name)}, {study.plan['split']})"
         for title, study in zip(plain, studies, strict=True)
     ]
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rtradar.checks import check_text, inside, shown
+from rtradar.checks import check_text, inside, printable, shown
 from rtradar.errors import InputError
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, own_material
@@ -58,7 +58,7 @@ def _scene(table: Table, path: Path) -> Scene:
         check_keys("[person] ", person, (), ("position_m", "heading_deg"))
         fields |= {"person_" + key if key == "position_m" else key: value for key, value in person.items()}
     texts = {key: table[key] for key in _TEXTS if key in table}
-    scene = Scene(**{"name": path.stem, **texts}, walls=tuple(walls), furniture=tuple(furniture), **fields)
+    scene = Scene(**{"name": printable(path.stem), **texts}, walls=tuple(walls), furniture=tuple(furniture), **fields)
     for piece in scene.furniture:
         piece.triangles()
     return scene
