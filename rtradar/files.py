@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import io
 import json
 import math
 import os
@@ -26,6 +27,15 @@ from rtradar.errors import InputError
 
 _MOST_JSON_BYTES = 100_000_000
 _TOKEN_BYTES = 6
+_OTHER_KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFIFO: "a pipe (FIFO)",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+"""What has the name of a file and is none."""
+
 _PATIENCE_S = 1.0
 """Waited, at the end, for a file that is just taking its name."""
 
@@ -180,26 +190,6 @@ def remove_parts(folder: Path, names: str) -> int:
     return count
 
 
-def open_regular(path: Path) -> BinaryIO:
-    """Open a file that may be anybody's for reading; what is no regular file, such as a pipe, is never waited for.
-
-    Raises
-    ------
-    OSError
-        Where it cannot be read, or is no regular file.
-    """
-    descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
-    if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-        os.close(descriptor)
-        raise OSError(errno.EINVAL, "not a regular file", str(path))
-    return os.fdopen(descriptor, "rb")
-
-
-def check_regular(path: Path) -> None:
-    """Raise OSError where `open_regular` would: for files that a library opens by name."""
-    open_regular(path).close()
-
-
 def check_place(path: Path | None, option: str = "--json") -> None:
     """Find out before the work, not after it, that a file cannot be written there.
 
@@ -264,12 +254,8 @@ def read_json(path: Path) -> Any:
     ValueError
         Where it is no JSON, is nested deeper than Python goes, or is larger than 100 MB.
     """
-    with open_regular(path) as file:
-        text = file.read(_MOST_JSON_BYTES + 1)
-    if len(text) > _MOST_JSON_BYTES:
-        raise ValueError(f"more than {_MOST_JSON_BYTES / 1e6:g} MB")
     try:
-        return json.loads(text.decode("utf-8"))
+        return json.loads(read_bytes(path, _MOST_JSON_BYTES).decode("utf-8-sig"))
     except RecursionError:
         raise ValueError("nested too deep") from None
 
@@ -344,10 +330,18 @@ def stored(file: Any, name: str) -> Any:
     """
     import h5py
 
-    data = file[name]
-    if not isinstance(data, h5py.Dataset) or data.file.filename != file.filename or data.external or data.is_virtual:
+    data = file
+    for step in name.split("/"):
+        # Asked before it is followed: a link to another file would have that opened.
+        link = data.get(step, getlink=True) if isinstance(data, h5py.Group) else None
+        if link is None:
+            raise KeyError(f"there is no {name}")
+        if not isinstance(link, h5py.HardLink):
+            raise ValueError(f"{name} is not in this file")
+        data = data[step]
+    if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
         raise ValueError(f"{name} is not in this file")
-    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > os.stat(file.filename).st_size:
+    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > file.id.get_filesize():
         raise ValueError(f"{name} claims more than there is")
     return data
 
@@ -387,3 +381,82 @@ def discard_unfinished() -> None:
     for remove in reversed(_unfinished):
         with suppress(Exception):
             remove()
+
+
+def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
+    """Open a file for reading that may be anybody's: a regular file, not a folder, pipe, socket or device.
+
+    Nothing waits here, as opening a pipe would until somebody writes to it. A device is not even opened, for that alone may
+    move it; and what counts is what was opened, should something else have taken the name since it was looked at.
+
+    Parameters
+    ----------
+    path : path
+        Links are followed.
+
+    Returns
+    -------
+    io.BufferedReader
+
+    Raises
+    ------
+    OSError
+        Where it cannot be opened or is no regular file; ``strerror`` says why.
+    """
+    try:
+        _check_regular(path, os.stat(path))
+        # O_NONBLOCK means nothing to regular files. Windows has neither flag.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except ValueError as error:  # a null character, or half of one that UTF-16 writes as two
+        raise OSError(errno.EINVAL, f"no file can have this name ({' '.join(str(error).split())})") from None
+    try:
+        _check_regular(path, os.fstat(descriptor))
+        return open(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def special_kind(path: str | os.PathLike[str]) -> str:
+    """What a path names where that is a pipe, a socket or a device, at which a reader may wait; empty for anything else."""
+    try:
+        kind = stat.S_IFMT(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return ""
+    return "" if kind in (stat.S_IFREG, stat.S_IFDIR) else _OTHER_KINDS.get(kind, "of an unknown kind")
+
+
+def _check_regular(path: str | os.PathLike[str], status: os.stat_result) -> None:
+    """Raise OSError where the status is that of anything but a regular file."""
+    kind = stat.S_IFMT(status.st_mode)
+    if kind != stat.S_IFREG:
+        said = _OTHER_KINDS.get(kind, "of an unknown kind")
+        number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
+        raise OSError(number, f"it is {said}, not a file", os.fspath(path))
+
+
+def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+    """All of a regular file that may be anybody's.
+
+    Parameters
+    ----------
+    path : path
+    most_bytes : int
+        How large it may be.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    OSError
+        As in `open_regular`.
+    ValueError
+        Where it is larger.
+    """
+    with open_regular(path) as file:
+        # The size is asked first: what is read may take no more memory than what is allowed.
+        if os.fstat(file.fileno()).st_size > most_bytes or len(content := file.read(most_bytes + 1)) > most_bytes:
+            raise ValueError(f"more than {most_bytes / 1e6:g} MB")
+        return content

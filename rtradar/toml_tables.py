@@ -9,6 +9,7 @@ from typing import Any
 
 from rtradar.checks import shown
 from rtradar.errors import InputError
+from rtradar.files import read_bytes
 
 Table = Mapping[str, Any]
 
@@ -34,16 +35,13 @@ def read_toml(path: Path, what: str, cure: str) -> Table:
     """
     where = f"{what} file '{path}'"
     try:
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"{where} is larger than {_MOST_BYTES / 1e6:g} MB: it is no {what}")
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        # Windows' editors begin a file with a byte order mark, which is no part of its text.
+        return tomllib.loads(read_bytes(path, _MOST_BYTES).decode("utf-8-sig"))
     except OSError as error:
         raise InputError(f"{where}: {error.strerror}; {cure}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{where} is not TOML: {shown(str(error))[1:-1]}") from None
-    except InputError:
-        raise
-    except ValueError as error:  # a null character in the path, an integer of too many digits
+    except ValueError as error:  # too large, an integer of too many digits
         raise InputError(f"{where} cannot be used: {shown(str(error))[1:-1]}") from None
 
 

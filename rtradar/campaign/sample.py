@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from rtradar.clouds.sample import Sample
 from rtradar.clouds.sample_file import FORMAT
 from rtradar.errors import ValidityWarning
+from rtradar.files import open_regular
 from rtradar.motion import Motion, cut, synthetic_motion
 from rtradar.pipeline import clouds_of
 from rtradar.radar import Radar
@@ -147,5 +148,6 @@ def digest(paths: list[Path]) -> str:
     """Hash of the content of files, one after the other."""
     found = hashlib.sha256()
     for path in paths:
-        found.update(hashlib.sha256(path.read_bytes()).digest())
+        with open_regular(path) as file:
+            found.update(hashlib.file_digest(file, "sha256").digest())
     return found.hexdigest()[:_ID_DIGITS]

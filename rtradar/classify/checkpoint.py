@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import io
+import os
 import zipfile
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, BinaryIO, NamedTuple
 
 import torch
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, check_regular
+from rtradar.files import atomic_file, open_regular
 
 _MOST_BYTES = 1_000_000_000  # of PointNet with its optimiser: 42 MB
 _KEYS = ("network", "optimiser", "epochs", "history")
@@ -57,11 +58,12 @@ def load_checkpoint(path: Path) -> Checkpoint:
     """
     cure = "remove it to train anew, or give another folder"
     try:
-        check_regular(path)
-        if path.stat().st_size > _MOST_BYTES:
-            raise InputError(f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}")
-        _check_archive(path)
-        content = torch.load(path, map_location="cpu", weights_only=True)
+        with open_regular(path) as file:
+            if os.fstat(file.fileno()).st_size > _MOST_BYTES:
+                raise InputError(f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}")
+            _check_archive(file)
+            file.seek(0)
+            content = torch.load(file, map_location="cpu", weights_only=True)
     except InputError:
         raise
     except OSError as error:
@@ -75,8 +77,8 @@ def load_checkpoint(path: Path) -> Checkpoint:
     return Checkpoint(**content)
 
 
-def _check_archive(path: Path) -> None:
+def _check_archive(file: BinaryIO) -> None:
     """Raise where the file is not the kind of archive that `save_checkpoint` writes: nothing in it is larger than it is."""
-    with zipfile.ZipFile(path) as archive:
+    with zipfile.ZipFile(file) as archive:
         if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
             raise ValueError("it is compressed")

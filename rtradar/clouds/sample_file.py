@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.files import check_regular
+from rtradar.files import open_regular
 
 FORMAT = 1
 """Of a sample's file and of the index; a reader refuses others."""
@@ -44,17 +45,18 @@ def read_sample(path: Path, name: str) -> Any:
         Where the file is damaged, or larger than 200 MB.
     """
     try:
-        check_regular(path)
-        size = path.stat().st_size
-        if size <= _MOST_BYTES:
-            return _about(_array(path, name)) if name == "about" else _array(path, name).reshape(-1, 3).astype(np.float64)
+        with open_regular(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size <= _MOST_BYTES:
+                array = _array(file, name)
+                return _about(array) if name == "about" else array.reshape(-1, 3).astype(np.float64)
     except Exception:  # what readers of archives and of headers raise at damaged ones is of any type
         raise InputError(f"sample '{path}' is damaged; mend the collection with: rtradar dataset build") from None
     raise InputError(f"sample '{path}' has {size / 1e6:.0f} MB; {_MOST_BYTES / 1e6:.0f} MB are allowed: it is none of rtradar's")
 
 
-def _array(path: Path, name: str) -> NDArray[Any]:
-    with zipfile.ZipFile(path) as archive:
+def _array(file: BinaryIO, name: str) -> NDArray[Any]:
+    with zipfile.ZipFile(file) as archive:
         entry = archive.getinfo(f"{name}.npy")
         # Ours are not compressed: nothing in them is larger than the file.
         if len(archive.comment) != DIGEST or entry.compress_type != zipfile.ZIP_STORED:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rtradar.clouds import RDT_AXES, RDT_UNITS
 from rtradar.clouds.spatial import SPATIAL_AXES, measured_alone
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_arrays
+from rtradar.files import atomic_file, read_arrays, read_bytes
 
 _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
 """What a spatial cloud tells of its points beside their places."""
@@ -24,6 +24,7 @@ _PLY_TYPES = {
 _MEANING = re.compile(r"\b(\w{1,64}) = (\w{1,64}) \[([ -\\^-~]{0,64})\]", re.ASCII)
 """Of one column; bounded, for to look for longer words in a hostile comment takes the square of its length."""
 _MOST_HEADER_BYTES = 65536
+_MOST_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True)
@@ -109,7 +110,7 @@ def read_npz(path: Path) -> CloudTable:
 
 def read_ply(path: Path) -> CloudTable:
     """The vertices of a binary little-endian PLY; errors of many kinds where it is none."""
-    data = path.read_bytes()
+    data = read_bytes(path, _MOST_BYTES)
     head, end, body = data.partition(b"end_header\n")
     lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
     if not end or lines[:2] != [["ply"], ["format", "binary_little_endian", "1.0"]]:
@@ -124,7 +125,7 @@ def read_ply(path: Path) -> CloudTable:
 
 def read_pcd(path: Path) -> CloudTable:
     """A binary PCD of one number a field; errors of many kinds where it is none."""
-    data = path.read_bytes()
+    data = read_bytes(path, _MOST_BYTES)
     head, end, body = data.partition(b"DATA binary\n")
     lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
     told = {line[0]: line[1:] for line in lines if len(line) > 1 and not line[0].startswith("#")}

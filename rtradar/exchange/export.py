@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import struct
 import zipfile
 import zlib
@@ -15,7 +16,6 @@ from rtradar.exchange.int16 import read_int16, write_int16
 from rtradar.exchange.mat import read_mat, write_mat
 from rtradar.exchange.netcdf import read_netcdf, write_netcdf
 from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
-from rtradar.files import check_regular
 from rtradar.output_folder import check_whole
 
 _T = TypeVar("_T")
@@ -77,7 +77,7 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
             f"'{target}': no format has the suffix '{target.suffix}'; allowed: {', '.join(IF_FORMATS)} for IF samples, "
             f"{', '.join(CLOUD_FORMATS)} for clouds"
         )
-    if origin.is_dir():
+    if os.path.isdir(origin):
         if suffix in CLOUD_FORMATS:
             raise InputError(f"'{origin}' is a folder; name the cloud in it, such as {origin / 'cloud_xyz.npz'}")
         recording = open_recording(origin)
@@ -85,7 +85,8 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     elif suffix in IF_FORMATS:
         raise InputError(f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made")
     else:
-        check_whole(origin.parent)
+        if os.path.isdir(origin.parent):
+            check_whole(origin.parent)
         cloud = read_cloud(origin)
         said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[suffix][0](target, cloud)
     return {"file": str(target)} | said
@@ -109,7 +110,7 @@ def read_if(path: str | Path) -> IfCube:
         Where it cannot be read.
     """
     place = Path(path)
-    if place.is_dir():
+    if os.path.isdir(place):
         recording = open_recording(place)
         tx, (chirps, *rest) = recording.radar.n_tx, recording.shape
         return IfCube(recording.read(0, chirps * tx).reshape(chirps, *rest), recording.radar)
@@ -142,7 +143,6 @@ def _read(path: Path, readers: Mapping[str, Callable[[Path], _T]], what: str) ->
     if reader is None:
         raise InputError(f"'{path}': {what} is read from {', '.join(readers)}; give such a file")
     try:
-        check_regular(path)
         return reader(path)
     except _DAMAGE as error:
         why = getattr(error, "strerror", None) or " ".join(str(error).split())[:100] or type(error).__name__

@@ -12,7 +12,7 @@ import numpy as np
 
 from rtradar.errors import InputError
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import atomic_file, read_json
+from rtradar.files import atomic_file, open_regular, read_json
 
 _LARGEST = 32767
 _WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"
@@ -74,7 +74,8 @@ def read_int16(path: Path) -> IfCube:
     """
     about = read_json(path.with_suffix(".json"))
     shape = tuple(map(int, about["shape"]))
-    whole = np.fromfile(path, dtype="<i2")
+    with open_regular(path) as file:
+        whole = np.fromfile(file, dtype="<i2")
     if len(shape) != 5 or min(shape) < 0 or shape[4] != 2 or whole.size != math.prod(shape):
         raise ValueError(f"{whole.size} numbers where the JSON file tells of {shape}")
     scale = float(about["scale"])

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rtradar.exchange.recording import IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import LastingFile, atomic_file, stored
+from rtradar.files import LastingFile, atomic_file, open_regular, stored
 
 _HEADER = b"MATLAB 7.3 MAT-file, Platform: rtradar, Created on: Thu Jan  1 00:00:00 1970 HDF5 schema 1.00 ."
 """Text of the file; the same time always, so that the same samples give the same file."""
@@ -63,7 +63,7 @@ def read_mat(path: Path) -> IfCube:
     Exception
         Of many kinds where the file is another; `rtradar.exchange.read_if` makes one line of it.
     """
-    with h5py.File(path, "r") as file:
+    with open_regular(path) as raw, h5py.File(raw, "r") as file:
         samples = np.ascontiguousarray(stored(file, "if_samples")[:].view(np.complex64).T)
         text = "".join(map(chr, stored(file, "radar/all")[:].ravel()))
     return IfCube(samples, radar_of(text))

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import LastingFile, atomic_file, stored
+from rtradar.files import LastingFile, atomic_file, open_regular, stored
 
 _PARTS = ("if_real", "if_imag")
 """netCDF knows no complex numbers."""
@@ -63,7 +63,7 @@ def read_netcdf(path: Path) -> IfCube:
     Exception
         Of many kinds where the file is another; `rtradar.exchange.read_if` makes one line of it.
     """
-    with h5py.File(path, "r") as file:
+    with open_regular(path) as raw, h5py.File(raw, "r") as file:
         samples = np.empty(stored(file, _PARTS[0]).shape, dtype=np.complex64)
         samples.real, samples.imag = (stored(file, name)[:] for name in _PARTS)
         return IfCube(samples, radar_of(str(file.attrs["radar"])))

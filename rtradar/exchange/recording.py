@@ -6,6 +6,7 @@ import dataclasses
 import json
 import math
 import os
+import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from rtradar.checks import printable
 from rtradar.errors import InputError
-from rtradar.files import check_regular, read_json
+from rtradar.files import read_json
 from rtradar.output_folder import check_whole
 from rtradar.radar import Radar
 
@@ -28,6 +30,8 @@ IF_UNIT = "m"
 
 _MOST_BYTES, _MOST_CHUNK_BYTES = 2**42, 2**34
 """Of an array, hours at the paper's rate, and of what is unpacked at once; nothing need lie behind what a file claims."""
+
+_MOST_TEXT_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
@@ -113,12 +117,12 @@ def open_recording(folder: Path) -> IfRecording:
     import zarr  # slow to import
 
     check_whole(folder)
-    if not (folder / "if.zarr").is_dir():
+    if not os.path.isdir(folder / "if.zarr"):
         raise InputError(f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if")
     try:
         summary = read_json(folder / "summary.json")
         radar = Radar(**summary["parameters"]["radar"])
-    except (OSError, ValueError, KeyError, TypeError, RecursionError) as error:  # an InputError is a ValueError
+    except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
         raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
     if not summary["parameters"].get("save_if", True):
         raise InputError(
@@ -131,9 +135,7 @@ def open_recording(folder: Path) -> IfRecording:
             "export a run under tdm or fdm"
         )
     try:
-        for parent, _, names in os.walk(folder / "if.zarr"):
-            for name in names:
-                check_regular(Path(parent, name))
+        largest = _largest_file(folder / "if.zarr")
         stored = zarr.open_array(folder / "if.zarr", mode="r")
         shape, kind = stored.shape, np.dtype(stored.dtype)
     except Exception as error:  # zarr fails in many ways on a damaged folder
@@ -144,11 +146,33 @@ def open_recording(folder: Path) -> IfRecording:
             f"'{folder / 'if.zarr'}' holds {kind} {shape}; the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
             f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
         )
-    if stored.nbytes > _MOST_BYTES or math.prod(stored.chunks) * kind.itemsize > _MOST_CHUNK_BYTES:
+    chunk_bytes = math.prod(stored.chunks) * kind.itemsize
+    if stored.nbytes > _MOST_BYTES or chunk_bytes > _MOST_CHUNK_BYTES or largest > 2 * chunk_bytes + _MOST_TEXT_BYTES:
         raise InputError(
             f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, as no run writes; run it again"
         )
-    return IfRecording(radar, stored, folder.resolve().name)
+    return IfRecording(radar, stored, printable(folder.resolve().name))
+
+
+def _largest_file(store: Path) -> int:
+    """Bytes of the largest file of an array in a folder, of which zarr reads all at once.
+
+    Raises
+    ------
+    ValueError
+        Where something in it is neither a file nor a folder, or its description is too large to be one.
+    """
+    largest = 0
+    for folder, folders, names in os.walk(store):
+        for name in (*folders, *names):
+            status = os.lstat(os.path.join(folder, name))
+            if not (stat.S_ISREG(status.st_mode) or (name in folders and stat.S_ISDIR(status.st_mode))):
+                raise ValueError(f"'{name}' in it is a link, a pipe or a device")
+            if stat.S_ISREG(status.st_mode):
+                largest = max(largest, status.st_size)
+                if name == "zarr.json" and status.st_size > _MOST_TEXT_BYTES:
+                    raise ValueError(f"{name} has more than {_MOST_TEXT_BYTES / 1e6:g} MB")
+    return largest
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from scipy.interpolate import CubicSpline
 
 from rtradar.checks import shown
 from rtradar.errors import InputError
+from rtradar.files import open_regular
 from rtradar.motion.axes import to_world
 from rtradar.motion.markers import NEEDED, joint_centres
 from rtradar.motion.motion import Motion
@@ -101,10 +102,8 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
     InputError
         Where the file cannot be read, is damaged or cut off, or a marker is not in it.
     """
-    if path.is_dir():
-        raise InputError(f"{path}: a directory; give one C3D file")
     try:
-        with _Bounded(io.FileIO(path)) as handle, warnings.catch_warnings(record=True) as caught:
+        with _Bounded(open_regular(path).detach()) as handle, warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             labels, points, rate_hz, first, unit, upward = _read(handle)
     except OSError as error:

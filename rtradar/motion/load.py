@@ -6,6 +6,7 @@ import inspect
 from pathlib import Path
 
 from rtradar.errors import InputError
+from rtradar.files import special_kind
 from rtradar.motion.amc import load_amc
 from rtradar.motion.asf import load_skeleton
 from rtradar.motion.bvh import load_bvh
@@ -53,6 +54,9 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
     if name not in READERS:
         known = ", ".join(f".{known}" for known in READERS)
         raise InputError(f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc with its .asf)")
+    if kind := special_kind(file):
+        # Readers of other packages may take folders, and names of what is no file; nobody's may wait.
+        raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
     read = READERS[name]
     with READERS.guarded(name):
         taken = inspect.signature(read).parameters

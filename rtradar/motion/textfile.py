@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import codecs
+import io
 import math
+import os
 from collections.abc import Generator
 from pathlib import Path
 
 from tqdm import tqdm
 
 from rtradar.errors import InputError
+from rtradar.files import open_regular
 
 FRAMES_AT_ONCE = 512
 """Frames that are held as Python's numbers, which take four times the memory of an array's."""
@@ -30,40 +34,40 @@ _CHARACTERS_A_STEP = 1_000_000
 def read_lines(path: Path, kind: str) -> Generator[str]:
     """Lines of a text file, one after the other, with a bar where it takes long; to be closed before an error is told.
 
-    Latin-1, for every byte is a character there and only comments use more than ASCII; line ends may be mixed.
+    Latin-1, for every byte is a character there and only comments use more than ASCII; line ends may be mixed, and a byte
+    order mark is passed over.
 
     Raises
     ------
     InputError
-        Where the file is not there, is a directory, is empty, is binary, or is larger than 2 GB (some six hours at 120 Hz).
+        Where the file is not there, is no regular file, is empty, is binary, or is larger than 2 GB (some six hours at 120 Hz).
     """
-    if path.is_dir():
-        raise InputError(f"{path}: a directory; give one {kind} file")
     try:
-        size = path.stat().st_size
-        if size > _MOST_BYTES:
-            raise InputError(
-                f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
-            )
-        with path.open("rb") as start:
-            if b"\0" in start.read(_LOOKED_AT_FIRST):
+        with io.TextIOWrapper(open_regular(path), encoding="latin-1") as file:
+            size = os.fstat(file.fileno()).st_size
+            if size > _MOST_BYTES:
+                raise InputError(
+                    f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
+                )
+            start = file.buffer.read(_LOOKED_AT_FIRST)
+            if b"\0" in start:
                 raise InputError(f"{path}: binary data; expected {kind} text")
-        # On a terminal; a bar starts a thread, which small files are not worth.
-        silent = None if size > _LONG_BYTES else True
-        bar = tqdm(total=size, desc=f"reading {path.name}", unit="B", unit_scale=True, leave=False, disable=silent)
-        with path.open(encoding="latin-1") as file, bar:
-            blank, behind = True, 0
-            while line := file.readline(_MOST_CHARACTERS + 1):
-                if "\0" in line:
-                    raise InputError(f"{path}: binary data; expected {kind} text")
-                if len(line) > _MOST_CHARACTERS:
-                    raise InputError(f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text")
-                blank = blank and not line.strip()
-                behind += len(line)
-                if behind > _CHARACTERS_A_STEP:
-                    bar.update(behind)
-                    behind = 0
-                yield line
+            file.seek(len(codecs.BOM_UTF8) if start.startswith(codecs.BOM_UTF8) else 0)
+            # On a terminal; a bar starts a thread, which small files are not worth.
+            silent = None if size > _LONG_BYTES else True
+            with tqdm(total=size, desc=f"reading {path.name}", unit="B", unit_scale=True, leave=False, disable=silent) as bar:
+                blank, behind = True, 0
+                while line := file.readline(_MOST_CHARACTERS + 1):
+                    if "\0" in line:
+                        raise InputError(f"{path}: binary data; expected {kind} text")
+                    if len(line) > _MOST_CHARACTERS:
+                        raise InputError(f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text")
+                    blank = blank and not line.strip()
+                    behind += len(line)
+                    if behind > _CHARACTERS_A_STEP:
+                        bar.update(behind)
+                        behind = 0
+                    yield line
     except OSError as error:
         raise InputError(f"{path}: cannot read this {kind} file ({error.strerror}); check the path") from None
     if blank:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +11,10 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.checks import printable
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.files import check_regular, read_arrays, read_json, stored
+from rtradar.files import open_regular, read_arrays, read_json, stored
 from rtradar.output_folder import check_whole
 from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
@@ -82,6 +84,8 @@ def view(
     """
     if colour not in COLOURS:
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
+    if not os.path.isdir(folder):
+        raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
     check_whole(Path(folder))
     linked = load_linked(Path(folder))
     times = linked.moments.times
@@ -94,7 +98,7 @@ def view(
         "last_s": float(times[-1]),
     }
     if page is not None:
-        write_view(page, linked, name=Path(folder).resolve().name, colour=colour)
+        write_view(page, linked, name=printable(Path(folder).resolve().name), colour=colour)
         told["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
     if still is not None:
         step = linked.moments.nearest(float(times.mean()) if time_s is None else time_s)
@@ -111,7 +115,7 @@ def load_linked(folder: Path) -> Linked:
     InputError
         Where one of them is missing or damaged, or they are not of one run.
     """
-    if not (folder / "summary.json").is_file():
+    if not os.path.isfile(folder / "summary.json"):
         raise InputError(f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named")
     summary, radar = _summary(folder / "summary.json")
     parameters = summary["parameters"]
@@ -121,8 +125,7 @@ def load_linked(folder: Path) -> Linked:
     spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",))
     path = folder / "maps.h5"
     try:
-        check_regular(path)
-        with h5py.File(path, "r") as file:
+        with open_regular(path) as raw, h5py.File(raw) as file:
             maps = _maps(file)
             if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
@@ -168,7 +171,7 @@ def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
 
 def _line(value: Any) -> str:
     """As a page shows it: JSON may hold half of a character, which no file can."""
-    return "".join(letter if letter.isprintable() else "?" for letter in str(value)[:_MOST_LETTERS])
+    return printable(str(value)[:_MOST_LETTERS])
 
 
 def _archive(path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:

@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.files import atomic_file, read_bytes
 from rtradar.validate.outcome import Outcome, Row, used_up
 
 BEGIN, END = "<!-- validation: begin -->", "<!-- validation: end -->"
 """What stands before and after the table in a README."""
+
+_MOST_BYTES = 10_000_000
 
 KEYS = ("sphere", "ellipsoid", "plate", "path", "point", "doppler", "edge", "body", "cfar", "if-sum", "backends")
 """The main claims, in the order of the table; others come after them."""
@@ -71,8 +73,8 @@ def write_readme(path: Path, text: str) -> None:
 def around_table(path: Path) -> tuple[str, str]:
     """What stands before the first and behind the second marker."""
     try:
-        content = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        content = read_bytes(path, _MOST_BYTES).decode("utf-8")
+    except (OSError, ValueError) as error:
         raise InputError(f"--readme {path}: {getattr(error, 'strerror', 'no text')}; name a markdown file") from None
     if content.count(BEGIN) != 1 or content.count(END) != 1 or content.index(BEGIN) > content.index(END):
         raise InputError(f"--readme {path}: it must hold '{BEGIN}' once and '{END}' once after it; put them where the table goes")
