@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
+import io
+import os
+import re
+import struct
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
@@ -13,11 +18,14 @@ from numpy.typing import NDArray
 
 from rtradar.checks import shown
 from rtradar.errors import InputError
+from rtradar.files import open_regular, read_bytes
 from rtradar.scene.mesh_headers import refuse_hostile_header
 
 MESH_ENDINGS = (".ply", ".obj", ".stl", ".glb")
 MOST_FACES = 2_000_000
 MOST_BYTES = 200_000_000
+_STL_HEADER_BYTES, _STL_FACE_BYTES = 84, 50
+_TO_ASCII = bytes(range(128)).ljust(256, b"?")
 _FARTHEST = 1e9
 """In units of the file: a kilometre in micrometres."""
 _MOST_INWARD = 100
@@ -113,11 +121,10 @@ def read_mesh(path: Path) -> Triangles:
     if path.suffix.lower() not in MESH_ENDINGS:
         raise InputError(f"{where}: unknown kind of file; allowed: {', '.join(MESH_ENDINGS)}")
     try:
-        status = path.stat()
-    except (OSError, ValueError) as error:
-        raise InputError(f"{where}: {getattr(error, 'strerror', None) or error}") from None
-    if not path.is_file():
-        raise InputError(f"{where} is not a file")
+        with open_regular(path) as file:
+            status = os.fstat(file.fileno())
+    except OSError as error:
+        raise InputError(f"{where}: {error.strerror}") from None
     if status.st_size > MOST_BYTES:
         raise InputError(f"{where} has {status.st_size / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} MB are allowed")
     return _read(path, status.st_mtime_ns, status.st_size)
@@ -125,28 +132,54 @@ def read_mesh(path: Path) -> Triangles:
 
 @lru_cache(maxsize=32)
 def _read(path: Path, changed_ns: int, size: int) -> Triangles:
-    where = f"mesh '{path}'"
-    refuse_hostile_header(where, path, MOST_FACES)
-    return checked_triangles(where, *_load(where, path))
+    where, ending = f"mesh '{path}'", path.suffix.lower()
+    try:
+        content = read_bytes(path, MOST_BYTES)
+    except (OSError, ValueError) as error:
+        raise InputError(f"{where}: {getattr(error, 'strerror', None) or error}") from None
+    content = _in_ascii(content, ending)
+    refuse_hostile_header(where, ending, content, MOST_FACES)
+    return checked_triangles(where, *_load(where, ending, content))
 
 
-def _load(where: str, path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _in_ascii(content: bytes, ending: str) -> bytes:
+    """The same mesh with ``?`` for every byte of its text that is not ASCII, and without a byte order mark.
+
+    Only names and comments hold such bytes. Nothing here asks for them, but trimesh would have to know their encoding.
+    """
+    content = content.removeprefix(codecs.BOM_UTF8)
+    if ending == ".obj":
+        text = len(content)
+    elif ending == ".stl":
+        (count,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4) if len(content) >= _STL_HEADER_BYTES else (0,)
+        # What tells a binary file from one of text, which may both begin with "solid".
+        text = 0 if len(content) == _STL_HEADER_BYTES + _STL_FACE_BYTES * count else len(content)
+    elif ending == ".ply":
+        text = len(content) if re.match(rb"ply\s+format\s+ascii", content) else content.find(b"end_header")
+    else:  # the text of a glb is JSON, which is UTF-8
+        text = 0
+    return content[:text].translate(_TO_ASCII) + content[text:] if text > 0 else content
+
+
+def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     import trimesh  # slow to import
 
     try:
         # No resolver: a file may name others (materials, buffers, pictures), and none of them is opened.
-        with path.open("rb") as file, np.errstate(all="ignore"):
+        with np.errstate(all="ignore"):
             loaded = trimesh.load_scene(
-                file, file_type=path.suffix[1:].lower(), resolver=None, process=False, skip_materials=True
+                io.BytesIO(content), file_type=ending[1:], resolver=None, process=False, skip_materials=True
             )
             pieces = _pieces(where, loaded)
     except InputError:
         raise
-    except OSError as error:
-        raise InputError(f"{where}: {error.strerror or 'cannot be read'}") from None
+    except ImportError as error:  # trimesh looks for some packages only where a file needs them
+        raise InputError(
+            f"{where}: to read it takes the Python package '{error.name}'; install that, or save the mesh as binary PLY"
+        ) from None
     except Exception as error:  # what trimesh raises at broken files is of any type
         reason = shown(str(error))[1:-1] or type(error).__name__
-        raise InputError(f"{where} is broken or is no {path.suffix[1:].lower()} file: {reason}") from None
+        raise InputError(f"{where} is broken or is no {ending[1:]} file: {reason}") from None
     if not pieces:
         raise InputError(f"{where} has no triangles")
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])

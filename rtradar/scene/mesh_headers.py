@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import struct
-from pathlib import Path
 
 from rtradar.checks import shown
 from rtradar.errors import InputError
@@ -16,15 +15,17 @@ _NUMBERS_A_FACE = 12
 """Three corners with place, normal, texture and index each: what a glb without shared vertices has."""
 
 
-def refuse_hostile_header(where: str, path: Path, most_faces: int) -> None:
+def refuse_hostile_header(where: str, ending: str, content: bytes, most_faces: int) -> None:
     """Look at the counts in a PLY or glb file; other kinds carry none that a reader believes.
 
     Parameters
     ----------
     where : str
         Begins the message.
-    path : path
-        Of the file.
+    ending : str
+        Of the file's name, such as ``.ply``.
+    content : bytes
+        All of the file.
     most_faces : int
         How many faces a mesh may have.
 
@@ -33,14 +34,13 @@ def refuse_hostile_header(where: str, path: Path, most_faces: int) -> None:
     InputError
         Where it promises more than ``most_faces`` faces could need, or has no header.
     """
-    check = {".ply": _check_ply, ".glb": _check_glb}.get(path.suffix.lower())
+    check = {".ply": _check_ply, ".glb": _check_glb}.get(ending)
     if check is not None:
-        check(where, path, most_faces)
+        check(where, content, most_faces)
 
 
-def _check_ply(where: str, path: Path, most_faces: int) -> None:
-    with path.open("rb") as file:
-        head, end, _ = file.read(_MOST_PLY_HEADER).partition(b"end_header")
+def _check_ply(where: str, content: bytes, most_faces: int) -> None:
+    head, end, _ = content[:_MOST_PLY_HEADER].partition(b"end_header")
     if not end:
         raise InputError(f"{where} is broken or is no ply file: its header has no end")
     for kind, count in re.findall(rb"element\s+(\S+)\s+(\d+)", head):
@@ -49,16 +49,13 @@ def _check_ply(where: str, path: Path, most_faces: int) -> None:
             raise InputError(f"{where} promises more elements {shown(kind.decode('ascii', 'replace'))} than the {most} allowed")
 
 
-def _check_glb(where: str, path: Path, most_faces: int) -> None:
+def _check_glb(where: str, content: bytes, most_faces: int) -> None:
     broken = f"{where} is broken or is no glb file"
-    with path.open("rb") as file:
-        start = file.read(20)
-        length = struct.unpack("<I", start[12:16])[0] if len(start) == 20 else 0
-        if not 0 < length <= _MOST_GLB_HEADER:
-            raise InputError(f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed")
-        text = file.read(length)
+    length = struct.unpack("<I", content[12:16])[0] if len(content) >= 20 else 0
+    if not 0 < length <= _MOST_GLB_HEADER:
+        raise InputError(f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed")
     try:
-        accessors = json.loads(text).get("accessors", [])
+        accessors = json.loads(content[20 : 20 + length]).get("accessors", [])
         count = sum(abs(int(accessor["count"])) for accessor in accessors)
     except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
         raise InputError(f"{broken}: its header cannot be read") from None

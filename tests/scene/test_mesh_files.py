@@ -49,6 +49,98 @@ def test_every_kind_of_file(tmp_path: Path, ending: str) -> None:
     assert not mesh.vertices.flags.writeable
 
 
+OBJ = b"""# caf\xe9 \x85 v 9 9 9
+mtllib caf\xe9.mtl
+o caf\xe9
+usemtl caf\xe9
+v 0 0 0
+v 1 0 0
+v 0 1 0
+v 0 0 1
+g caf\xe9
+f 1 3 2
+f 1 2 4
+f 1 4 3
+f 2 3 4
+"""
+PLY_OF_TEXT = b"""ply
+format ascii 1.0
+comment TextureFile caf\xe9.png
+comment caf\xe9
+element vertex 4
+property float x
+property float y
+property float z
+element face 4
+property list uchar int vertex_indices
+end_header
+0 0 0
+1 0 0
+0 1 0
+0 0 1
+3 0 2 1
+3 0 1 3
+3 0 3 2
+3 1 2 3
+"""
+
+
+def solid() -> trimesh.Trimesh:
+    return trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+
+
+def stl_of_text() -> bytes:
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {} {} {}\n".format(*corner) for corner in face)
+        + "endloop\nendfacet\n"
+        for face in solid().triangles
+    )
+    return b"solid caf\xe9\n" + facets.encode() + b"endsolid caf\xe9\n"
+
+
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"], ids=["", "with a byte order mark"])
+@pytest.mark.parametrize(
+    ("ending", "content"),
+    [
+        ("obj", OBJ),
+        ("obj", OBJ.replace(b"\xe9", "é".encode())),
+        ("stl", stl_of_text()),
+        ("stl", stl_of_text().replace(b"\n", b"\r\n")),
+        ("ply", PLY_OF_TEXT),
+    ],
+    ids=["obj", "obj in UTF-8", "stl", "stl of Windows", "ply"],
+)
+def test_names_and_comments_may_be_in_any_encoding(tmp_path: Path, ending: str, content: bytes, mark: bytes) -> None:
+    path = tmp_path / f"x.{ending}"
+    path.write_bytes(mark + content)
+    mesh = read_mesh(path)
+    assert mesh.closed
+    assert volume(mesh) == pytest.approx(1 / 6)
+
+
+@pytest.mark.parametrize("ending", ["stl", "ply"])
+def test_headers_of_binary_files_may_be_in_any_encoding(tmp_path: Path, ending: str) -> None:
+    solid().export(tmp_path / f"plain.{ending}")
+    content = (tmp_path / f"plain.{ending}").read_bytes()
+    if ending == "stl":
+        content = b"solid caf\xe9".ljust(80, b"\xe9") + content[80:]
+    else:
+        content = content.replace(b"1.0\n", b"1.0\ncomment caf\xe9\n", 1)
+    (tmp_path / f"x.{ending}").write_bytes(content)
+    plain, other = (read_mesh(tmp_path / f"{name}.{ending}") for name in ("plain", "x"))
+    np.testing.assert_array_equal(plain.corners, other.corners)
+
+
+def test_a_package_that_trimesh_lacks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def lacking(*words: object, **named: object) -> None:
+        raise ModuleNotFoundError("No module named 'extra'", name="extra")
+
+    monkeypatch.setattr(trimesh, "load_scene", lacking)
+    cube().export(tmp_path / "cube.ply")
+    assert "takes the Python package 'extra'; install that, or save the mesh as binary PLY" in refusal(tmp_path / "cube.ply")
+
+
 def test_endings_in_capitals(tmp_path: Path) -> None:
     file = tmp_path / "CUBE.STL"
     cube().export(file, file_type="stl")
