@@ -66,11 +66,7 @@ USERS: dict[str, Callable[[Any], object]] = {
 }
 
 
-@pytest.mark.parametrize(
-    "seed",
-    [-1, 2**63, 10**5000, 1.5, True, None, "7", np.int64(-3), float("nan")],
-    ids=lambda seed: repr(seed)[:20] if not isinstance(seed, int) or abs(seed) < 10**30 else "huge",
-)
+@pytest.mark.parametrize("seed", [-1, 2**63, pytest.param(10**5000, id="huge"), 1.5, True, None, "7", np.int64(-3), float("nan")])
 @pytest.mark.parametrize("user", USERS)
 def test_what_is_no_seed_is_told_in_one_line(user: str, seed: object) -> None:
     with pytest.raises(InputError, match=r"seed = .*; it must be a whole number from 0 to 9223372036854775807") as caught:
