@@ -93,7 +93,7 @@ def _described(value: Any, names: Iterable[str], seen: dict[int, int]) -> _Descr
     if isinstance(value, dict):
         return "dict", *((key, _described(item, names, seen)) for key, item in sorted(value.items()))
     if isinstance(value, np.ndarray):
-        return "array", value.dtype.str, value.shape, value.strides, value.tobytes()
+        return "array", value.dtype.str, value.shape, value.strides, hashlib.sha256(value.tobytes()).hexdigest()
     if isinstance(value, CodeType):
         return "code", _code_digest(value)
     home = value.__name__ if isinstance(value, ModuleType) else str(getattr(value, "__module__", None))

@@ -223,37 +223,35 @@ def is_on_disk(function: _Function) -> bool:
     return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
 
 
-def cache_folder() -> str | None:
-    """Where code of this module is kept; None, with a `CacheWarning`, where no folder can be written.
-
-    Returns
-    -------
-    str or None
-        None, too, where nothing is compiled (``NUMBA_DISABLE_JIT``).
-    """
-    cache = getattr(compiled()(_increment), "_cache", None)
-    return cache.cache_path if cache else None
+def check_cache() -> None:
+    """Tell by a `CacheWarning` where no folder for compiled code can be written: before workers start, which tell nothing."""
+    is_on_disk(compiled()(_increment))
 
 
-def try_cache() -> str:
+def try_cache() -> tuple[str, str]:
     """Compile a function, keep its code and load it again.
 
     Returns
     -------
-    str
-        What went wrong; empty where nothing did.
+    finding : str
+        Where code is kept, or why it is not.
+    advice : str
+        What to do about it; empty where all is well.
     """
     dispatcher: Any = compiled()(_increment)
     if not hasattr(dispatcher, "compile"):
-        return "nothing is compiled: NUMBA_DISABLE_JIT is set"
+        return "nothing is compiled", "NUMBA_DISABLE_JIT is set, which makes all of it very slow: unset it"
     cache, sig = dispatcher._cache, (types.int64,)
-    cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first; what is there is written anew
-    dispatcher._cache = NullCache()
+    cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first
+    dispatcher._cache = NullCache()  # whatever is there, it is compiled
     dispatcher.compile(sig)
     cache.save_overload(sig, dispatcher.overloads[sig])
-    if not cache.trouble and cache.load_overload(sig, dispatcher.targetctx) is None:
-        return "what was written could not be loaded again"
-    return str(cache.trouble)
+    trouble = cache.trouble
+    if not trouble and cache.load_overload(sig, dispatcher.targetctx) is None:
+        trouble = "what was written could not be loaded again"
+    if trouble:
+        return f"not kept: {trouble}", f"compiled code is not kept; {CACHE_ADVICE}"
+    return f"kept, for one in {cache.cache_path}", ""
 
 
 def _increment(number):  # type: ignore[no-untyped-def]

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rtradar.compiled import CacheWarning, try_cache
 from rtradar.errors import BackendError
 from rtradar.files import write_json
 from rtradar.gpu import gpu_for_ffts
@@ -45,6 +46,8 @@ class DoctorReport:
         ``good``, or what is wrong, for llvm, scalar and cuda.
     gpu_ffts : str
         The GPU that FFTs may be done on, or why there is none.
+    compiled_code : str
+        Where code that is compiled was kept and loaded again, or why not.
     chosen : str or None
         Mitsuba's variant that ``--variant auto`` takes; None where nothing works.
     advice : list of str
@@ -60,6 +63,7 @@ class DoctorReport:
     llvm: list[Row]
     backends: dict[Kind, str]
     gpu_ffts: str
+    compiled_code: str
     chosen: str | None
     advice: list[str]
 
@@ -74,7 +78,10 @@ class DoctorReport:
 
 
 def examine() -> DoctorReport:
-    """Look at this machine. Every backend is probed anew, in processes of their own; it takes some seconds."""
+    """Look at this machine. It takes some seconds.
+
+    Every backend is probed anew, in processes of their own, and a function is compiled, kept and loaded again.
+    """
     libraries = candidates()
     verdicts = [judge(VARIANTS["llvm"], library, fresh=True) for library in libraries]
     good = next((library for library, verdict in zip(libraries, verdicts, strict=True) if verdict.good), None)
@@ -100,6 +107,11 @@ def examine() -> DoctorReport:
     missing = [name for name, version in packages.items() if version is None]
     if missing:
         advice.append(f"packages are missing; install them: pip install {' '.join(missing)}")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", CacheWarning)
+        compiled_code, what_to_do = try_cache()
+    if what_to_do:
+        advice.append(what_to_do)
     total, available = _memory_mb()
     return DoctorReport(
         python=f"{platform.python_version()} ({platform.python_implementation()}, {sys.executable})",
@@ -120,6 +132,7 @@ def examine() -> DoctorReport:
         ],
         backends=backends,
         gpu_ffts=gpu_for_ffts()[1],
+        compiled_code=compiled_code,
         chosen=chosen,
         advice=advice,
     )
@@ -149,6 +162,7 @@ def report_text(found: DoctorReport) -> str:
             for kind, finding in found.backends.items()
         ),
         f"GPU FFTs  {found.gpu_ffts}",
+        f"Compiled  {found.compiled_code}",
         *(f"To do     {line}" for line in found.advice),
         f"Verdict   ready, on {found.chosen}" if found.chosen else "Verdict   no backend works: rays cannot be traced",
     ]

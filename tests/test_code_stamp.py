@@ -307,3 +307,11 @@ def test_stamps_of_the_package_have_what_is_taken_in(
     monkeypatch.setattr(function, "__code__", code.replace(co_consts=(*code.co_consts, "changed")))
     assert stamp_of(named(by)) != before[0]
     assert stamp_of(named(not_by)) == before[1]
+
+
+def test_nothing_is_kept_by_numba_itself() -> None:
+    """It would not see what other files bring in, and fails on import where no folder can be written."""
+    root = Path(rtradar.__file__).parents[1]
+    files = [file for folder in ("rtradar", "validation") for file in (root / folder).rglob("*.py")]
+    assert len(files) > 200
+    assert not [file for file in files if "cache=True" in file.read_text(encoding="utf-8")]

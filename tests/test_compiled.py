@@ -1,7 +1,9 @@
 """How loops are compiled: zero as NumPy divides by it, functions that are taken in, and Python's collector meanwhile."""
 
+import errno
 import gc
 import math
+import os
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -14,7 +16,8 @@ from numba.core import event
 from numba.core.caching import NullCache
 from numba.core.errors import TypingError
 
-from rtradar.compiled import compiled, is_on_disk, on_cache_lines, taken_in
+import rtradar.compiled as compiling
+from rtradar.compiled import CacheWarning, compiled, is_on_disk, on_cache_lines, taken_in, try_cache
 
 
 @taken_in()
@@ -64,6 +67,39 @@ def test_what_is_on_disk_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     twice(2.0)
     assert is_on_disk(twice)
     assert is_on_disk(double)  # as NUMBA_DISABLE_JIT leaves it: nothing to compile
+
+
+def test_trouble_with_the_disk_is_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a name of the moment"))
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling.IndexDataCacheFile, "save", full)
+    with pytest.warns(CacheWarning, match=r"compiled code is not kept \(No space left on device\).* NUMBA_CACHE_DIR") as told:
+        assert [compiled()(double)(2.0), compiled()(half)(2.0)] == [4.0, 1.0]
+    assert len(told) == 1
+
+
+@pytest.mark.parametrize("part", ["CompileResultCacheImpl", "IndexDataCacheFile", "stamp_of"])
+def test_another_numba_may_keep_code_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str) -> None:
+    def changed(*_: object, **__: object) -> None:
+        raise TypeError("an argument is missing")
+
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling, part, changed)
+    with pytest.warns(CacheWarning, match="an argument is missing"):
+        assert compiled()(double)(2.0) == 4.0
+
+
+def test_the_cache_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
+    for _ in range(2):
+        finding, advice = try_cache()
+        assert (finding.startswith(f"kept, for one in {tmp_path}"), advice) == (True, "")
+    monkeypatch.setattr(compiling.IndexDataCacheFile, "load", lambda *_: None)
+    assert try_cache()[0] == "not kept: what was written could not be loaded again"
 
 
 def test_the_collector_is_afterwards_as_it_was(collector: bool) -> None:

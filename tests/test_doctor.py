@@ -59,6 +59,19 @@ def test_nothing_works(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "no backend works" in doctor.report_text(found)
 
 
+@pytest.mark.parametrize(
+    ("finding", "advice"), [("kept, for one in /cache", ""), ("not kept: no room", "name a folder in NUMBA_CACHE_DIR")]
+)
+def test_whether_compiled_code_is_kept(monkeypatch: pytest.MonkeyPatch, finding: str, advice: str) -> None:
+    _machine(monkeypatch, LIBRARIES)
+    monkeypatch.setattr(doctor, "try_cache", lambda: (finding, advice))
+    found = doctor.examine()
+    assert (found.compiled_code, found.advice, found.exit_status) == (finding, [advice] if advice else [], 0)
+    text = doctor.report_text(found)
+    assert f"Compiled  {finding}" in text
+    assert advice in text
+
+
 def test_a_missing_package_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     _machine(monkeypatch, LIBRARIES)
     monkeypatch.setattr(doctor, "PACKAGES", ("numpy", "no-such-package"))

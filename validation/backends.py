@@ -19,7 +19,7 @@ import sys
 from collections.abc import Iterator
 
 import numpy as np
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 from rows import Row, judged, main, reported
 from scipy.spatial import ConvexHull
@@ -27,6 +27,7 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
+from rtradar.compiled import compiled
 from rtradar.trace.backend import available, select, use
 from rtradar.trace.body_tracer import BodyTracer, Hits
 from rtradar.trace.unit_sphere import SUBDIVISIONS
@@ -108,7 +109,7 @@ def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> N
     return part
 
 
-@njit(cache=True, parallel=True)
+@compiled(parallel=True)
 def _first(origins, directions, centres, frames, semi_axes, vertices, faces, found):  # type: ignore[no-untyped-def]
     for ray in prange(len(origins)):
         best, found[ray] = np.inf, -1

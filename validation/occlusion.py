@@ -20,7 +20,7 @@ from functools import partial
 
 import numpy as np
 import rows
-from numba import njit, prange
+from numba import prange
 from numpy.typing import NDArray
 from physical_optics import lit_points, wave_number
 from rows import Row, main
@@ -28,6 +28,7 @@ from scipy.signal.windows import hann
 
 import rtradar as rt
 from rtradar.body.body import Poses
+from rtradar.compiled import compiled
 from rtradar.scatter import build_rung
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ class Target:
         return complex(shadowed / self.contribution.sum())
 
 
-@njit(cache=True, parallel=True, fastmath=True)
+@compiled(parallel=True, fastmath=True)
 def _shadowed(points, contribution, occluder, radius, cell):  # type: ignore[no-untyped-def]
     total_re, total_im = 0.0, 0.0
     square = occluder[0] ** 2 + occluder[1] ** 2 + occluder[2] ** 2

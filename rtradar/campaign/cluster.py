@@ -6,12 +6,15 @@ import logging
 import os
 import signal
 import sys
+import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
 
+from rtradar.compiled import check_cache
 from rtradar.errors import InputError
+from rtradar.files import temporary_folder
 from rtradar.threads import environment_of, thread_limit
 
 if TYPE_CHECKING:
@@ -63,6 +66,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
                 raise InputError(f"--scheduler {scheduler} has no workers; start some: dask worker {scheduler}") from None
             yield client
         return
+    check_cache()
     count = workers or CPU_COUNT
     environment = environment_of(thread_limit() or max(1, CPU_COUNT // count))
     settings = {
@@ -72,6 +76,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         "distributed.nanny.environ": environment,
     }
     with (
+        _place_for_kernels(environment),
         _environment_kept(),  # Dask puts what it starts workers with into that of this process
         _silent_tracker(),
         dask.config.set(settings),
@@ -104,6 +109,26 @@ def _deaf_children() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _place_for_kernels(environment: dict[str, str]) -> Iterator[None]:
+    """Where Dr.Jit can keep no kernels, have workers share a folder meanwhile; otherwise each of them would tell."""
+    home = os.environ.get("HOME")
+    folder = os.environ.get("DRJIT_CACHE_DIR") or (home and os.path.join(home, ".drjit"))
+    with ExitStack() as stack:
+        if sys.platform != "win32" and not (folder and _can_be_written(folder)):
+            environment["DRJIT_CACHE_DIR"] = str(stack.enter_context(temporary_folder()))
+        yield
+
+
+def _can_be_written(folder: str) -> bool:
+    try:
+        os.makedirs(folder, exist_ok=True)
+        tempfile.TemporaryFile(dir=folder).close()
+    except OSError:
+        return False
+    return True
 
 
 @contextmanager

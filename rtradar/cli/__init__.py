@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import errno
 import io
+import logging
 import os
 import sys
 import warnings
@@ -65,6 +66,8 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     from rtradar.files import DISK_ERRORS
 
     warnings.showwarning = _show_warning
+    # Where it has no folder of its own it makes one for the moment, and would tell in two lines each time.
+    logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         _parser().parse_args(arguments, options)
     except SystemExit as stop:

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 from rtradar import __version__
 from rtradar.campaign import build as building
 from rtradar.campaign.build import Store, build_dataset
+from rtradar.campaign.cluster import _place_for_kernels as place_for_kernels
 from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.sample import Made, Recipe
 from rtradar.campaign.work import make_and_store, work
@@ -254,6 +255,23 @@ def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pyte
     assert contents(killed) == contents(undisturbed)
     write_index(killed, [recipe.identity for recipe in marked])
     assert len(Collection(killed)) == len(marked)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Dr.Jit keeps kernels elsewhere there")
+@pytest.mark.parametrize("home", ["there", "not a folder", None])
+def test_workers_have_a_place_for_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str | None) -> None:
+    (tmp_path / "there").mkdir()
+    (tmp_path / "not a folder").touch()
+    monkeypatch.delenv("DRJIT_CACHE_DIR", raising=False)
+    if home is None:
+        monkeypatch.delenv("HOME")
+    else:
+        monkeypatch.setenv("HOME", str(tmp_path / home))
+    environment: dict[str, str] = {}
+    with place_for_kernels(environment):
+        assert list(environment) == ([] if home == "there" else ["DRJIT_CACHE_DIR"])
+        assert all(Path(place).is_dir() for place in environment.values())
+    assert not any(Path(place).exists() for place in environment.values())
 
 
 def test_no_scheduler_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> None:

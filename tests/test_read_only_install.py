@@ -1,0 +1,119 @@
+"""Where neither the package nor a home can be written, all commands work, and one line says what it costs."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+import rtradar
+
+Command = Callable[..., subprocess.CompletedProcess[str]]
+
+COMPILES_TWO = """
+import multiprocessing
+import numpy as np
+from rtradar.cli import main
+from rtradar.compiled import check_cache, compiled, is_on_disk
+from rtradar.scatter.small_vectors import dot
+
+@compiled()
+def squared(vector):
+    return dot(vector, vector)
+
+@compiled()
+def twice(number):
+    return 2 * number
+
+def work():
+    print(twice(3.0))
+
+if __name__ == "__main__":
+    main(["--version"])  # from here on warnings are shown as commands show them
+    check_cache()
+    print(is_on_disk(twice), squared(np.ones(3)), twice(2.0), flush=True)
+    worker = multiprocessing.get_context("spawn").Process(target=work)
+    worker.start()
+    worker.join()
+"""
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Command:
+    """Python from a copy of the package, by somebody who may write neither it nor a home, but the folder he is in."""
+    install, work = tmp_path / "install", tmp_path / "work"
+    shutil.copytree(Path(rtradar.__file__).parent, install / "rtradar", ignore=shutil.ignore_patterns("__pycache__"))
+    for folder in ("scenes", "meshes"):
+        there = Path(rtradar.__file__).parents[1] / folder
+        if there.is_dir():
+            shutil.copytree(there, install / folder)
+    work.mkdir()
+    (work / "compiles_two.py").write_text(COMPILES_TWO)
+    home = install / "home"
+    home.mkdir()
+    for folder in [install, *(path for path in install.rglob("*") if path.is_dir())]:
+        folder.chmod(0o555)
+    (work / "compiles_two.py").chmod(0o444)
+    # Root writes everywhere, unless he gives up the right to.
+    right = "-dac_override,-dac_read_search"
+    without = ["setpriv", f"--bounding-set={right}", f"--inh-caps={right}"] if os.name == "posix" and os.geteuid() == 0 else []
+    try:
+        held = subprocess.run([*without, sys.executable, "-c", f"open({str(home / 'x')!r}, 'w')"], capture_output=True, text=True)
+    except OSError:
+        pytest.skip("there is no setpriv here")
+    if "PermissionError" not in held.stderr:
+        pytest.skip("nothing keeps this user from writing")
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(("XDG_", "NUMBA_", "MPL", "DRJIT_CACHE"))
+    }
+    environment |= {"HOME": str(home), "TMPDIR": str(work), "PYTHONPATH": str(install), "PYTHONDONTWRITEBYTECODE": "1"}
+
+    def run(*words: str, **more: str) -> subprocess.CompletedProcess[str]:
+        (work / "__pycache__").mkdir(exist_ok=True)
+        (work / "__pycache__").chmod(0o555)
+        command = [*without, sys.executable, *words]
+        return subprocess.run(command, cwd=work, env={**environment, **more}, capture_output=True, text=True, check=False)
+
+    return run
+
+
+def test_compiling_without_a_cache_is_told_once(read_only: Command) -> None:
+    done = read_only("compiles_two.py")
+    assert done.stdout.splitlines()[-2:] == ["True 3.0 4.0", "6.0"]
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("rtradar: warning: compiled code is not kept (no folder for it can be written)")
+    assert "NUMBA_CACHE_DIR" in line
+
+
+def test_a_folder_that_is_named_serves(read_only: Command, tmp_path: Path) -> None:
+    done = read_only("compiles_two.py", NUMBA_CACHE_DIR=str(tmp_path / "work" / "cache"))
+    assert (done.stdout.splitlines()[-2:], done.stderr) == (["False 3.0 4.0", "6.0"], "")
+
+
+def test_commands_import_all_that_they_need(read_only: Command) -> None:
+    done = read_only("-m", "rtradar", "view", "nothing")
+    assert done.returncode == 2
+    assert done.stderr.splitlines() == [
+        "rtradar: 'nothing' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named"
+    ]
+    assert read_only("-m", "rtradar", "--help").returncode == 0
+
+
+@pytest.mark.slow
+def test_a_run_a_view_and_the_doctor(read_only: Command) -> None:
+    words = ["run", "synthetic:walk", "--duration", "0.15", "--fidelity", "analytic", "--out", "out"]
+    done = read_only("-m", "rtradar", *words)
+    assert done.returncode == 0
+    (line,) = done.stderr.splitlines()
+    assert "NUMBA_CACHE_DIR" in line
+    done = read_only("-m", "rtradar", "view", "out", "--no-browser")
+    assert (done.returncode, done.stderr) == (0, "")
+    done = read_only("-m", "rtradar", "doctor")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "Compiled  not kept: no folder for it can be written" in done.stdout
+    assert "NUMBA_CACHE_DIR" in done.stdout
