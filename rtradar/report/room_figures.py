@@ -57,8 +57,13 @@ def draw_plan(
         text = axes.annotate(name, tuple(middle), xytext=tuple(outward), textcoords="offset points", fontsize=7, color="dimgrey")
         text.set(ha="center", va="center")
     for piece in scene.furniture:
-        corners = piece.triangles().corners[..., :2]
-        axes.add_collection(PolyCollection(list(corners), color="tan", alpha=0.5, linewidth=0))
+        triangles = piece.triangles()
+        corners = triangles.corners[..., :2]
+        (ax, ay), (bx, by) = ((corners[:, k] - corners[:, 0]).T for k in (1, 2))
+        # Faces that look up cover a closed body; upright ones cover nothing.
+        seen = ax * by - ay * bx
+        covering = corners[seen > 0 if triangles.closed else seen != 0]
+        axes.add_collection(PolyCollection(list(covering), color="tan", alpha=0.5, linewidth=0))
         axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
     axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])  # more than ten paths
     for name, corners in paths.items():

@@ -18,6 +18,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from tqdm import tqdm
 
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
@@ -40,6 +41,9 @@ _BOW_RAD = 0.3
 _OF_PIECE = 0.125
 """Of a piece's longest extent, where nothing else asks for smaller facets: what corners and other pieces hide is hidden by
 whole facets. A trihedral is then within 0.1 dB of closed form."""
+_PATIENCE_S = 2.0
+"""What lasts longer shows a bar."""
+
 _POLARIZATIONS: tuple[Literal["te"], Literal["tm"]] = ("te", "tm")
 
 
@@ -85,7 +89,9 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     corners = np.concatenate([triangles.corners for _, triangles in pieces])
     surfaces = MeshSurfaces(mi, corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
     first = 0
-    for piece, triangles in pieces:
+    # A tenth of a second a piece, so a hall of chairs takes minutes.
+    bar = tqdm(pieces, desc="furniture", unit="piece", disable=None, leave=False, delay=_PATIENCE_S)
+    for piece, triangles in bar:
         last = first + len(triangles.faces)
         grid = _facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
         returns = _returns(piece, triangles.closed, _Piece(surfaces, first, last), grid, radar, scene)

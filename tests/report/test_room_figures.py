@@ -1,0 +1,35 @@
+"""The plan of a room."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rtradar.radar import Radar
+from rtradar.report import room_figures
+from rtradar.scene import Furniture, Scene, material
+
+
+def test_a_plan_draws_no_more_faces_than_cover_the_furniture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    drawn: list[np.ndarray] = []
+    collection = room_figures.PolyCollection
+
+    def counted(corners: list[np.ndarray], **words: object) -> object:
+        drawn.append(np.array(corners))
+        return collection(corners, **words)
+
+    monkeypatch.setattr(room_figures, "PolyCollection", counted)
+    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(2.0, 0.0, 0.0), yaw_deg=30.0)
+    room_figures.draw_plan(tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, "title")
+    every = chair.triangles().corners[..., :2]
+    (corners,) = drawn
+    assert len(corners) < len(every) / 3  # each face takes as long; all of them took most of a run's time in a hall of chairs
+
+    def area(triangles: np.ndarray) -> float:
+        sides = triangles[:, 1:] - triangles[:, :1]
+        return float(np.abs(np.linalg.det(sides)).sum() / 2)
+
+    # What looks up covers as much as what looks down.
+    assert area(corners) == pytest.approx(area(every) / 2)
