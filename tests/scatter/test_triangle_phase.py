@@ -1,0 +1,46 @@
+"""Sums of phasors over triangles: the series that they are made of, and the sums, against NumPy and a quadrature."""
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rtradar.scatter.triangle_phase import SERIES, _phasor, _sine, sum_large, sum_small
+
+
+def test_series_of_sine_and_cosine_are_as_exact_as_they_say() -> None:
+    angle = np.linspace(-300.0, 300.0, 20_011)
+    cosine, sine = _phasor(angle)
+    np.testing.assert_allclose(cosine + 1j * sine, np.exp(1j * angle), rtol=0, atol=3e-11)
+    positive = np.concatenate([np.logspace(-9, 0, 50), np.linspace(1.0, 300.0, 10_007)])
+    np.testing.assert_allclose(_sine(positive), np.sin(positive), rtol=0, atol=1e-12)
+    small = positive[positive < 1.5]
+    np.testing.assert_allclose(_sine(small) / small, np.sin(small) / small, rtol=1e-12)
+
+
+def quadrature(mean: float, u: float, v: float, k: float) -> complex:
+    """Mean of exp(-jk deviation) over a triangle with u, v and -u - v at its corners, times exp(-jk mean)."""
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    x, y = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, indexing="ij")
+    second, third = x, y * (1 - x)
+    phase = mean + u * (1 - second - third) + v * second - (u + v) * third
+    return complex(np.sum(np.outer(weights, weights) / 2 * (1 - x) * np.exp(-1j * k * phase)))
+
+
+def facets(least: float, most: float) -> tuple[NDArray[np.float64], ...]:
+    """Forty means, deviations and strengths whose p for k = 250 lies between two bounds."""
+    rng = np.random.default_rng(0)
+    turn, size = rng.uniform(0, 2 * np.pi, 40), np.sqrt(np.linspace(least, most, 40)) / 250
+    # On the ellipse u^2 + u v + v^2 = size^2.
+    u, v = size * (np.cos(turn) - np.sin(turn) / np.sqrt(3)), size * 2 / np.sqrt(3) * np.sin(turn)
+    return rng.uniform(-2, 2, 40), u, v, rng.uniform(0, 1, 40)
+
+
+@pytest.mark.parametrize(("add_up", "bounds"), [(sum_small, (0.0, SERIES)), (sum_large, (0.1, 400.0))])
+def test_sums_are_those_of_the_integrals(add_up: object, bounds: tuple[float, float]) -> None:
+    mean, u, v, strength = facets(*bounds)
+    for i in range(len(mean)):
+        found = add_up(mean[i : i + 1], u[i : i + 1], v[i : i + 1], strength[i : i + 1], 250.0)  # type: ignore[operator]
+        # The series leaves out 2 (p^6 + 10 p^3 q^2 + q^4) / 14!, where q^2 is at most 4 p^3 / 27: 2.4e-7 of a facet for p = 4.
+        assert found == pytest.approx(strength[i] * quadrature(mean[i], u[i], v[i], 250.0), abs=3e-7)
+    whole = sum(strength[i] * quadrature(mean[i], u[i], v[i], 250.0) for i in range(len(mean)))
+    assert add_up(mean, u, v, strength, 250.0) == pytest.approx(whole, abs=2e-6)  # type: ignore[operator]
