@@ -98,9 +98,8 @@ def test_a_folder_that_is_named_serves(read_only: Command, tmp_path: Path) -> No
 def test_commands_import_all_that_they_need(read_only: Command) -> None:
     done = read_only("-m", "rtradar", "view", "nothing")
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [
-        "rtradar: 'nothing' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named"
-    ]
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("rtradar: 'nothing' ")
     assert read_only("-m", "rtradar", "--help").returncode == 0
 
 

@@ -96,7 +96,7 @@ def test_order_kills_and_damage_leave_the_same_bytes(
         make_and_store(recipe, str(undisturbed), fake)
     for recipe in order[:killed]:  # a run that ends early, with one file half-written
         make_and_store(recipe, str(folder), fake)
-    (folder / f".{order[-1].identity}.npz.0123.part").write_bytes(b"half")
+    (folder / f".{order[-1].identity}.npz.0123456789ab.part").write_bytes(b"half")
     path = sample_path(folder, order[spoiled].identity)
     if path.exists():
         path.write_bytes(path.read_bytes()[:cut])
@@ -155,7 +155,7 @@ def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> N
     again = build_dataset(tmp_path / "set.toml", out)
     assert (again["whole"], again["made"], again["workers"]) == (2, 0, 0)
     sample_path(out, Collection(out).ids[0]).write_bytes(b"spoiled")
-    (out / ".x.npz.12.part").write_bytes(b"left by a killed writer")
+    (out / ".x.npz.0123456789ab.part").write_bytes(b"left by a killed writer")
     mended = build_dataset(tmp_path / "set.toml", out)
     assert (mended["whole"], mended["damaged"], mended["made"]) == (1, 1, 1)
     assert contents(out) == first
@@ -173,7 +173,7 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     (tmp_path / "set.toml").write_text(TINY)
     out = tmp_path / "out"
     out.mkdir()
-    unfinished = out / ".0123.npz.4567.part"
+    unfinished = out / ".0123.npz.0123456789ab.part"
     with alone_in(out):
         unfinished.write_bytes(b"half")
         with pytest.raises(InputError, match=r"another command writes into .*out.*; wait"):
@@ -181,7 +181,7 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     assert list(out.iterdir()) == [unfinished]
 
 
-@pytest.mark.parametrize(("scheduler", "left"), [(None, []), ("tcp://elsewhere:8786", [".0123.npz.4567.part"])])
+@pytest.mark.parametrize(("scheduler", "left"), [(None, []), ("tcp://elsewhere:8786", [".0123.npz.0123456789ab.part"])])
 def test_half_samples_of_own_workers_go_as_the_process_has_to_end(tmp_path: Path, scheduler: str | None, left: list[str]) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
     (tmp_path / "set.toml").write_text(TINY)
@@ -194,7 +194,7 @@ folder = Path({str(tmp_path)!r})
 
 @contextlib.contextmanager
 def killed(workers, scheduler):
-    (folder / "out" / ".0123.npz.4567.part").write_bytes(b"half")
+    (folder / "out" / ".0123.npz.0123456789ab.part").write_bytes(b"half")
     discard_unfinished()
     os._exit(0)
     yield
