@@ -361,7 +361,8 @@ class Tree:
                 continue
             count += len(tests)
             with tempfile.TemporaryDirectory(dir=self._root.parent) as folder:
-                cache = Path(folder) / "numba"
+                kept, cache = Path(folder) / "source.py", Path(folder) / "numba"
+                shutil.copy2(path, kept)
                 shutil.copytree(self._cache, cache, copy_function=os.link)
                 if compiled:
                     stems = {Path(mutant.file).stem, *(Path(name).stem for ring in self.importers(mutant.file) for name in ring)}
@@ -372,7 +373,7 @@ class Tree:
                     path.write_text(changed(source, mutant), encoding="utf-8")
                     status, said = self._pytest(["-x", *tests], cache, COMPILING_S if compiled else LIMIT_S, {})
                 finally:
-                    shutil.copy2(CHECKOUT / mutant.file, path)
+                    shutil.copy2(kept, path)
             if status is None:
                 return "timeout", test_file, count
             if status != 0:
