@@ -131,10 +131,16 @@ def hip_headings(nodes: Motion) -> NDArray[np.float64]:
 
 
 def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Direction (2,) of the median of headings (frame, 2), component by component."""
-    middle = np.median(headings, axis=0)
-    # Where the headings cancel out their median says nothing, and the first frame decides.
-    return np.asarray(middle if float(np.linalg.norm(middle)) > 1e-6 else headings[0])
+    """Unit vector (2,) along the median of the headings (frame, 2): of their angles to the mean heading.
+
+    A median of each component would not turn with the recording.
+    """
+    mean = headings.mean(axis=0)
+    # Where the headings cancel out their mean says nothing, and the first frame stands for it.
+    along = mean if float(np.linalg.norm(mean)) > 1e-6 else headings[0]
+    to_the_left = along[0] * headings[:, 1] - along[1] * headings[:, 0]
+    angle = math.atan2(along[1], along[0]) + float(np.median(np.arctan2(to_the_left, headings @ along)))
+    return np.array([math.cos(angle), math.sin(angle)])
 
 
 def walk_direction(roots: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64] | None:

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from rtradar.errors import InputError
@@ -29,6 +29,7 @@ def inside(motion: Motion) -> Motion:
 
 
 @settings(max_examples=15)
+@example(0.125, 0.0, 0.0)  # at which a median of each component was 1.7e-4 m off
 @given(st.floats(-math.pi, math.pi), st.floats(-5, 5), st.floats(-5, 5))
 def test_placement_undoes_any_yaw_and_shift(yaw: float, x: float, y: float) -> None:
     for activity in ("walk", "kick"):
