@@ -14,7 +14,9 @@ from scipy import integrate, special, stats
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.scatter.wall_series import Term
 from rtradar.scene import reflection, slab
+from rtradar.scene.slab import slab_passes
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "theory.rst").read_text(encoding="utf-8")
@@ -158,6 +160,11 @@ def test_walls(polarization: str) -> None:
     assert reflection(eta, cosine, polarization) == pytest.approx(r)
     expected = r * (1 - q**2) / (1 - r**2 * q**2), (1 - r**2) * q / (1 - r**2 * q**2)
     assert slab(eta, thickness, frequency, cosine, polarization) == pytest.approx(expected)
+    passes = [slab_passes(eta, thickness, frequency, cosine, polarization, p) for p in range(4)]
+    assert passes == pytest.approx([r, (1 - r**2) * q, -(1 - r**2) * r * q**2, (1 - r**2) * r**2 * q**3])
+    for p in range(4):
+        longer = p * thickness * np.sqrt(5.3 - (1 - cosine**2)) - p % 2 * thickness * cosine
+        assert Term(p, rest=False, index_squared=5.3).extra_m(thickness, np.array(cosine)) == pytest.approx(longer)
 
 
 def test_noise() -> None:

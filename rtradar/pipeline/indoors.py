@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.pipeline.room import RoomIf
+from rtradar.pipeline.survey import Limit, warn_of
 from rtradar.radar import Radar
 from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.multipath import Multipath
+from rtradar.scatter.multipath import FIELD_ERROR, Multipath
 from rtradar.scene import Scene
 
 _GHOST_STEP_CYCLES = 4
@@ -20,11 +21,16 @@ _GHOST_STEP_CYCLES = 4
 
 
 class Indoors(NamedTuple):
-    """``rung`` the person in the room, ``room`` the IF of the room itself, ``account`` what was kept and dropped, for JSON."""
+    """The person in the room.
+
+    ``rung`` the person, ``room`` the IF of the room itself, ``account`` what was kept and dropped, for JSON; ``limits`` what the
+    walls bring.
+    """
 
     rung: Multipath
     room: RoomIf
     account: dict[str, Any]
+    limits: tuple[Limit, ...]
 
 
 class Ghost(NamedTuple):
@@ -92,7 +98,22 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
-    return Indoors(rung, room, account)
+    return Indoors(rung, room, account, _limits(rung))
+
+
+def _limits(rung: Multipath) -> tuple[Limit, ...]:
+    """Walls that are not followed over the sweep, where the person is seen by them."""
+    share = max(rung.not_followed.values(), default=0.0)
+    if share == 0:
+        return ()
+    names = ", ".join(rung.not_followed)
+    message = (
+        f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, so dispersive they are or so "
+        f"little they let through: {names}"
+    )
+    limit = Limit("wall_frequency_response", share, message)
+    warn_of(limit)
+    return (limit,)
 
 
 def ghosts(rung: Multipath, radar: Radar, time_s: float) -> list[Ghost]:

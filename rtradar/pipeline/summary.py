@@ -75,7 +75,8 @@ def _watts(capture: Capture) -> dict[str, float]:
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:
-    limits: list[dict[str, Any]] = [dataclasses.asdict(limit) for limit in capture.survey.limits]
+    of_room = capture.inside.limits if capture.inside else ()
+    limits: list[dict[str, Any]] = [dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)]
     if not capture.survey.visible:
         limits += [{"name": "nobody_visible", "share": 0.0, "message": message} for message in capture.warned]
     return limits

@@ -169,14 +169,29 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
     limits = tuple(Limit(name, value / power, message) for name, value, message in [*found, *indoors])
     for limit in limits:
-        if limit.share > _WARN_SHARE:
-            warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=2)
+        warn_of(limit)
     return Survey(power / len(chirps), True, part_power, looked_at, power_at, hidden_at, limits)
 
 
 def _and_direction(radar: Radar) -> str:
     angle_deg = folded_angle_deg(radar)
     return f" and, ahead, {angle_deg:.1f} degrees beside its direction, more to the sides" if angle_deg > 0 else ""
+
+
+def warn_of(limit: Limit) -> None:
+    """Warn of a limit that concerns much of the echo power.
+
+    Parameters
+    ----------
+    limit : Limit
+
+    Warns
+    -----
+    ValidityWarning
+        Where it is more than 5 %.
+    """
+    if limit.share > _WARN_SHARE:
+        warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=3)
 
 
 def _refuse_too_near(radar: Radar, body: Body, times: NDArray[np.float64]) -> None:

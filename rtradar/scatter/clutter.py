@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +20,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter_furniture import furniture_returns
-from rtradar.scatter.clutter_returns import RoomEchoes, sweep_nodes
+from rtradar.scatter.clutter_returns import FREQUENCY_ERROR, RoomEchoes, sweep_nodes
 from rtradar.scatter.clutter_rough import rough_returns
 from rtradar.scatter.clutter_walls import mirror_returns
 from rtradar.scatter.path_account import MARGIN_DB
@@ -90,7 +90,8 @@ class Clutter:
     Raises
     ------
     InputError
-        Where a dial is out of range, or a mesh cannot be used.
+        Where a dial is out of range, a mesh cannot be used, or walls change a return faster over the sweep than a polynomial
+        follows to a thousandth of the strongest.
     BackendError
         Where no backend of that kind works here.
     """
@@ -111,6 +112,7 @@ class Clutter:
             *furniture_returns(mi, radar, scene),
             *rough_returns(radar, scene, tracer, seed),
         ]
+        _refuse_not_followed(found, scene)
         items = [_item(echoes, radar) for echoes in found]
         heard = [index for index, item in enumerate(items) if item.cell_m2 > 0]
         ranks = sorted(heard, key=lambda index: -items[index].cell_m2)
@@ -180,6 +182,18 @@ class Clutter:
             part=-1 - np.repeat(np.arange(len(self.objects)), [own.n_echoes for own in self.objects]),
             bounces=np.concatenate([np.empty(0, dtype=np.int64), *(own.bounces for own in self.objects)]),
         )
+
+
+def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:
+    """Refuse a room whose strongest echoes are not followed over the sweep, by what is known to be wrong of all others."""
+    strongest = max((float(np.abs(echoes.amplitude).max(initial=0.0)) for echoes in found), default=0.0)
+    for echoes in found:
+        if echoes.off_m > FREQUENCY_ERROR * strongest:
+            raise InputError(
+                f"clutter of scene '{scene.name}': over the sweep the return '{echoes.name}' is off by "
+                f"{echoes.off_m / strongest:.2g} of the strongest, allowed is {FREQUENCY_ERROR:g}; take a thinner wall, one of a "
+                "permittivity that changes less over the sweep, or a narrower sweep"
+            )
 
 
 def _item(echoes: RoomEchoes, radar: Radar) -> ClutterItem:

@@ -25,8 +25,8 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter_groups import FacetGroups, PathGroups
 from rtradar.scatter.clutter_returns import FURNITURE_NODES, RoomEchoes, sweep_nodes
-from rtradar.scatter.footprints import Footprints, across, radiate
-from rtradar.scatter.room_walls import through_walls
+from rtradar.scatter.clutter_terms import behind_walls
+from rtradar.scatter.footprints import Footprints, radiate
 from rtradar.scatter.shooting import Shooter, exits
 from rtradar.scatter.tubes import MeshGrid
 from rtradar.scene import Furniture, Material, Scene, reflection
@@ -168,8 +168,7 @@ def _returns(piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid,
     ).heard(radar)
     if returns.n_echoes == 0:
         return None
-    through = _let_through(returns.points[0, 0, :, 0], radar, scene, nodes)
-    return replace(returns, amplitude=returns.amplitude * through.conj()).heard(radar)
+    return behind_walls(returns, radar, scene).heard(radar)
 
 
 class _Shot(NamedTuple):
@@ -223,15 +222,3 @@ def _reflected(footprints: Footprints, material: Material, frequency_hz: float) 
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j
     factors = [(reflection(eta, cosine, kind) / turn).real[:, None] for kind in _POLARIZATIONS]
     return turn, replace(footprints, field=factors[1] * (footprints.field - in_te) - factors[0] * in_te)
-
-
-def _let_through(points: Array, radar: Radar, scene: Scene, frequency: Array) -> NDArray[np.complex128]:
-    """What walls let through from each Tx to points (echo, 3) and on to each Rx, (node, tx, rx, echo)."""
-
-    def legs(antennas: Array) -> NDArray[np.complex128]:
-        ways = points - antennas[:, None]
-        sent = across(-ways / np.linalg.norm(ways, axis=-1, keepdims=True), radar.polarization)
-        arrived = through_walls(scene, antennas[:, None], points, frequency, sent.astype(np.complex128))
-        return np.asarray((arrived * sent).sum(axis=-1))
-
-    return np.asarray(legs(radar.tx)[:, :, None] * legs(radar.rx)[:, radar.rx_of_tx])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -18,8 +19,10 @@ Kind = Literal["mirror", "furniture", "reflector", "rough"]
 MOST_NODES = 13
 """Of a polynomial over the sweep: with more, what `synthesize` makes of it in powers of time loses digits."""
 FURNITURE_NODES = 5
+DENSE_NODES = 33
+"""Frequencies at which slabs are taken before as few as serve are kept."""
 _NODES = (1, 3, 5, 7, 9, 11, MOST_NODES)
-_FREQUENCY_ERROR = 1e-3
+FREQUENCY_ERROR = 1e-3
 """Of the strongest echo of an object, by which its amplitude may be off between frequency nodes."""
 
 
@@ -42,6 +45,8 @@ class RoomEchoes:
     bounces : (echo,) int64
     points : (tx or 1, rx or 1, echo, hop, 3) float64
         Where the path goes between Tx and Rx, world [m]; 1 where all antennas share the points.
+    off_m : float
+        What the polynomial through the nodes is known to be off by, at most, where that is more than was asked for [m].
     """
 
     name: str
@@ -51,6 +56,7 @@ class RoomEchoes:
     frequency: Array
     bounces: NDArray[np.int64]
     points: Array
+    off_m: float = 0.0
 
     @property
     def n_echoes(self) -> int:
@@ -98,16 +104,28 @@ class RoomEchoes:
         """Amplitudes (node, tx, rx, echo) of the polynomial at other frequencies (node,) [Hz]."""
         return np.asarray(np.tensordot(_weights(self.frequency, frequency, radar), self.amplitude, axes=1))
 
-    def economised(self, radar: Radar) -> RoomEchoes:
-        """With the fewest frequency nodes that keep the amplitudes within a thousandth of the strongest."""
+    def economised(self, radar: Radar, error: float = FREQUENCY_ERROR) -> RoomEchoes:
+        """With the fewest frequency nodes that keep the amplitudes within this of the strongest; see ``off_m``."""
         largest = np.abs(self.amplitude).max(initial=0.0)
         for count in _NODES:
             nodes = sweep_nodes(radar, count)
             fewer = self.at_nodes(nodes, radar)
             again = np.tensordot(_weights(nodes, self.frequency, radar), fewer, axes=1)
-            if count == MOST_NODES or np.abs(again - self.amplitude).max(initial=0.0) <= _FREQUENCY_ERROR * largest:
-                break
-        return replace(self, amplitude=fewer, frequency=nodes)
+            off = float(np.abs(again - self.amplitude).max(initial=0.0))
+            if off <= error * largest:
+                return replace(self, amplitude=fewer, frequency=nodes, off_m=0.0)
+        return replace(self, amplitude=fewer, frequency=nodes, off_m=off)
+
+
+def best_followed(ways: Iterable[Callable[[], RoomEchoes | None]]) -> RoomEchoes | None:
+    """Of several ways to write the same echoes, the first that as many nodes as there may be follow; else the nearest to it."""
+    best = None
+    for way in ways:
+        found = way()
+        if found is None or not found.off_m:
+            return found
+        best = found if best is None or found.off_m < best.off_m else best
+    return best
 
 
 def sweep_nodes(radar: Radar, count: int) -> Array:

@@ -8,7 +8,8 @@ S^2 from the height of the surface instead of a fit. So the power per area is
     sigma0 = 4 S^2 |R|^2 cos_i cos_s,
 
 R of the smooth slab at the angle of each leg, its polarisation as it arrives; over half of space it adds up to S^2 |R|^2 of
-what arrives, and mirrored and diffuse power together to what a smooth wall mirrors. All of it is taken as co-polar.
+what arrives, and mirrored and diffuse power together to what a smooth wall mirrors. All of it is taken as co-polar. Other walls
+on the way let through on both legs what their slabs do.
 
 A point stands for its cell of a jittered grid, two range bins wide: where cells are seen from so near that a range bin
 holds few, the diffuse return is grainier than that of a real wall, its mean power is right.
@@ -26,8 +27,9 @@ from numpy.typing import NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter_returns import RoomEchoes
+from rtradar.scatter.clutter_terms import behind_walls
 from rtradar.scatter.footprints import across
-from rtradar.scatter.room_walls import height, reflect, through_walls
+from rtradar.scatter.room_walls import height, reflect
 from rtradar.scene import Scene, Wall
 from rtradar.seeds import stream
 from rtradar.trace.room_tracer import RoomTracer
@@ -92,7 +94,7 @@ def _echoes(
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
         sent = across(-ways, radar.polarization).astype(np.complex128)
-        field = reflect(smooth, through_walls(scene, antennas[:, None], points, frequency, sent), ways, frequency)[0]
+        field = reflect(smooth, sent, ways, frequency)[0]
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * ~tracer.blocked(antennas[:, None], points)
         return distance, np.maximum(-(ways @ normal), 0.0), strength
 
@@ -104,7 +106,7 @@ def _echoes(
     # |R|^2 as the geometric mean of both legs' own.
     power = 4 * scattered * cosines * field_t[:, None] * field_r[kept] * area
     amplitude = np.sqrt(power) / (far_t[:, None] * far_r[kept]) * np.exp(1j * phase)
-    return RoomEchoes(
+    returns = RoomEchoes(
         name=wall.name,
         kind="rough",
         length=far_t[:, None] + far_r[kept],
@@ -113,3 +115,4 @@ def _echoes(
         bounces=np.ones(len(points), dtype=np.int64),
         points=points[None, None, :, None],
     ).heard(radar)
+    return behind_walls(returns, radar, scene).heard(radar)

@@ -25,14 +25,21 @@ from rtradar.scatter.mirror import mirror
 from rtradar.scatter.occlusion import MirrorVisibility
 from rtradar.scatter.path_account import MARGIN_DB, PathAccount, account
 from rtradar.scatter.path_anchors import PathAnchors, Surroundings, path_anchors
+from rtradar.scatter.path_terms import PathTerms
 from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
 from rtradar.scatter.wall_echoes import WallEchoes
-from rtradar.scatter.wall_nodes import frequency_nodes
 from rtradar.scatter.wall_paths import WallPath, corners, wall_paths
+from rtradar.scatter.wall_series import room_series
 from rtradar.scene import Scene
 
 ANCHORS_S = 20e-3
 """Between instants at which what is left of echoes over walls is found: ghosts are within -21 dB (`validation/multipath.py`)."""
+
+FIELD_ERROR = 0.02
+"""Of the field of an echo through or over a wall, at most, over the sweep; beyond it a limit tells."""
+
+_ENOUGH, _MOST_NODES = 0.015, 3
+"""Of that, what polynomials through so many nodes of the sweep may take; one pass of `synthesize` takes no more of them."""
 
 _KEPT_BYTES = 64e6
 """Of anchors that are remembered, so that pruning and the signal trace once: 10 s of a room of six walls."""
@@ -60,6 +67,12 @@ class Multipath:
         Model of the body.
     material : {"perfect-conductor", "skin"}
         Of the body.
+
+    Attributes
+    ----------
+    paths : tuple of WallPath
+    not_followed : dict of str to float
+        Walls whose frequency response is not known to `FIELD_ERROR`, and the share of the echo power that meets each; by `prune`.
 
     Raises
     ------
@@ -103,10 +116,11 @@ class Multipath:
             tracer = BodyTracer(mi, body.semi_axes)
             self._visibility = MirrorVisibility(radar, body, tracer)
             tracers = (tracer, RoomTracer(mi, scene))
-        self._frequency = frequency_nodes(scene.walls, radar)
+        series = room_series(scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order)
+        self._frequency = series.frequency
         self._surface = Surface(material, radar)
         eta = body_material(material, self._frequency).eta(self._frequency)
-        self._around = Surroundings(scene, tracers, eta, self._frequency, radar.polarization)
+        self._around = Surroundings(scene, series.walls, tracers, eta, self._frequency, radar.polarization)
         self._plain = not scene.walls and not scene.furniture and material == "perfect-conductor"
         self._ends = ArrayEnds.of(radar)
         self._step = anchor_step(radar, ANCHORS_S)
@@ -114,6 +128,8 @@ class Multipath:
         self._over_walls = WallEchoes(radar, self.paths, far_field=fidelity == "analytic")
         parts = len(body.part_names)
         self._path, self._part = (array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts))
+        self._terms = PathTerms(radar, scene, series.walls, self.paths, self._path)
+        self.not_followed: dict[str, float] = {}
         self._kept: dict[int, PathAnchors] = {}
 
     @property
@@ -123,11 +139,11 @@ class Multipath:
 
     @property
     def path_names(self) -> tuple[str, ...]:
-        """Path of each echo."""
-        return tuple(self.paths[number].name for number in self._path)
+        """Path of each echo that `echoes` gave last; more may come while a capture is gone through, until `prune`."""
+        return tuple(self.paths[self._path[echo]].name for echo in self._terms.echo)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps: the direct one of each part first, then those over walls, which may be left out."""
+        """Echoes at these chirps: the direct one of each part first, then those over walls, then those that slabs delay."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
         if self._plain:
@@ -147,10 +163,23 @@ class Multipath:
             lengths[..., ghosts], bare[..., ghosts] = self._over_walls.at(
                 self._path[ghosts], self._part[ghosts], at, near.take(ghosts)
             )
-        out = np.empty((*shape, n_echoes), dtype=np.complex64)
+        seen_before, seen_after = before.seen, after.seen
+        if self._terms.delayed:
+            echo = np.array(self._terms.echo)
+            lengths = self._terms.lengths(at, self._on_body(at, near), lengths)
+            bare, seen_before, seen_after = (array[..., echo] for array in (bare, seen_before, seen_after))
+        out = np.empty((*shape, len(self._terms)), dtype=np.complex64)
         weights = tx_weight, self._ends.rx_weight[at.tx_index]
-        weigh(bare, before.factor, after.factor, before.seen, after.seen, share, interval, line, *weights, out)
+        weigh(bare, before.factor, after.factor, seen_before, seen_after, share, interval, line, *weights, out)
         return self._as_echoes(at.tx_index, lengths, out)
+
+    def _on_body(self, at: ChirpPoses, near: Nearby) -> NDArray[np.float64]:
+        """Where echoes leave the body, (chirp, echo, 3) world [m]."""
+        places = near.places()
+        # Between anchors they are on a chord; where there is none, any place will do.
+        size = np.sqrt(((places / at.semi_axes[self._part]) ** 2).sum(axis=-1, keepdims=True))
+        places = np.where(size > 0, places, 0.0) / np.where(size > 0, size, 1.0)
+        return np.asarray(at.centres[:, self._part] + np.einsum("ceij,cej->cei", at.frames[:, self._part], places))
 
     def course(self, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """Corners (corner, 3) of a path, by its name, from the middle of the array over a point (3,) and back [m]."""
@@ -160,8 +189,11 @@ class Multipath:
         return np.array([*out, *reversed(back[:-1])])
 
     def _as_echoes(self, tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.complex128]) -> Echoes:
+        echo = np.array(self._terms.echo, dtype=np.int64)
         bounces = 1 + np.array([self.paths[path].order for path in self._path], dtype=np.int64)
-        return Echoes(length=length, amplitude=amplitude, frequency=self._frequency, tx=tx, part=self._part, bounces=bounces)
+        return Echoes(
+            length=length, amplitude=amplitude, frequency=self._frequency, tx=tx, part=self._part[echo], bounces=bounces[echo]
+        )
 
     def _direct(
         self, chirps: NDArray[np.int64], at: ChirpPoses, near: NDArray[np.float64] | None = None
@@ -184,9 +216,9 @@ class Multipath:
         share = chirps % self._step / self._step
         ends = np.concatenate([intervals, intervals[[bool(share[interval == i].any()) for i in range(len(intervals))]] + 1])
         self._find(np.unique(ends))
-        before = _stack([self._kept[int(number)] for number in intervals])
+        before = _stack([self._kept[int(number)] for number in intervals], len(self._terms))
         # Where every chirp of an interval is its first, what comes after it does not matter.
-        after = _stack([self._kept.get(int(number) + 1, self._kept[int(number)]) for number in intervals])
+        after = _stack([self._kept.get(int(number) + 1, self._kept[int(number)]) for number in intervals], len(self._terms))
         return interval, share, before, after
 
     def _find(self, numbers: NDArray[np.int64]) -> None:
@@ -194,7 +226,7 @@ class Multipath:
         for first in range(0, len(missing), _ANCHORS_AT_ONCE):
             some = missing[first : first + _ANCHORS_AT_ONCE]
             at = chirp_poses(self._radar, self._body, np.array(some) * self._step)
-            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, Poses(*at[3:]))
+            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, self._terms, Poses(*at[3:]))
             for place, number in enumerate(some):
                 self._kept[number] = PathAnchors(*(array[place].copy() for array in found))
         needed = set(numbers.tolist())
@@ -223,28 +255,43 @@ class Multipath:
             One for each path; direct echoes always stay.
         """
         radar = self._radar
-        power = np.zeros(len(self._part))
-        chosen = np.arange(0, n_chirps, self._step)
-        for first in range(0, len(chosen), _CHIRPS_AT_ONCE):
-            echoes = self.echoes(chosen[first : first + _CHIRPS_AT_ONCE])
-            power += (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2)).sum(axis=0)
-        power /= len(chosen)
+        looked_at = np.arange(0, n_chirps, self._step)
+        column_power = np.zeros(len(self._terms))
+        for first in range(0, len(looked_at), _CHIRPS_AT_ONCE):
+            echoes = self.echoes(looked_at[first : first + _CHIRPS_AT_ONCE])
+            found = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 2)).sum(axis=0)
+            found[: len(column_power)] += column_power
+            column_power = found
+        column_power /= len(looked_at)
+        walls = self._terms.not_followed()
+        self.not_followed = {
+            name: float(column_power[[name in own for own in walls]].sum() / column_power.sum())
+            for name in sorted(set().union(*walls))
+            if column_power.sum() > 0
+        }
         gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
-        keep = (power > 0) & (power * gain >= noise_power_m2 * 10 ** (-MARGIN_DB / 10))
-        keep |= np.array([self.paths[number].order == 0 for number in self._path])
+        worth = (column_power > 0) & (column_power * gain >= noise_power_m2 * 10 ** (-MARGIN_DB / 10))
+        echo = np.array(self._terms.echo)
+        power, keep = np.zeros(len(self._part)), np.zeros(len(self._part), dtype=bool)
+        np.add.at(power, echo, column_power)
+        np.logical_or.at(keep, echo, worth)
+        direct = np.array([self.paths[number].order == 0 for number in self._path])
+        keep |= direct
         names = np.array(self._body.part_names, dtype=object)[self._part]
         accounts = tuple(
             account(path, self._path == number, keep, power, names, noise_power_m2 / gain)
             for number, path in enumerate(self.paths)
         )
-        self._leave_out(keep)
+        self._leave_out(keep, worth | (direct[echo] & (np.arange(len(echo)) < len(direct))))
         return accounts
 
-    def _leave_out(self, keep: NDArray[np.bool_]) -> None:
+    def _leave_out(self, keep: NDArray[np.bool_], columns: NDArray[np.bool_]) -> None:
         self._path, self._part = self._path[keep], self._part[keep]
+        self._terms.keep(columns, keep)
         for number, anchor in self._kept.items():
-            factor, seen, start = anchor
-            self._kept[number] = PathAnchors(factor[..., keep].copy(), seen[..., keep].copy(), start[..., keep, :].copy())
+            (factor, seen, start), count = anchor, len(columns)
+            kept = _widened(factor, count)[..., columns].copy()
+            self._kept[number] = PathAnchors(kept, seen[..., keep].copy(), start[..., keep, :].copy())
 
 
 class PersonAlone:
@@ -262,5 +309,12 @@ class PersonAlone:
         return one_echo_a_part(at.tx_index, length, room._surface.echo(at, amplitude), room._radar.centre_frequency_hz)
 
 
-def _stack(anchors: list[PathAnchors]) -> PathAnchors:
-    return PathAnchors(*(np.stack(column) for column in zip(*anchors, strict=True)))
+def _stack(anchors: list[PathAnchors], columns: int) -> PathAnchors:
+    factor, seen, start = zip(*anchors, strict=True)
+    return PathAnchors(np.stack([_widened(own, columns) for own in factor]), np.stack(seen), np.stack(start))
+
+
+def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:
+    """With nothing in the columns that were not yet known."""
+    missing = columns - factor.shape[-1]
+    return factor if not missing else np.pad(factor, [(0, 0)] * (factor.ndim - 1) + [(0, missing)])

@@ -2,13 +2,14 @@
 
 A leg carries the field of its antenna as a vector, over walls and through walls by the coefficients of their slabs, to the
 mirror point on the body. Both legs are told from their antennas: by reciprocity a receiver hears as it would send. Mirror
-points are those for the middles of the lines of antennas, legs run from the ends of the lines.
+points are those for the middles of the lines of antennas, legs run from the ends of the lines. A slab that delays sends on
+several waves, each with its own delay: an echo has a column for each pair of those of its legs.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
+from collections.abc import Iterator, Sequence
+from itertools import pairwise, product
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -18,9 +19,11 @@ from rtradar.body.body import Poses
 from rtradar.scatter.array_ends import ArrayEnds
 from rtradar.scatter.body_material import antenna_field, bisector, body_reflection
 from rtradar.scatter.mirror import mirror
+from rtradar.scatter.path_terms import AT_ONCE, Met, PathTerms
 from rtradar.scatter.polarization import copolar
-from rtradar.scatter.room_walls import reflect, through_walls
+from rtradar.scatter.room_walls import Passage, reflected, setting_out, through_walls
 from rtradar.scatter.wall_paths import Leg, WallPath, corners, images
+from rtradar.scatter.wall_series import WallSeries
 from rtradar.scene import Scene
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
@@ -28,14 +31,17 @@ from rtradar.trace.room_tracer import RoomTracer
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 
-_FLAT = 0.02
-"""A factor that changes by less over the sweep, 0.2 dB, is made the same at all nodes: `synthesize` does such an echo faster."""
+_FLAT = 0.01
+"""A factor that changes by less over the sweep, 0.1 dB, is made the same at all nodes: `synthesize` does such an echo faster."""
+
+_FAINT = 2e-3
+"""Of the strongest term of an echo: a weaker one is left out."""
 
 
 class PathAnchors(NamedTuple):
     """What is left of the echoes.
 
-    ``factor (anchor, node, line, 2, rx_end, echo)`` complex64: co-polar field over that of the bare return, exp(+j omega t);
+    ``factor (anchor, node, line, 2, rx_end, column)`` complex64: co-polar field over that of the bare return, exp(+j omega t);
     of a direct echo over what `mirror` has for a conductor. ``seen (anchor, line, 2, rx_end, echo)`` bool.
     ``start (anchor, line, 2, echo, 3)``: mirror points of both ends of the lines of Tx in the axes of the parts [m].
     """
@@ -46,9 +52,13 @@ class PathAnchors(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """Who reflects, hides and lets through: ``tracers`` are the body's and the furniture's, or None where nothing hides."""
+    """Who reflects, hides and lets through: ``tracers`` are the body's and the furniture's, or None where nothing hides.
+
+    ``series`` are the terms of the walls.
+    """
 
     scene: Scene
+    series: Sequence[WallSeries]
     tracers: tuple[BodyTracer, RoomTracer] | None
     body_eta: Field
     frequency_hz: Array
@@ -61,6 +71,7 @@ def path_anchors(
     paths: Sequence[WallPath],
     path: NDArray[np.int64],
     part: NDArray[np.int64],
+    terms: PathTerms,
     poses: Poses,
 ) -> PathAnchors:
     """Look at some poses.
@@ -72,6 +83,8 @@ def path_anchors(
     paths : sequence of WallPath
     path, part : (echo,) int64
         Of each echo. Whether other parts hide a direct one is left to `MirrorVisibility`.
+    terms : PathTerms
+        Gets the columns that are met for the first time.
     poses : Poses
 
     Returns
@@ -83,18 +96,19 @@ def path_anchors(
         _carry(around, [getattr(paths[p], side) for p in path], places, points)
         for side, places in (("out", ends.tx), ("back", ends.rx))
     ]
-    out, back = legs
-    normal = bisector(-out.arriving[:, :, :, None], -back.arriving[:, :, None])
-    sent = body_reflection(out.field[:, :, :, :, None], out.arriving[:, :, :, None], normal, around.body_eta)
-    # `mirror` counts a conductor straight on as +1: the field's turn is in the sign.
-    factor = -np.sum(back.field[:, :, :, None] * sent, axis=-1)
-    direct = np.flatnonzero([paths[p].order == 0 for p in path])
-    if len(direct):
-        own = copolar(-out.arriving[:, :, :, None, direct], -back.arriving[:, :, None, :, direct], around.polarization)
-        safe = np.abs(own) > 1e-6
-        factor[..., direct] = np.where(safe, factor[..., direct] / np.where(safe, own, 1.0), 1.0)
-    seen = out.valid[:, :, :, None] & back.valid[:, :, None] & exists[:, :, None, None]
-    seen &= (np.abs(factor) > 0).any(axis=0)
+    direct = np.array([paths[p].order == 0 for p in path], dtype=bool)
+    factors = [(chosen, met, _left(around, legs, direct, chosen, *fields)) for chosen, met, fields in _pairs(paths, path, legs)]
+    strength = np.zeros((*exists.shape[:2], 2, ends.rx.shape[1], len(path)))
+    for chosen, _, found in factors:
+        strength[..., chosen] = np.maximum(strength[..., chosen], np.abs(found).max(axis=0))
+    seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & exists[:, :, None, None] & (strength > 0)
+    columns = []
+    for chosen, met, found in factors:
+        worth = _worth(found, strength[..., chosen])
+        columns.append(np.array([terms.column(int(echo), met) if kept else -1 for echo, kept in zip(chosen, worth, strict=True)]))
+    factor = np.zeros((len(around.frequency_hz), *strength.shape[:-1], len(terms)), dtype=np.complex128)
+    for (_, _, found), column in zip(factors, columns, strict=True):
+        factor[..., column[column >= 0]] = found[..., column >= 0]
     if around.tracers is not None:
         body, room = around.tracers
         asked = np.logical_or.reduce(seen, axis=3), np.logical_or.reduce(seen, axis=2)
@@ -102,12 +116,57 @@ def path_anchors(
         for anchor in range(len(seen)):
             body.pose(poses.centres[anchor], poses.frames[anchor])
             for leg, still in zip(legs, clear, strict=True):
-                _clear_of_body(body, leg, still[anchor], anchor, part, direct)
+                _clear_of_body(body, leg, still[anchor], anchor, part, np.flatnonzero(direct))
         seen &= clear[0][:, :, :, None] & clear[1][:, :, None]
     middle = factor[len(factor) // 2]
     flat = np.all(np.abs(factor - middle) <= _FLAT * np.abs(middle), axis=(0, 2, 3, 4), keepdims=True)
     factor = np.where(flat, middle, factor)
     return PathAnchors(np.moveaxis(factor, 0, 1).astype(np.complex64), seen, start.astype(np.float32))
+
+
+def _pairs(
+    paths: Sequence[WallPath], path: NDArray[np.int64], legs: Sequence[_Carried]
+) -> Iterator[tuple[NDArray[np.int64], Met, tuple[Field, Field]]]:
+    """Echoes, what they met on both legs, and the fields (node, anchor, line, end, echo, 3) of the legs, pair by pair."""
+    out, back = legs
+    yield np.arange(len(path)), AT_ONCE, (out.field, back.field)
+    for number in np.unique(path):
+        there, here = paths[number].out, paths[number].back
+        if len(out.waves[there]) == len(back.waves[here]) == 1:
+            continue
+        chosen = np.flatnonzero(path == number)
+        for (met_out, sent), (met_back, heard) in product(out.waves[there].items(), back.waves[here].items()):
+            if (met_out, met_back) != AT_ONCE:
+                fields = sent[..., out.of_leg[chosen], :], heard[..., back.of_leg[chosen], :]
+                yield chosen, (met_out, met_back), fields
+
+
+def _left(
+    around: Surroundings,
+    legs: Sequence[_Carried],
+    direct: NDArray[np.bool_],
+    chosen: NDArray[np.int64],
+    sent: Field,
+    heard: Field,
+) -> Field:
+    """Co-polar field over that of the bare return, of some echoes, (node, anchor, line, 2, rx_end, echo)."""
+    out, back = (leg.arriving[..., chosen, :] for leg in legs)
+    out, back = out[:, :, :, None], back[:, :, None]
+    returned = body_reflection(sent[:, :, :, :, None], out, bisector(-out, -back), around.body_eta)
+    # `mirror` counts a conductor straight on as +1: the field's turn is in the sign.
+    factor = np.asarray(-np.sum(heard[:, :, :, None] * returned, axis=-1))
+    own = np.flatnonzero(direct[chosen])
+    if len(own):
+        share = copolar(-out[..., own, :], -back[..., own, :], around.polarization)
+        safe = np.abs(share) > 1e-6
+        factor[..., own] = np.where(safe, factor[..., own] / np.where(safe, share, 1.0), 1.0)
+    return factor
+
+
+def _worth(factor: Field, strength: Array) -> NDArray[np.bool_]:
+    """Which echoes have a term at any place that is not faint beside the strongest there, (echo,)."""
+    size = np.abs(factor).max(axis=0)
+    return np.asarray(((size > _FAINT * strength) & (size > 0)).any(axis=(0, 1, 2, 3)))
 
 
 def _mirror_points(
@@ -146,11 +205,14 @@ def _mirror_points(
 class _Carried(NamedTuple):
     """Legs from the ends of the lines to the mirror points.
 
-    ``field (node, anchor, line, end, echo, 3)`` that arrives, ``arriving (anchor, line, end, echo, 3)`` its direction,
-    ``valid (anchor, line, end, echo)``; ``straight``: list of straight pieces (echo index, origins, targets, last).
+    ``field (node, anchor, line, end, echo, 3)`` that arrives without delay in slabs, ``waves`` all fields of the echoes of a leg,
+    by what they met; ``of_leg (echo,)`` counts the echoes of each leg. ``arriving (anchor, line, end, echo, 3)`` direction,
+    ``valid (anchor, line, end, echo)``; ``pieces``: list of straight pieces (echo index, origins, targets, last).
     """
 
     field: Field
+    waves: dict[Leg, dict[tuple[Passage, ...], Field]]
+    of_leg: NDArray[np.int64]
     arriving: Array
     valid: NDArray[np.bool_]
     pieces: list[tuple[NDArray[np.int64], Array, Array, bool]]
@@ -158,22 +220,27 @@ class _Carried(NamedTuple):
 
 def _carry(around: Surroundings, legs: Sequence[Leg], antennas: Array, points: Array) -> _Carried:
     shape = (points.shape[0], *antennas.shape[:2], points.shape[2])
-    field = np.empty((len(around.frequency_hz), *shape, 3), dtype=np.complex128)
-    arriving, valid = np.empty((*shape, 3)), np.empty(shape, dtype=bool)
-    pieces = []
+    field = np.zeros((len(around.frequency_hz), *shape, 3), dtype=np.complex128)
+    arriving, valid, of_leg = np.empty((*shape, 3)), np.empty(shape, dtype=bool), np.empty(len(legs), dtype=np.int64)
+    pieces, all_waves = [], {}
+    scene, frequency = around.scene, around.frequency_hz
     for leg in dict.fromkeys(legs):
         chosen = np.array([number for number, own in enumerate(legs) if own == leg])
+        of_leg[chosen] = np.arange(len(chosen))
         along, valid[..., chosen] = corners(leg, antennas[:, :, None], points[:, :, None, chosen])
         way = _unit(along[1] - along[0])
-        own = np.broadcast_to(antenna_field(way, around.polarization), (len(field), *way.shape)).astype(np.complex128)
+        waves = setting_out(antenna_field(way, around.polarization), len(frequency))
         for step, (origins, targets) in enumerate(pairwise(along)):
             if step > 0:
-                own = reflect(leg[step - 1].wall, own, way, around.frequency_hz)
+                number = scene.walls.index(leg[step - 1].wall)
+                waves = reflected(scene, around.series, number, step, waves, way, frequency)
                 way = _unit(targets - origins)
-            own = through_walls(around.scene, origins, targets, around.frequency_hz, own)
+            waves = through_walls(scene, around.series, step, waves, origins, targets, frequency)
             pieces.append((chosen, origins, targets, step == len(leg)))
-        field[..., chosen, :], arriving[..., chosen, :] = own, way
-    return _Carried(field, arriving, valid, pieces)
+        all_waves[leg] = {wave.met: wave.field for wave in waves}
+        field[..., chosen, :] = all_waves[leg].setdefault((), field[..., chosen, :])
+        arriving[..., chosen, :] = way
+    return _Carried(field, all_waves, of_leg, arriving, valid, pieces)
 
 
 def _unit(ways: Array) -> Array:

@@ -9,14 +9,22 @@ A wall has two faces. Its front is the rectangle itself; waves that come from be
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.scene import Scene, Wall, slab
+from rtradar.scatter.wall_series import WHOLE, Term, WallSeries
+from rtradar.scene import Scene, Wall
+from rtradar.scene.slab import Polarization
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
+Series = Sequence[WallSeries]
+Waves = list["Wave"]
+_POLARIZATIONS: tuple[Polarization, ...] = ("te", "tm")
 
 _NORMAL_INCIDENCE = 1e-9  # sine of incidence below which the plane of incidence has no direction of its own
 
@@ -88,7 +96,7 @@ def crossed(wall: Wall, origins: Array, targets: Array) -> NDArray[np.bool_]:
     return across
 
 
-def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike) -> Field:
+def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[0]) -> Field:
     """The field after reflection, at the face that it meets.
 
     Parameters
@@ -101,6 +109,8 @@ def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike
         Unit vectors along which it travels.
     frequency_hz : (node,) float64
         [Hz].
+    term : Term
+        What of the slab's coefficient is meant; the phase of its extra length is left to whoever asks.
 
     Returns
     -------
@@ -111,64 +121,134 @@ def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike
     against = directions @ normal
     onward = directions - 2 * against[..., None] * normal
     cosine, frequency = np.minimum(np.abs(against), 1.0), _nodes(frequency_hz, against)
-    te, tm = (_coefficients(wall, cosine, frequency)[kind][0] for kind in (0, 1))
+    te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in _POLARIZATIONS)
     lost = np.exp(-2 * (2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.roughness_m * cosine) ** 2)
     return _dyad(field, directions, onward, normal, te * lost, tm * lost)
 
 
-def transmit(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike) -> Field:
+def transmit(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[1]) -> Field:
     """The field behind the wall, in place of the same way through air; arguments as those of `reflect`.
 
     The ray goes straight on: the small shift to the side is left out, its phase is not.
     """
     cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
     frequency = _nodes(frequency_hz, cosine)
-    te, tm = (_coefficients(wall, cosine, frequency)[kind][1] for kind in (0, 1))
-    air = np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.thickness_m * cosine)
-    return _dyad(field, directions, directions, wall.normal, te * air, tm * air)
+    te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in _POLARIZATIONS)
+    return _dyad(field, directions, directions, wall.normal, te, tm)
 
 
-def through_walls(scene: Scene, origins: Array, targets: Array, frequency_hz: ArrayLike, field: Field) -> Field:
-    """The field at the end of straight legs, through all walls on the way.
+class Passage(NamedTuple):
+    """A wall that a wave has met on a piece of its way, and the passes through its slab that count for its delay."""
+
+    wall: int
+    piece: int
+    passes: int
+
+
+class Wave(NamedTuple):
+    """One of the terms in which a wave has come so far.
+
+    ``met`` the passages that tell it from others; ``extra_m (...)`` what they add to its way [m]; ``field (node, ..., 3)``
+    complex, without the phase of both, and 0 where it went another way.
+    """
+
+    met: tuple[Passage, ...]
+    extra_m: Array
+    field: Field
+
+
+def reflected(scene: Scene, series: Series, number: int, piece: int, waves: Waves, directions: Array, frequency: Array) -> Waves:
+    """Waves after reflection by a wall, each once for each term of its slab.
 
     Parameters
     ----------
     scene : Scene
-    origins, targets : (..., 3) float64
-        Ends of the legs, world [m]; they broadcast. A leg that ends on a face of a wall does not cross it.
-    frequency_hz : (node,) float64
+    series : sequence of WallSeries
+        Of all its walls.
+    number : int
+        Of the wall that reflects.
+    piece : int
+        Of the way that comes after.
+    waves : list of Wave
+    directions : (..., 3) float64
+        Unit vectors along which they arrive.
+    frequency : (node,) float64
         [Hz].
-    field : (node, ..., 3) complex
-        At the origins; (..., 3) stands for all nodes.
 
     Returns
     -------
-    (node, ..., 3) complex128
+    list of Wave
+    """
+    wall = scene.walls[number]
+    cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
+    out = []
+    for met, extra, field in waves:
+        for term in series[number].terms[0]:
+            sent = reflect(wall, field, directions, frequency, term)
+            # What the face itself sends back comes without a delay.
+            passage = (Passage(number, piece, term.passes),) if term.passes else ()
+            out.append(Wave((*met, *passage), extra + term.extra_m(wall.thickness_m, cosine), sent))
+    return out
+
+
+def through_walls(
+    scene: Scene, series: Series, piece: int, waves: Waves, origins: Array, targets: Array, frequency: Array
+) -> Waves:
+    """Waves at the end of straight legs, through all walls on the way.
+
+    Parameters
+    ----------
+    scene : Scene
+    series : sequence of WallSeries
+        Of all its walls.
+    piece : int
+        Of the way, for the passages.
+    waves : list of Wave
+    origins, targets : (..., 3) float64
+        Ends of the legs, world [m]; they broadcast to the shape of the waves. A leg that ends on a face of a wall does not
+        cross it.
+    frequency : (node,) float64
+        [Hz].
+
+    Returns
+    -------
+    list of Wave
         Without spreading and without the phase of the leg's length; 0 behind metal.
     """
-    origins, targets = (np.asarray(places, dtype=np.float64) for places in (origins, targets))
-    shape = np.broadcast_shapes(origins.shape, targets.shape)
-    frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
-    out = np.array(np.broadcast_to(field, (len(frequency), *shape)), dtype=np.complex128)
-    for wall in scene.walls:
+    origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+    for number, wall in enumerate(scene.walls):
         legs = crossed(wall, origins, targets)
-        if legs.any():
-            ways = np.broadcast_to(targets, shape)[legs] - np.broadcast_to(origins, shape)[legs]
-            ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
-            out[:, legs] = transmit(wall, out[:, legs], ways, frequency)
-    return out
+        if not legs.any():
+            continue
+        ways = targets[legs] - origins[legs]
+        ways /= np.linalg.norm(ways, axis=-1, keepdims=True)
+        cosine = np.minimum(np.abs(ways @ wall.normal), 1.0)
+        came, waves = waves, []
+        for met, extra, field in came:
+            # Those that do not cross go on as they are.
+            past = np.where(legs[..., None], 0.0, field)
+            for term in series[number].terms[1]:
+                passed = past if term.whole else np.zeros_like(field)
+                passed[:, legs] = transmit(wall, field[:, legs], ways, frequency, term)
+                if not term.whole:
+                    longer = extra.copy()
+                    longer[legs] += term.extra_m(wall.thickness_m, cosine)
+                    waves.append(Wave((*met, Passage(number, piece, term.passes)), longer, passed))
+            if past.any():
+                waves.append(Wave(met, extra, past))
+    return waves
+
+
+def setting_out(field: Array, nodes: int) -> Waves:
+    """A wave at its antenna, of a field (..., 3) that is the same at all nodes."""
+    shape = np.shape(field)
+    return [Wave((), np.zeros(shape[:-1]), np.array(np.broadcast_to(field, (nodes, *shape)), dtype=np.complex128))]
 
 
 def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
     """Frequencies (node, 1, ..., 1) for as many axes as ``like`` has."""
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     return frequency.reshape(-1, *(1,) * like.ndim)
-
-
-def _coefficients(wall: Wall, cosine: Array, frequency: Array) -> tuple[tuple[Field, Field], tuple[Field, Field]]:
-    """Reflection and transmission, for TE and for TM, each (node, ...)."""
-    eta = wall.material.eta(frequency)
-    return slab(eta, wall.thickness_m, frequency, cosine, "te"), slab(eta, wall.thickness_m, frequency, cosine, "tm")
 
 
 def _dyad(field: Field, arriving: Array, leaving: Array, normal: Array, te: Field, tm: Field) -> Field:

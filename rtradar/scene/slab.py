@@ -103,6 +103,58 @@ def slab(
     return np.where(conducts, _perfect(polarization), reflected), np.where(conducts, 0.0, transmitted)
 
 
+def slab_passes(
+    eta: ArrayLike,
+    thickness_m: ArrayLike,
+    frequency_hz: ArrayLike,
+    cos_incidence: ArrayLike,
+    polarization: Polarization,
+    passes: int,
+    *,
+    rest: bool = False,
+) -> NDArray[np.complex128]:
+    """What leaves a slab after so many passes through it, of a plane wave that meets it: a term of the series of `slab`.
+
+    Parameters
+    ----------
+    eta, thickness_m, frequency_hz, cos_incidence, polarization
+        As of `slab`.
+    passes : int
+        0 or more: even ones leave by the face that the wave meets, odd ones by the other.
+    rest : bool
+        Whether the terms of two passes more, four more, and so on, are added.
+
+    Returns
+    -------
+    (...) complex128
+        Field over the incident one, between points opposite each other on the faces: ``r``, then
+        ``(1 - r^2) (-r)^(passes - 1) q^passes``.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning.
+
+    Notes
+    -----
+    Equation :eq:`passes` of the theory page.
+    """
+    eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
+    inner = _inner(eta, cosine)
+    face = _interface(eta, cosine, inner, polarization)
+    k = 2 * pi * np.asarray(frequency_hz, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    through = np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner)
+    if passes == 0:
+        term = face + (slab_passes(eta, thickness_m, frequency_hz, cosine, polarization, 2, rest=True) if rest else 0 * through)
+        return np.where(conducts, _perfect(polarization), term)
+    term = (1 - face**2) * (-face) ** (passes - 1) * through**passes
+    if rest:
+        loop = 1 - (face * through) ** 2
+        # Exactly grazing, nothing enters.
+        term = np.where(loop == 0, 0.0, term / np.where(loop == 0, 1.0, loop))
+    return np.where(conducts, 0.0, term)
+
+
 def _checked(
     eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
 ) -> tuple[NDArray[np.complex128], NDArray[np.float64], NDArray[np.bool_]]:

@@ -8,6 +8,7 @@ from scipy.optimize import minimize
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.scatter import room_walls as rw
+from rtradar.scatter.wall_series import whole_walls
 from rtradar.scene import Scene, Wall, material, own_material, slab
 
 # A tilted front, so that no axis is special.
@@ -129,7 +130,11 @@ def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
     origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
     targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
     field, frequency = np.array([0.0, 0, 1.0]), np.array([12e9, 16e9])
-    got = rw.through_walls(scene, origins[:, None], targets, frequency, field)
+    setting_out = rw.setting_out(np.broadcast_to(field, (2, 3, 3)), 2)
+    (wave,) = rw.through_walls(scene, whole_walls(scene.walls), 0, setting_out, origins[:, None], targets, frequency)
+    got = wave.field
+    assert wave.met == ()
+    assert not wave.extra_m.any()
     assert got.shape == (2, 2, 3, 3)
     np.testing.assert_array_equal(got[:, :, 0], np.broadcast_to(field, (2, 2, 3)))
     for index, origin in enumerate(origins):
