@@ -388,10 +388,15 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
     fields = {}
     for apart_s in (2.5e-3, multipath.ANCHORS_S):
         with mock.patch.object(multipath, "ANCHORS_S", apart_s):
-            echoes = Multipath(radar, body, scene).echoes(chirps)
-        over_walls = echoes.bounces > 1
-        phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length[..., over_walls]
-        fields[apart_s] = echoes.amplitude[len(echoes.frequency) // 2][..., over_walls] * np.exp(1j * phase)
+            rung = Multipath(radar, body, scene)
+            echoes = rung.echoes(chirps)
+        phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
+        field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
+        # What slabs delay comes in several echoes of one path and part.
+        owned = list(zip(rung.path_names, echoes.part.tolist(), strict=True))
+        paths = sorted({own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1})
+        of_path = np.array([[own == path for path in paths] for own in owned], dtype=np.float64)
+        fields[apart_s] = field @ of_path
     first, last = fields.values()
     yield from shadow_rows(radar, scene, body, chirps)
     error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
