@@ -35,13 +35,17 @@ def read_toml(path: Path, what: str, cure: str) -> Table:
     """
     where = f"{what} file '{path}'"
     try:
-        # Windows' editors begin a file with a byte order mark, which is no part of its text.
-        return tomllib.loads(read_bytes(path, _MOST_BYTES).decode("utf-8-sig"))
+        content = read_bytes(path, _MOST_BYTES)
     except OSError as error:
         raise InputError(f"{where}: {error.strerror}; {cure}") from None
+    except ValueError:
+        raise InputError(f"{where} is larger than {_MOST_BYTES / 1e6:g} MB: it is no {what}") from None
+    try:
+        # Windows' editors begin a file with a byte order mark, which is no part of its text.
+        return tomllib.loads(content.decode("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
         raise InputError(f"{where} is not TOML: {shown(str(error))[1:-1]}") from None
-    except ValueError as error:  # too large, an integer of too many digits
+    except ValueError as error:  # an integer of too many digits
         raise InputError(f"{where} cannot be used: {shown(str(error))[1:-1]}") from None
 
 

@@ -22,7 +22,18 @@ SOON_S = 10.0  # two seconds on a quiet machine, which validation/interruptions.
 @pytest.mark.parametrize(("number", "says"), [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "ended by SIGTERM")])
 def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(tmp_path: Path, number: signal.Signals, says: str) -> None:
     (tmp_path / "maps.h5").write_text("old")
-    command = [sys.executable, "-m", "rtradar", "run", "synthetic:walk", "--fidelity", "analytic", "--out", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "rtradar",
+        "run",
+        "synthetic:walk",
+        "--fidelity",
+        "analytic",
+        "--overwrite",
+        "--out",
+        str(tmp_path),
+    ]
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # what is ignored here would be ignored there
     try:
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)

@@ -156,7 +156,7 @@ def test_a_column_that_is_not_there_names_those_that_are(folder: Path) -> None:
 
 def test_what_killed_writers_left_is_swept_and_nothing_else(folder: Path) -> None:
     before = sorted(path.name for path in folder.iterdir())
-    for name in (".a.npz.12ab.part", ".collection.json.34cd.part"):
+    for name in (".a.npz.0123456789ab.part", ".collection.json.0123456789ab.part"):
         (folder / name).write_bytes(b"half")
     assert sweep(folder) == 2
     assert sorted(path.name for path in folder.iterdir()) == before
