@@ -129,6 +129,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         moving = True
                         _move(work, place, kind)
                     place.remove_tree(work.path.name)
+                    _remove_leftovers(place, but=None)  # what a killed command had still to move is replaced now
             except BaseException as error:
                 if moving:
                     raise _parted(out, work.path, error) from None

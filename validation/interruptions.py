@@ -4,8 +4,8 @@ Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at e
 build``, ``train``, ``export`` and ``view``, some into a folder where an older result of the same command lies. Claimed is: every
 file is as it was before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes
 within 2 s, with status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the folder
-of a run holds old files or new ones, not both; a command that reads it changes nothing, and the next run into it takes away what
-is neither.
+of a run holds old files or new ones; where the kill fell between the moves of its files it holds both, its list says so, and a
+command that reads it refuses it in one line. A command that reads changes nothing, and the next run takes away what is neither.
 
     python validation/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
@@ -193,16 +193,17 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
     after = contents(out) if out.exists() else {}
     left = tally(old, after)
     hidden, lost, changed, new = compared(old, after)
-    touched = 0
+    touched, refused = 0, False
     if name == "SIGKILL" and not case.single:
         look = [sys.executable, "-m", "rtradar", "export", str(out), "--out", str(work / "samples.mat")]
-        subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S)  # a folder without samples is refused
+        looked = subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S, text=True)
+        refused = looked.returncode == 2 and "holds files of two runs" in looked.stderr and looked.stderr.count("\n") == 1
         touched = len(set((contents(out) if out.exists() else {}).items()) ^ set(after.items()))
         _, said_again = start(case, out, work).communicate(timeout=PATIENCE_S)
         if said_again:
             print(said_again)
         hidden = compared(old, contents(out))[0]
-        left += f", then {tally(old, contents(out))}"
+        left += f"{', refused by a reader' if refused else ''}, then {tally(old, contents(out))}"
     lines = [line for line in said.replace("\r", "\n").splitlines() if line.startswith("rtradar: ")]
     ended = f"{seconds:5.2f} s  status {process.returncode:3d}  {left}; {len(orphans)} processes"
     row = f"{case.name:26} {stage.name:18} {name:8} {ended}"
@@ -211,8 +212,8 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
         judged(claim, "processes left", "1", len(orphans), 0, says=SAYS + "processes left"),
     ]
     if not case.single:
-        mixed = len(changed) + len(new) if len(changed) < len(old) else 0
-        found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed"))
+        mixed = len(changed) + len(new) if len(changed) < len(old) and not refused else 0
+        found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed, not refused"))
     if name == "SIGKILL" and not case.single:
         found.append(judged(claim, "files that a reader changed", "1", touched, 0, says=SAYS + "files that a reader changed"))
     if name != "SIGKILL":
