@@ -7,6 +7,7 @@ these. It is read from the functions in memory and not from files: a module may 
 from __future__ import annotations
 
 import hashlib
+import inspect
 from collections.abc import Callable, Iterable
 from functools import cache
 from types import BuiltinFunctionType, CodeType, FunctionType, ModuleType
@@ -33,7 +34,6 @@ _FLAGS = "OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTO
 _CODE = (
     "co_argcount",
     "co_kwonlyargcount",
-    "co_flags",
     "co_varnames",
     "co_names",
     "co_freevars",
@@ -41,6 +41,9 @@ _CODE = (
     "co_code",
     "co_exceptiontable",
 )
+
+_CODE_FLAGS = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR
+"""Flags of bytecode that go into machine code; while a profiler runs, Numba takes others off as it calls a function."""
 
 _VALUES = type(None), type(...), bool, int, float, complex, str, bytes, np.generic, np.dtype
 
@@ -124,7 +127,7 @@ def _described_function(function: FunctionType, seen: dict[int, int]) -> _Descri
 @cache
 def _code_digest(code: CodeType) -> str:
     """Of bytecode and of the constants in it; not of line numbers and file names, which do not go into machine code."""
-    parts = *(getattr(code, name) for name in _CODE), _described(code.co_consts, (), {})
+    parts = *(getattr(code, name) for name in _CODE), code.co_flags & _CODE_FLAGS, _described(code.co_consts, (), {})
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 

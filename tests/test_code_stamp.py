@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import cProfile
 import importlib
 import os
 import pkgutil
@@ -18,7 +19,7 @@ from numba.core.caching import NullCache
 from numba.extending import is_jitted
 
 import rtradar
-from rtradar.code_stamp import UnknownCodeError, stamp_of
+from rtradar.code_stamp import UnknownCodeError, _code_digest, stamp_of
 from rtradar.compiled import _CodeOnDisk, compiled
 from rtradar.signal.noise import _add
 
@@ -315,3 +316,19 @@ def test_nothing_is_kept_by_numba_itself() -> None:
     files = [file for folder in ("rtradar", "validation") for file in (root / folder).rglob("*.py")]
     assert len(files) > 200
     assert not [file for file in files if "cache=True" in file.read_text(encoding="utf-8")]
+
+
+@compiled()
+def _plus_one(number: float) -> float:
+    return number + 1
+
+
+def test_a_stamp_stays_as_it_is_while_a_profiler_watches() -> None:
+    before = stamp_of(_plus_one)
+    _plus_one(1.0)
+    profiler = cProfile.Profile()
+    profiler.enable()
+    _plus_one(2.0)  # Numba takes flags off the function's code for the profiler's sake
+    profiler.disable()
+    _code_digest.cache_clear()
+    assert stamp_of(_plus_one) == before
