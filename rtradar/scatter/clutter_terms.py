@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -64,8 +65,18 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     RoomEchoes
     """
     points = returns.points[0, 0, :, 0]
-    if not any(crossed(wall, places[:, None], points).any() for wall in scene.walls for places in (radar.tx, radar.rx)):
+    behind = np.zeros(len(points), dtype=bool)
+    for wall, antennas in product(scene.walls, (radar.tx, radar.rx)):
+        behind |= crossed(wall, antennas[:, None], points).any(axis=0)
+    if not behind.any():
         return returns
+    before, after = returns.take(~behind), _let_through(returns.take(behind), radar, scene)
+    return _joined([replace(before, amplitude=before.at_nodes(after.frequency, radar), frequency=after.frequency), after])
+
+
+def _let_through(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
+    """`behind_walls` of points that some antennas see through a wall."""
+    points = returns.points[0, 0, :, 0]
     series, nodes = delayed(scene, radar, FURNITURE_NODES), sweep_nodes(radar, FURNITURE_NODES)
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
@@ -92,14 +103,19 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
                 off = max(off, float(size.max()))
     if not parts:
         return replace(returns, amplitude=np.zeros_like(returns.amplitude))
-    whole = replace(
-        parts[0],
+    whole = _joined(parts).economised(radar, ENOUGH)
+    return replace(whole, off_m=max(whole.off_m, off))
+
+
+def _joined(parts: Sequence[RoomEchoes]) -> RoomEchoes:
+    """Echoes of one object at the same nodes."""
+    return replace(
+        parts[-1],
         length=np.concatenate([part.length for part in parts], axis=-1),
         amplitude=np.concatenate([part.amplitude for part in parts], axis=-1),
         bounces=np.concatenate([part.bounces for part in parts]),
         points=np.concatenate([part.points for part in parts], axis=2),
-    ).economised(radar, ENOUGH)
-    return replace(whole, off_m=max(whole.off_m, off))
+    )
 
 
 def _most(left: Field) -> Array:

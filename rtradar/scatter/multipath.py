@@ -166,20 +166,12 @@ class Multipath:
         seen_before, seen_after = before.seen, after.seen
         if self._terms.delayed:
             echo = np.array(self._terms.echo)
-            lengths = self._terms.lengths(at, self._on_body(at, near), lengths)
+            lengths = self._terms.lengths(at, near.places(), self._part, lengths)
             bare, seen_before, seen_after = (array[..., echo] for array in (bare, seen_before, seen_after))
         out = np.empty((*shape, len(self._terms)), dtype=np.complex64)
         weights = tx_weight, self._ends.rx_weight[at.tx_index]
         weigh(bare, before.factor, after.factor, seen_before, seen_after, share, interval, line, *weights, out)
         return self._as_echoes(at.tx_index, lengths, out)
-
-    def _on_body(self, at: ChirpPoses, near: Nearby) -> NDArray[np.float64]:
-        """Where echoes leave the body, (chirp, echo, 3) world [m]."""
-        places = near.places()
-        # Between anchors they are on a chord; where there is none, any place will do.
-        size = np.sqrt(((places / at.semi_axes[self._part]) ** 2).sum(axis=-1, keepdims=True))
-        places = np.where(size > 0, places, 0.0) / np.where(size > 0, size, 1.0)
-        return np.asarray(at.centres[:, self._part] + np.einsum("ceij,cej->cei", at.frames[:, self._part], places))
 
     def course(self, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:
         """Corners (corner, 3) of a path, by its name, from the middle of the array over a point (3,) and back [m]."""

@@ -97,14 +97,16 @@ class PathTerms:
             for met in self.met
         ]
 
-    def lengths(self, at: ChirpPoses, places: Array, length: Array) -> Array:
+    def lengths(self, at: ChirpPoses, places: Array, part: NDArray[np.int64], length: Array) -> Array:
         """Lengths of all columns.
 
         Parameters
         ----------
         at : ChirpPoses
         places : (chirp, echo, 3) float64
-            Where the echoes leave the body, world [m].
+            Where the echoes leave the body, in the axes of their part [m]; on a chord or on the ellipsoid.
+        part : (echo,) int64
+            Part of each echo.
         length : (chirp, rx, echo) float64
             Without the delays of slabs [m].
 
@@ -118,7 +120,8 @@ class PathTerms:
         column, wall_of, passage = self._lists
         out = np.empty((*length.shape[:2], len(self)))
         echo = np.array(self.echo)
-        _longer(self._tx, self._rx, at.tx_index, places, length, echo, column, wall_of, passage, out)
+        body = at.centres, at.frames, at.semi_axes, part
+        _longer(self._tx, self._rx, at.tx_index, places, *body, length, echo, column, wall_of, passage, out)
         return out
 
     def _listed(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
@@ -159,19 +162,36 @@ def _delay(antenna, place, first, last, passes, passage):  # type: ignore[no-unt
     return total
 
 
+@taken_in()
+def _on_surface(local, axes, centre, frame, out):  # type: ignore[no-untyped-def]
+    """Where the ray from a part's centre through a point in its axes leaves the ellipsoid; ``out`` in the world."""
+    x, y, z = local
+    size = math.sqrt((x / axes[0]) ** 2 + (y / axes[1]) ** 2 + (z / axes[2]) ** 2)
+    # Where an echo has no specular point, any place will do.
+    scale = 1 / size if size > 0 else 0.0
+    for row in range(3):
+        out[row] = centre[row] + scale * (frame[row, 0] * x + frame[row, 1] * y + frame[row, 2] * z)
+
+
 @compiled(parallel=True)
-def _longer(tx, rx, tx_index, places, length, echo, column, passes, passage, out):  # type: ignore[no-untyped-def]
+def _longer(  # type: ignore[no-untyped-def]
+    tx, rx, tx_index, local, centres, frames, semi_axes, part, length, echo, column, passes, passage, out
+):
     """Fill ``out (chirp, rx, column)``; ``column (column, 2, 3)``: leg, first passage and the one after the last, each way."""
     chirps, receivers, columns = out.shape
     for chirp in prange(chirps):
         transmitter = tx_index[chirp]
+        places = np.empty((len(part), 3))
+        for one in range(len(part)):
+            own = part[one]
+            _on_surface(local[chirp, one], semi_axes[own], centres[chirp, own], frames[chirp, own], places[one])
         for number in range(columns):
-            place = places[chirp, echo[number]]
+            place = places[echo[number]]
             leg, first, last = column[number, 0, 0], column[number, 0, 1], column[number, 0, 2]
             more = _delay(tx[leg, transmitter], place, first, last, passes, passage) if last > first else 0.0
             leg, first, last = column[number, 1, 0], column[number, 1, 1], column[number, 1, 2]
             for receiver in range(receivers):
-                own = length[chirp, receiver, echo[number]] + more
+                whole = length[chirp, receiver, echo[number]] + more
                 if last > first:
-                    own += _delay(rx[leg, transmitter, receiver], place, first, last, passes, passage)
-                out[chirp, receiver, number] = own
+                    whole += _delay(rx[leg, transmitter, receiver], place, first, last, passes, passage)
+                out[chirp, receiver, number] = whole
