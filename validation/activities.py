@@ -1,9 +1,10 @@
-"""How well activities are told apart: the data sets and trainings behind README's figures, and what they came to.
+"""How well activities are told apart: the data sets and trainings of docs/classification.md, and what they gave.
 
     python validation/activities.py OUT [--only NAME,NAME,...] [--list]
 
 Every step is one command of `rtradar` and goes on where it was stopped, so this may be killed and started again. All of it takes
-many hours on two cores; README tells which steps. Real recordings are those that the environment variable RTRADAR_MOCAP names.
+many hours on two cores; docs/classification.md has what came of it. Real recordings are those that the environment variable
+RTRADAR_MOCAP names.
 
 Judged are the accuracies asked for (97 % by the paper's folds, 90 % by subject), and that what must be at chance is: clouds of
 noise alone, and how a cloud was made, may be above a quarter by what one time in a hundred is luck, no more. How clouds would be

@@ -33,7 +33,7 @@ class Row:
     tolerance: float | None  # None: reported, not judged
     passed: bool
     key: str = field(default_factory=script_name)  # of the claim, as `rtradar validate --only` takes it
-    says: str = ""  # the claim in words; rows that say the same, with the same limit, are one line of the README's table
+    says: str = ""  # the claim in words; rows that say the same, with the same limit, are one line of docs/validation.md's table
     cases: int = 1  # of which this is the worst
 
 

@@ -238,7 +238,7 @@ def figures(points: list[Point]) -> str:
 
 
 def table(points: dict[tuple[str, str, str], Point]) -> str:
-    """For a README: a line a rung, then a line a setting of a dial; from and to over the activities."""
+    """For docs/choosing-a-level.md: a line a rung, then a line a setting of a dial; from and to over the activities."""
     lines = ["| rung | " + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS) + " |"]
     lines.append("|---" * (1 + 3 * len(PRESETS)) + "|")
 

@@ -3,7 +3,7 @@ Choose a rung
 =============
 
 The rungs of the ladder trade accuracy for time. Here one pose of a kick, seen from the side, meets each of them; its error is
-set against what it costs. README has the same for whole runs, both radars and all activities.
+set against what it costs. The page "Choosing a fidelity level" has the same for whole runs, both radars and all activities.
 """
 
 import os

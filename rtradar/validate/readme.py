@@ -1,4 +1,4 @@
-"""The table of all figures, and where it stands in a README."""
+"""The table of all figures, and where it stands in a markdown page: docs/validation.md."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from rtradar.files import atomic_file, read_bytes
 from rtradar.validate.outcome import Outcome, Row, used_up
 
 BEGIN, END = "<!-- validation: begin -->", "<!-- validation: end -->"
-"""What stands before and after the table in a README."""
+"""What stands before and after the table in the page."""
 
 _MOST_BYTES = 10_000_000
 
@@ -19,7 +19,7 @@ KEYS = ("sphere", "ellipsoid", "plate", "path", "point", "doppler", "edge", "bod
 
 
 def markdown(outcomes: Sequence[Outcome]) -> str:
-    """A table for a README: a line for each thing that is claimed, with the worst of its judged rows."""
+    """The table for docs/validation.md: a line for each thing that is claimed, with the worst of its judged rows."""
     groups: dict[tuple[str, ...], list[Row]] = {}
     rows = [row | {"script": outcome.claim.script.name} for outcome in outcomes for row in outcome.rows]
     of_judged = [row for row in rows if row["tolerance"] is not None]
