@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from rtradar.scatter import register_rung, scattering_length
     from rtradar.scene import Scene
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 # OpenMP, which runs compiled loops, keeps threads that have nothing to do spinning; they would take the cores from threads that
 # have. Read when OpenMP is loaded, with the first compiled loop that runs in parallel.
