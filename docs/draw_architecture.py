@@ -20,7 +20,7 @@ import grimp
 import networkx as nx
 
 ROOT = Path(__file__).parents[1]
-GROUND = {"code_stamp", "compiled", "conventions", "errors", "phasor", "spool", "threads", "__main__"}
+GROUND = {"conventions", "errors", "kernels", "system", "__main__"}
 """What everybody uses, and what nobody does: not drawn."""
 
 _ROW, _TOP, _LEFT, _WIDTH = 30, 48, 250, 1180

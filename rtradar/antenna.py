@@ -10,8 +10,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.checks import check_number, shown
 from rtradar.errors import InputError
+from rtradar.system.checks import check_number, shown
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
 _PATTERNS = ("isotropic", "cosine", "dipole", "table")

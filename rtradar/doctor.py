@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rtradar.compiled import CacheWarning, try_cache
 from rtradar.errors import BackendError
-from rtradar.files import write_json
-from rtradar.gpu import gpu_for_ffts
-from rtradar.trace.backend import VARIANTS, BackendWarning, Kind, select
-from rtradar.trace.llvm import candidates
-from rtradar.trace.verdict import judge
+from rtradar.kernels.jit import CacheWarning, try_cache
+from rtradar.system.files import write_json
+from rtradar.system.gpu import gpu_for_ffts
+from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
+from rtradar.trace.backends.llvm import candidates
+from rtradar.trace.backends.verdict import judge
 
 PACKAGES = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "h5py", "zarr", "matplotlib")
 """Packages whose versions tell most when something goes wrong."""

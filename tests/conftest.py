@@ -13,8 +13,8 @@ import hypothesis
 import pytest
 
 import rtradar as rt
-from rtradar import threads
-from rtradar.trace.backend import Backend, available, select, use
+from rtradar.system import threads
+from rtradar.trace.backends.backend import Backend, available, select, use
 
 # The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
 hypothesis.settings.register_profile("rtradar", deadline=None, derandomize=True, database=None)
@@ -46,7 +46,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
-    """A backend, in use: ``rtradar.trace.backend.use(backend)`` gives Mitsuba. Its kernels and memory are let go after."""
+    """A backend, in use: ``rtradar.trace.backends.backend.use(backend)`` gives Mitsuba. Its memory is released after."""
     chosen = select(request.param)
     use(chosen)
     yield chosen
@@ -59,7 +59,7 @@ def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
 
 @pytest.fixture
 def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Threads of `rtradar.threads`, however many cores there are."""
+    """Threads of `rtradar.system.threads`, however many cores there are."""
     monkeypatch.setenv(threads.THREADS_VARIABLE, "4")
     threads._pool.cache_clear()
     yield

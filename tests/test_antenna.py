@@ -15,10 +15,10 @@ from scipy.integrate import quad
 import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.scatter import build_rung, chirp_poses
-from rtradar.scatter.analytic import far_field_echo
-from rtradar.scatter.antenna_gain import leg_gain, mirror_points
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.poses import ChirpPoses
+from rtradar.scatter.antenna_gain import leg_gain, specular_points
+from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.models.analytic import far_field_echo
+from rtradar.scatter.specular_point.solver import mirror
 
 BODY = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
 
@@ -144,17 +144,17 @@ def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> Non
         along = back[2] / np.linalg.norm(back)
         expected = ahead**3 * math.cos(math.pi / 2 * along) / math.sqrt(1 - along**2)
         found.append(abs(after.amplitude[0, chirp, rx, part] / before.amplitude[0, chirp, rx, part]) / expected)
-    # By the centres of the parts here, by their mirror points there: up to a few degrees at 2 m.
+    # By the centres of the parts here, by their specular points there: up to a few degrees at 2 m.
     assert np.median(found) == pytest.approx(1, abs=0.02)
     assert max(np.abs(np.log(found))) < 0.3
 
 
-def test_directions_are_those_of_the_mirror_points() -> None:
+def test_directions_are_those_of_the_specular_points() -> None:
     radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0))
     at = chirp_poses(radar, BODY, np.arange(2))
-    # The length over the exact mirror point is the least of all ways over the surface's near side; one over a point beside it is
-    # longer by the square of how far beside.
-    points = mirror_points(at)
+    # The length over the exact specular point is the least of all ways over the surface's near side; one over a point beside it
+    # is longer by the square of how far beside.
+    points = specular_points(at)
     ways = np.linalg.norm(points - at.tx[:, None, None], axis=-1) + np.linalg.norm(points - at.rx[:, :, None], axis=-1)
     exact = mirror(*at[1:])[0]
     assert (ways - exact).min() > -1e-9

@@ -19,13 +19,13 @@ from numba.core.caching import NullCache
 from numba.extending import is_jitted
 
 import rtradar
-from rtradar.code_stamp import UnknownCodeError, _code_digest, stamp_of
-from rtradar.compiled import _CodeOnDisk, compiled
+from rtradar.kernels.code_stamp import UnknownCodeError, _code_digest, stamp_of
+from rtradar.kernels.jit import _CodeOnDisk, compiled
 from rtradar.signal.noise import _add
 
 ESTATE = {
     "caller": """
-from rtradar.compiled import compiled
+from rtradar.kernels.jit import compiled
 from estate import far
 from estate.near import OFFSET, near, kept, table
 
@@ -39,13 +39,13 @@ def other(number):
 """,
     "near": """
 import numpy as np
-from rtradar.compiled import compiled, taken_in
+from rtradar.kernels.jit import compiled, inlined
 from estate.far import beyond
 
 OFFSET = 1000.0
 table = np.array([0.0, 20000.0])
 
-@taken_in(fastmath=set())
+@inlined(fastmath=set())
 def near(number, weight=1.0):
     return beyond(number) * weight
 
@@ -54,15 +54,15 @@ def kept(number):
     return number * 100.0
 """,
     "far": """
-from rtradar.compiled import taken_in
+from rtradar.kernels.jit import inlined
 WEIGHT = 10.0
 SIGN = 1.0
 
-@taken_in()
+@inlined()
 def beyond(number):
     return number * WEIGHT
 
-@taken_in()
+@inlined()
 def by_module(number):
     return number * SIGN
 
@@ -270,7 +270,7 @@ def test_settings_of_numba_go_into_it(monkeypatch: pytest.MonkeyPatch, setting: 
 def compiled_functions() -> dict[str, Any]:
     found = {}
     for module in pkgutil.walk_packages(rtradar.__path__, "rtradar."):
-        if module.name not in ("rtradar.__main__", "rtradar.trace.probe"):
+        if module.name not in ("rtradar.__main__", "rtradar.trace.backends.probe"):
             for value in vars(importlib.import_module(module.name)).values():
                 if is_jitted(value):
                     found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value
@@ -286,23 +286,33 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
 
 
 @pytest.mark.parametrize(
-    ("taken_in", "by", "not_by"),
+    ("inlined", "by", "not_by"),
     [
-        ("rtradar.phasor.phasor", "rtradar.signal.spreading._spread", "rtradar.signal.noise._add"),
-        ("rtradar.scatter.small_vectors.dot", "rtradar.scatter.fresnel_zone._zone_shares", "rtradar.scatter.mirror._mirror"),
-        ("rtradar.compiled.on_cache_lines", "rtradar.process.slow_time_dft._add_power", "rtradar.scatter.mirror._mirror"),
-        ("rtradar.scatter.mirror._newton", "rtradar.scatter.mirror._mirror", "rtradar.process.slow_time_dft._add_power"),
+        ("rtradar.kernels.phasor.phasor", "rtradar.signal.spreading._spread", "rtradar.signal.noise._add"),
+        (
+            "rtradar.kernels.small_vectors.dot",
+            "rtradar.scatter.fresnel_zones.visible_fraction._zone_shares",
+            "rtradar.scatter.specular_point.solver._mirror",
+        ),
+        (
+            "rtradar.kernels.jit.on_cache_lines",
+            "rtradar.process.slow_time_dft._add_power",
+            "rtradar.scatter.specular_point.solver._mirror",
+        ),
+        (
+            "rtradar.scatter.specular_point.solver._newton",
+            "rtradar.scatter.specular_point.solver._mirror",
+            "rtradar.process.slow_time_dft._add_power",
+        ),
     ],
 )
-def test_stamps_of_the_package_have_what_is_taken_in(
-    monkeypatch: pytest.MonkeyPatch, taken_in: str, by: str, not_by: str
-) -> None:
+def test_stamps_of_the_package_have_what_is_taken_in(monkeypatch: pytest.MonkeyPatch, inlined: str, by: str, not_by: str) -> None:
     def named(name: str) -> Any:
         module, _, attribute = name.rpartition(".")
         return getattr(importlib.import_module(module), attribute)
 
     before = stamp_of(named(by)), stamp_of(named(not_by))
-    function = named(taken_in)
+    function = named(inlined)
     function = getattr(function, "py_func", function)
     code = function.__code__
     monkeypatch.setattr(function, "__code__", code.replace(co_consts=(*code.co_consts, "changed")))

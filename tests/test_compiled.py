@@ -16,11 +16,11 @@ from numba.core import event
 from numba.core.caching import NullCache
 from numba.core.errors import TypingError
 
-import rtradar.compiled as compiling
-from rtradar.compiled import CacheWarning, compiled, is_on_disk, on_cache_lines, taken_in, try_cache
+import rtradar.kernels.jit as compiling
+from rtradar.kernels.jit import CacheWarning, compiled, inlined, is_on_disk, on_cache_lines, try_cache
 
 
-@taken_in()
+@inlined()
 def half(number: float) -> float:
     return number / 2
 

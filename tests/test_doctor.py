@@ -9,9 +9,9 @@ import pytest
 
 from rtradar import doctor
 from rtradar.errors import InputError
-from rtradar.trace import backend as backends
-from rtradar.trace.llvm import Library
-from rtradar.trace.verdict import Verdict
+from rtradar.trace.backends import backend as backends
+from rtradar.trace.backends.llvm import Library
+from rtradar.trace.backends.verdict import Verdict
 
 LIBRARIES = [Library("/lib/libLLVM-15.so.1", "environment"), Library("/venv/libLLVM.so.23.1", "wheel")]
 

@@ -64,7 +64,7 @@ def runs(process: int) -> bool:
 CHILD = """
 import subprocess, sys, time
 from rtradar.cli.ending import end_well
-from rtradar.files import atomic_file, temporary_folder
+from rtradar.system.files import atomic_file, temporary_folder
 end_well(lambda: "two\\nlines")
 child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(600)"])
 with temporary_folder(inside=sys.argv[1]) as folder, atomic_file(sys.argv[1] + "/new") as file:

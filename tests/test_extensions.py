@@ -19,8 +19,8 @@ from rtradar.cli import main
 from rtradar.motion.load import READERS
 from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
-from rtradar.registry import Registry
 from rtradar.scatter import RUNGS, build_rung
+from rtradar.system.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
 REGISTRIES: tuple[Registry, ...] = (RUNGS, READERS, PRESETS, DETECTORS)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import rtradar as rt
-from rtradar.checks import printable
+from rtradar.system.checks import printable
 
 NAME = b"caf\xe9"
 BVH = """HIERARCHY

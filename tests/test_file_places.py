@@ -12,9 +12,11 @@ import pytest
 
 from rtradar.cli import main
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, check_place, write_json
+from rtradar.system.files import atomic_file, check_place, write_json
 
-WRITE = "import sys; from rtradar.files import write_json; print('before'); write_json(sys.argv[1], {'a': 1}); print('after')"
+WRITE = (
+    "import sys; from rtradar.system.files import write_json; print('before'); write_json(sys.argv[1], {'a': 1}); print('after')"
+)
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")

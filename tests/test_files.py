@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.files import read_json, temporary_folder, write_json
+from rtradar.system.files import read_json, temporary_folder, write_json
 
 CONTENT = {"speed": [1, 2.5], "name": "walk"}
 TEXT = '{\n "speed": [\n  1,\n  2.5\n ],\n "name": "walk"\n}\n'

@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from rtradar import gpu
-from rtradar.gpu import gpu_for_ffts, gpu_name, has_nvidia_gpu
+from rtradar.system import gpu
+from rtradar.system.gpu import gpu_for_ffts, gpu_name, has_nvidia_gpu
 
 
 class Driver:

@@ -24,9 +24,9 @@ import trimesh
 import zarr
 
 import rtradar as rt
-from rtradar import files
 from rtradar.cli import main
-from rtradar.files import open_regular, read_bytes
+from rtradar.system import files
+from rtradar.system.files import open_regular, read_bytes
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX")
 
@@ -163,7 +163,7 @@ end
 @pytest.fixture(scope="module")
 def imported() -> None:
     """What is slow to import is, before time is taken."""
-    for name in ("torch", "matplotlib.pyplot", "rtradar.pipeline.view", "rtradar.campaign"):
+    for name in ("torch", "matplotlib.pyplot", "rtradar.pipeline.pictures.run_view", "rtradar.campaign"):
         pytest.importorskip(name)
 
 

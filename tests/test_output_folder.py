@@ -16,9 +16,9 @@ from typing import Any
 
 import pytest
 
-from rtradar import output_folder
 from rtradar.errors import InputError
-from rtradar.output_folder import OutputFiles, atomic_folder, check_whole
+from rtradar.system import output_folder
+from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole
 
 KIND = OutputFiles(
     "list.json", r"list\.json|maps|clouds|plan\.png|learning-\d+\.png|store\.zarr/(zarr\.json|c/\d+)", r"store\.zarr(/c)?"
@@ -398,7 +398,7 @@ def test_a_command_whose_files_are_not_foreseen_is_a_mistake_of_ours(tmp_path: P
 
 SLOW = """
 import json, pathlib, sys, time
-from rtradar import output_folder
+from rtradar.system import output_folder
 from tests_kind import KIND
 out = pathlib.Path(sys.argv[1])
 real = output_folder._Directory.move
@@ -412,7 +412,7 @@ with output_folder.atomic_folder(out, KIND) as folder:
         (folder / name).write_text("first")
     (folder / "list.json").write_text(json.dumps({"files": KIND.list_of(folder)}))
 """
-KIND_FILE = f"from rtradar.output_folder import OutputFiles\nKIND = {KIND!r}\n"
+KIND_FILE = f"from rtradar.system.output_folder import OutputFiles\nKIND = {KIND!r}\n"
 
 
 def command(tmp_path: Path, text: str, *words: str) -> tuple[list[str], dict[str, str]]:
@@ -443,7 +443,7 @@ def test_two_processes_that_end_at_once_leave_what_is_of_one(tmp_path: Path) -> 
 
 KILLED = """
 import json, os, pathlib, sys
-from rtradar import output_folder
+from rtradar.system import output_folder
 from tests_kind import KIND
 out, last = pathlib.Path(sys.argv[1]), int(sys.argv[2])
 calls = 0

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtradar.errors import InputError
-from rtradar.output_folder import OutputFiles, atomic_folder
+from rtradar.system.output_folder import OutputFiles, atomic_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of POSIX")
 

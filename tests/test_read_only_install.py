@@ -19,8 +19,8 @@ COMPILES_TWO = """
 import multiprocessing
 import numpy as np
 from rtradar.cli import main
-from rtradar.compiled import check_cache, compiled, is_on_disk
-from rtradar.scatter.small_vectors import dot
+from rtradar.kernels.jit import check_cache, compiled, is_on_disk
+from rtradar.kernels.small_vectors import dot
 
 @compiled()
 def squared(vector):

@@ -13,8 +13,8 @@ import rtradar as rt
 from rtradar.clouds import RdtCloud
 from rtradar.clouds.sampling import UniformSample
 from rtradar.errors import InputError
-from rtradar.seeds import MOST_SEED, check_seed, stream, word
 from rtradar.signal import Noise
+from rtradar.system.seeds import MOST_SEED, check_seed, stream, word
 
 RADAR = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=16, frame_duration_s=0.01)
 WORD = 2**32

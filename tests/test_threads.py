@@ -14,15 +14,15 @@ from functools import partial
 
 import pytest
 
-from rtradar import threads
-from rtradar.threads import THREADS_VARIABLE, environment_of, in_threads, thread_count, thread_limit
+from rtradar.system import threads
+from rtradar.system.threads import THREADS_VARIABLE, environment_of, in_threads, thread_count, thread_limit
 
 COUNT = """
-import numba, rtradar.threads
-from rtradar.trace.backend import select, use
+import numba, rtradar.system.threads
+from rtradar.trace.backends.backend import select, use
 use(select("llvm"))
 import drjit
-print(rtradar.threads._pool()._max_workers, numba.get_num_threads(), drjit.thread_count())
+print(rtradar.system.threads._pool()._max_workers, numba.get_num_threads(), drjit.thread_count())
 """
 
 
@@ -103,7 +103,7 @@ def test_work_is_not_kept_for_threads_that_have_not_woken() -> None:
 def test_a_forked_process_has_threads_of_its_own() -> None:
     program = """
 import os
-from rtradar.threads import in_threads
+from rtradar.system.threads import in_threads
 in_threads(str, range(4))
 child = os.fork()
 if child == 0:

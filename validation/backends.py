@@ -27,8 +27,8 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
-from rtradar.compiled import compiled
-from rtradar.trace.backend import available, select, use
+from rtradar.kernels.jit import compiled
+from rtradar.trace.backends.backend import available, select, use
 from rtradar.trace.body_tracer import BodyTracer, Hits
 from rtradar.trace.unit_sphere import SUBDIVISIONS
 

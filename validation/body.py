@@ -29,7 +29,7 @@ import rtradar as rt
 from rtradar.motion import place
 from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_rung
-from rtradar.scatter.poses import anchor_step
+from rtradar.scatter.common.poses import anchor_step
 
 Array = NDArray[np.float64]
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
@@ -55,7 +55,7 @@ def tangents(unit: Array) -> tuple[Array, Array]:
 
 
 def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
-    """|F|^2 (n,) and mirror point (n, 3) of ellipsoids about the origin for antennas (n, 3), axes (n, 3)."""
+    """|F|^2 (n,) and specular point (n, 3) of ellipsoids about the origin for antennas (n, 3), axes (n, 3)."""
 
     def on_surface(unit: Array, s: float, t: float) -> Array:
         east, north = tangents(unit)

@@ -1,8 +1,9 @@
 """The take that exists as C3D and as AMC, CMU 135_02: how far apart the joints are that both give, joint by joint.
 
-The offsets of `rtradar.motion.markers` were set by the first half of the take; only the second half is judged, frame k beside
-frame k. It is the same person: how well the offsets fit others is not measured here. The median of each joint must stay within
-6 cm; beside it stand the distance that 99 % of the frames keep, the largest, the frame of that, and the share beyond 6 cm.
+The offsets of `rtradar.motion.formats.markers` were set by the first half of the take; only the second half is judged, frame k
+beside frame k. It is the same person: how well the offsets fit others is not measured here. The median of each joint must stay
+within 6 cm; beside it stand the distance that 99 % of the frames keep, the largest, the frame of that, and the share beyond 6
+cm.
 
 Two reasons are measured. How far the AMC's joint is, in the median, from the one point that fits it best in the axes of three
 markers of its segment ("rigid"): no point fixed to the markers can be nearer. And how far the knee is bent, in all frames and
@@ -26,10 +27,10 @@ from numpy.typing import NDArray
 from rows import Row, judged, main, reported
 
 import rtradar as rt
-from rtradar.motion.c3d import LONGEST_GAP_S, bridged, read_markers
-from rtradar.motion.joints import to_nodes
-from rtradar.motion.markers import NEEDED
-from rtradar.motion.names import NODES
+from rtradar.motion.formats.c3d import LONGEST_GAP_S, bridged, read_markers
+from rtradar.motion.formats.markers import NEEDED
+from rtradar.motion.retarget import to_nodes
+from rtradar.motion.skeleton_names import NODES
 from rtradar.pipeline.agreement import chamfer
 
 LIMIT_CM = 6.0

@@ -25,10 +25,10 @@ from numpy.typing import NDArray
 from rows import Row, judged, main, reported
 from scipy.special import gammaincc
 
-from rtradar.compiled import compiled
+from rtradar.kernels.jit import compiled
 from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, range_spectrum
-from rtradar.process.cfar_law import order_rank
-from rtradar.process.tapers import hann
+from rtradar.process.detection.cfar_thresholds import order_rank
+from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
 
 GUARD, TRAIN, QUANTILE = 2, 4, 0.75

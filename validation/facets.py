@@ -23,7 +23,7 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.scatter.facet_scattering import facet_scattering
+from rtradar.scatter.facets.target import facet_scattering
 
 Array = NDArray[np.float64]
 SPEED_OF_LIGHT = 299_792_458.0

@@ -5,7 +5,7 @@ arrays: the same before all antennas of both radars, of which the corner channel
 time: a sphere passes before an upright ellipsoid, and the power beside the Doppler line of the ellipsoid is compared.
 
 The reference adds up the points of ``physical_optics.py`` that the occluder does not hide from either antenna, by the
-discriminant of the ray and the occluder; it knows nothing of mirror points, of zones or of meshes. Errors are relative to
+discriminant of the ray and the occluder; it knows nothing of specular points, of zones or of meshes. Errors are relative to
 the free field.
 
     python validation/fresnel.py [--quick] [--json FILE]
@@ -26,7 +26,7 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
-from rtradar.scatter.fresnel import Fresnel, fresnel_scattering
+from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -12,7 +12,7 @@ from fuzz_kit import Target, written
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import load_motion
-from rtradar.motion.markers import NEEDED
+from rtradar.motion.formats.markers import NEEDED
 
 BLOCK = 512
 FRAMES, RATE_HZ = 3, 100.0

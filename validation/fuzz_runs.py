@@ -11,8 +11,8 @@ import numpy as np
 from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
-from rtradar.pipeline.view import load_linked
-from rtradar.report.linked_page import linked_data
+from rtradar.pipeline.pictures.run_view import load_linked
+from rtradar.report.view.page import linked_data
 
 MAPS = {
     "time": np.array([0.002, 0.004]),

@@ -80,7 +80,7 @@ STARVED = """
 import sys, threading
 import rtradar as rt
 from rtradar.motion import synthetic_motion
-from rtradar.threads import in_threads, thread_count
+from rtradar.system.threads import in_threads, thread_count
 awake, duration_s, out = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
 asleep = threading.Event()
 if not awake:

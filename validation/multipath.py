@@ -29,12 +29,13 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.pipeline.room import RoomIf
+from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.process import angle, power_map, range_spectrum
-from rtradar.scatter import clutter_shadow, multipath
-from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.multipath import Multipath
-from rtradar.scatter.wall_paths import WallPath
+from rtradar.scatter.clutter import body_shadow as clutter_shadow
+from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.multipath import multipath
+from rtradar.scatter.multipath.image_paths import WallPath
+from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Scene, Surface, Wall, material, room_walls
 from rtradar.signal import synthesize
 
@@ -113,7 +114,7 @@ def length_rows(quick: bool) -> Iterator[Row]:
         for seed, axes in enumerate(SHAPES.values()):
             body = Mover((0.0, 0.4, 1.2), axes, Rotation.random(random_state=seed).as_matrix(), (-1.2, 0.6, 0.1))
             rung = Multipath(radar, body, Scene(walls=box()), order=2)  # type: ignore[arg-type]
-            # Between two anchors, where the mirror point is not known beforehand.
+            # Between two anchors, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
             echoes = rung.echoes(chirps)
             poses = body.at((chirps + 0.5) * radar.chirp_duration_s)

@@ -16,7 +16,7 @@ the modules that import its module, however indirectly, begin without; so no mut
 Survivors are printed with their change. Those that cannot be noticed stand in `mutation_equivalent.json`, each with its reason.
 With --json, what was run before is not run again. Not a claim of `rtradar validate`: it takes an hour, and judges the tests.
 
-    nice python validation/mutation.py [--count 80] [--seed 0] [--only motion/markers] [--json FILE]
+    nice python validation/mutation.py [--count 80] [--seed 0] [--only formats/markers] [--json FILE]
 """
 
 from __future__ import annotations
@@ -345,7 +345,7 @@ class Tree:
             node.name
             for node in ast.walk(tree)
             if isinstance(node, ast.FunctionDef)
-            and re.search(r"compiled|taken_in|njit|jit", " ".join(map(ast.unparse, node.decorator_list)))
+            and re.search(r"compiled|inlined|njit|jit", " ".join(map(ast.unparse, node.decorator_list)))
         }
         return bool(by_numba) and (mutant.function == "<module>" or mutant.function.split(".")[0] in by_numba)
 

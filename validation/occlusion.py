@@ -1,9 +1,9 @@
 """Occlusion: what `specular` does where one part hides another, against physical optics with a geometric shadow.
 
-A part straight behind another must return nothing. Half covered it returns all or nothing, by its mirror point; how far
+A part straight behind another must return nothing. Half covered it returns all or nothing, by its specular point; how far
 that is from physical optics is reported over the covered share. Then the fade in time: a sphere passes before an upright
 ellipsoid, and the power beside the Doppler line of the ellipsoid is compared for ramps of several lengths, and for the
-rung itself with anchors 10 ms apart, whatever the instant between them at which the mirror point goes.
+rung itself with anchors 10 ms apart, whatever the instant between them at which the specular point goes.
 
 The reference adds up the points of ``physical_optics.py`` that the occluder, a sphere, does not hide from the antenna, by
 the distance of its centre from each ray; the edge is softened over one cell, so that it converges as the square of it.
@@ -28,7 +28,7 @@ from scipy.signal.windows import hann
 
 import rtradar as rt
 from rtradar.body.body import Poses
-from rtradar.compiled import compiled
+from rtradar.kernels.jit import compiled
 from rtradar.scatter import build_rung
 
 Array = NDArray[np.float64]
@@ -245,7 +245,7 @@ def fade_rows(quick: bool) -> Iterator[Row]:
     for band in BANDS:
         target = Target.upright(TARGET, band.centre, band.density / (2.0 if quick else 1.0))
         times = band.radar.chirp_times(band.cycles)
-        # Instants at which the mirror point comes free, over one interval between anchors, in whole cycles.
+        # Instants at which the specular point comes free, over one interval between anchors, in whole cycles.
         late = np.linspace(0, round(10e-3 / band.cycle_s), 3 if quick else 11)[:-1].round().astype(int)
         for speed in (1.5,) if quick else (0.5, 1.5, 4.0):
             claim = f"{band.name}, {speed:g} m/s"

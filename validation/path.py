@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.scatter import build_rung
-from rtradar.scatter.mirror import mirror
+from rtradar.scatter.specular_point.solver import mirror
 
 Array = NDArray[np.float64]
 Vector = list[Decimal]

@@ -5,7 +5,7 @@
 with exact spherical path lengths. On p = A u, u on the unit sphere, n dS = det(A) A^-1 u dOmega, and what an antenna at T
 lights is exactly a cap, u.T' > 1 with T' = A^-1 T. So in polar coordinates about the middle of both caps the border is
 known in closed form, and its two corners, where the border goes over from one cap to the other: Gauss-Legendre rules
-between them converge exponentially. Nothing here knows of mirror points, of meshes or of rays.
+between them converge exponentially. Nothing here knows of specular points, of meshes or of rays.
 """
 
 from __future__ import annotations
@@ -84,10 +84,10 @@ def lit_points(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, dens
 
 
 def mirror_contribution(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0) -> complex:
-    """What the mirror point alone adds to the integral, with all of its higher orders: PO without its terminator [m].
+    """What the specular point alone adds to the integral, with all of its higher orders: PO without its terminator [m].
 
-    The integral along each meridian from the mirror point to the border is that down the valley of steepest descent from
-    the mirror point less that from the border. The first is taken here, on a straight line into complex polar angles, the
+    The integral along each meridian from the specular point to the border is that down the valley of steepest descent from
+    the specular point less that from the border. The first is taken here, on a straight line into complex polar angles, the
     second left out: it is the wave of the terminator, which physical optics invents.
     """
     k = wave_number(frequency)

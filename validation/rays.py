@@ -36,9 +36,9 @@ from scipy.signal.windows import chebwin
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.scatter.rays import Rays
-from rtradar.scatter.rays_scattering import rays_scattering
-from rtradar.scatter.tubes import EllipsoidGrid
+from rtradar.scatter.models.rays import Rays
+from rtradar.scatter.ray_tubes.target import rays_scattering
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid
 
 Array = NDArray[np.float64]
 SPEED_OF_LIGHT = 299_792_458.0

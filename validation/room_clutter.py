@@ -23,8 +23,8 @@ from rows import Row, judged, main, reported
 from scipy.signal.windows import chebwin
 
 import rtradar as rt
-from rtradar.pipeline.room import RoomIf
-from rtradar.scatter.clutter import Clutter
+from rtradar.pipeline.rooms.clutter_if import RoomIf
+from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Surface, Wall, material, room_walls
 
 Array = NDArray[np.float64]

@@ -23,7 +23,7 @@ from rows import Row, main, reported
 import rtradar as rt
 from rtradar.pipeline.agreement import chamfer
 from rtradar.process import CLUTTER_REMOVALS
-from rtradar.process.detection_score import DetectionScore, cell_noise_power, score, target_cells
+from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
 
 ACTIVITY, MARGIN_DB = "walk", 13.0
 ROOMS = ("living-room", "corridor")

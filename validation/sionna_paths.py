@@ -21,9 +21,9 @@ import rows
 from numpy.typing import NDArray
 from rows import Row, main
 
-from rtradar.scatter.wall_paths import corners, wall_paths
+from rtradar.scatter.multipath.image_paths import corners, wall_paths
 from rtradar.scene import Surface, material, room_walls
-from rtradar.trace.backend import select
+from rtradar.trace.backends.backend import select
 
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="multipath") for kind in (rows.judged, rows.reported))

@@ -19,7 +19,7 @@ from rows import Row, main, reported
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.process import peaks
+from rtradar.process.angles import peaks
 
 FAR_M = 0.3
 

@@ -12,7 +12,7 @@ frequency (1e-4).
 Walk: a recording of CMU, SNR 20 dB, one channel. The torso's line is the highest cell of each column, against the mean
 range rate of the three torso parts. A swing of a leg is when a foot comes at 2.4 m/s and more; its line is the highest cell
 among those faster than the middle between the foot and the next fastest part of the body, wherever these are 6 bins apart.
-The foot's range rate is that of its mirror point, found by a general minimiser: a foot turns while it swings, and its
+The foot's range rate is that of its specular point, found by a general minimiser: a foot turns while it swings, and its
 middle is up to 0.2 m/s slower or faster.
 
     RTRADAR_MOCAP=folder python validation/spectrogram.py [--quick] [--json FILE]     # without it, the pendulum alone
@@ -168,7 +168,7 @@ class Gait:
 
     times: Array
     parts: Array  # (time, part), of the middles
-    feet: dict[str, Array]  # of the mirror points
+    feet: dict[str, Array]  # of the specular points
 
     @classmethod
     def of(cls, radar: rt.Radar, body: Body) -> Gait:

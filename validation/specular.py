@@ -3,9 +3,9 @@
 Far: one kilometre, over shape and aspect, against the cross-section of geometric optics.
 Near: 4 m, monostatic and for each pair of Tx and Rx at the corners of the array, against scalar physical optics by the
 convergent quadrature of ``physical_optics.py``, for every part of the body wherever k times the smaller radius of
-curvature at the mirror point is 10 or more. Physical optics adds a wave from the terminator, about 1/(2k h) of the
+curvature at the specular point is 10 or more. Physical optics adds a wave from the terminator, about 1/(2k h) of the
 return with h the depth of the lit side, that no real body has, so single differences ripple and their rms counts. The
-same integral taken down the valley of steepest descent from the mirror point has no terminator, and no ripple.
+same integral taken down the valley of steepest descent from the specular point has no terminator, and no ripple.
 
     python validation/specular.py [--quick] [--json FILE]
 """
@@ -162,7 +162,7 @@ def pose_cases(radar: rt.Radar, n: int) -> Iterator[Case]:
 
 
 class Comparison(NamedTuple):
-    """One case at one frequency: our field, PO's, and what PO's mirror point alone gives."""
+    """One case at one frequency: our field, PO's, and what PO's specular point alone gives."""
 
     part: str
     k_rho: float
@@ -216,7 +216,7 @@ def near_rows(quick: bool) -> Iterator[Row]:
             # Geometric optics is the first term; the second, 1/(2jk rho), turns the phase and leaves the size alone.
             error, says = (
                 rms(decibel(ours / mirror)),
-                "`specular` at 4 m against the mirror point's share of physical optics, all parts: rms",
+                "`specular` at 4 m against the specular point's share of physical optics, all parts: rms",
             )
             yield judged(claim, "rms dB to PO's mirror point", "dB", error, 0.02, says=says, cases=len(found))
             yield reported(claim, "rms complex error to PO's mirror point", "", rms(ours / mirror - 1))
@@ -302,7 +302,7 @@ def law_rows(quick: bool) -> Iterator[Row]:
         moved.append(np.abs(referred_to(shift, away, turn.apply(tx) + shift, turn.apply(rx) + shift, 14e9) / there - 1))
         double = rt.scattering_length(alone(2 * axes, frame.as_matrix()), 2 * tx, 2 * rx, 7e9)
         scaled.append(np.abs(double / there / 2 - 1))
-    # 4 m are 1200 rad at 14 GHz and float64 keeps 2e-13 of them; the mirror point is good to 1e-7 of a semi-axis.
+    # 4 m are 1200 rad at 14 GHz and float64 keeps 2e-13 of them; the specular point is good to 1e-7 of a semi-axis.
     for name, errors in (("Tx and Rx swapped", swapped), ("all moved and turned", moved), ("all twice as large", scaled)):
         change, says = np.concatenate(errors), "`specular`: Tx and Rx swapped, all moved and turned, all twice as large: change"
         yield judged("4 m, laws", name, "", float(change.max()), 1e-7, says=says, cases=len(change))

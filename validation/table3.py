@@ -46,8 +46,8 @@ from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.pipeline.survey import survey
 from rtradar.process import ca_cfar, ca_scale, os_cfar, power_map, range_doppler, range_spectrum
-from rtradar.process.detection_score import DetectionScore, cell_noise_power, score, target_cells
-from rtradar.process.tapers import hann
+from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
+from rtradar.process.window_functions import hann
 from rtradar.scatter import build_rung
 from rtradar.signal import Noise, synthesize
 

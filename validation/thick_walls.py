@@ -28,9 +28,9 @@ from rows import Row, judged, main, reported
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
-from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.clutter_returns import RoomEchoes
-from rtradar.scatter.multipath import Multipath
+from rtradar.scatter.clutter.returns import RoomEchoes
+from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material
 from rtradar.signal import synthesize
 

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.scatter import Rung, build_rung
-from rtradar.scatter.rays import ANCHOR_S
+from rtradar.scatter.models.rays import ANCHOR_S
 
 CHEAPEST = "analytic"  # all costs are over its
 # In the order of the table; `reference` has a cost and no error.

@@ -18,8 +18,8 @@ from rtradar.bench.rates import measure_rates
 from rtradar.bench.rows import chirp_rows, rung_row
 from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
 from rtradar.bench.tables import tables
-from rtradar.files import atomic_file, check_place, temporary_folder, write_json
 from rtradar.radar import Radar
+from rtradar.system.files import atomic_file, check_place, temporary_folder, write_json
 
 __all__ = ["Plan", "bench", "plan_of"]
 

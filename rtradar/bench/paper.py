@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from rtradar.bench.runs import RunError
 from rtradar.bench.times import Spread, by_stage
-from rtradar.files import temporary_folder
+from rtradar.system.files import temporary_folder
 from rtradar.validate import validation_folder
 
 IF_STAGE = "echoes and IF"

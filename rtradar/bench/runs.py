@@ -18,7 +18,7 @@ from tqdm import tqdm
 
 from rtradar.bench.plan import Case
 from rtradar.bench.times import to_cloud_s, with_elsewhere
-from rtradar.files import temporary_folder
+from rtradar.system.files import temporary_folder
 
 MOTION = "synthetic:walk"
 

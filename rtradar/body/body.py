@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.ellipsoids import Ellipsoids
-from rtradar.compiled import compiled
 from rtradar.errors import InputError
-from rtradar.motion.joints import to_nodes
+from rtradar.kernels.jit import compiled
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import NODES
+from rtradar.motion.retarget import to_nodes
+from rtradar.motion.skeleton_names import NODES
 
 _SIDED: Mapping[str, tuple[str, float]] = {
     "hip": ("hip", 0.07),
@@ -77,7 +77,7 @@ class Body:
     Parameters
     ----------
     motion : Motion
-        On the 22 nodes of `rtradar.motion.names.NODES`; `from_motion` takes any other.
+        On the 22 nodes of `rtradar.motion.skeleton_names.NODES`; `from_motion` takes any other.
     semi_axes : (part, 3) float64
         a, b across the bone and c along it [m].
 
@@ -112,7 +112,7 @@ class Body:
         Parameters
         ----------
         motion : Motion
-            Of any skeleton that `rtradar.motion.joints.to_nodes` understands; its ``girth`` multiplies the radii.
+            Of any skeleton that `rtradar.motion.retarget.to_nodes` understands; its ``girth`` multiplies the radii.
 
         Returns
         -------

@@ -21,8 +21,8 @@ from rtradar.campaign.work import Outcome, work
 from rtradar.clouds.collection_index import sweep, write_index
 from rtradar.clouds.sample import is_whole, sample_path
 from rtradar.errors import InputError
-from rtradar.files import unfinished
-from rtradar.output_folder import alone_in
+from rtradar.system.files import unfinished
+from rtradar.system.output_folder import alone_in
 
 
 @dataclass(frozen=True)

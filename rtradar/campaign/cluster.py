@@ -12,10 +12,10 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from typing import TYPE_CHECKING
 
-from rtradar.compiled import check_cache
 from rtradar.errors import InputError
-from rtradar.files import temporary_folder
-from rtradar.threads import environment_of, thread_limit
+from rtradar.kernels.jit import check_cache
+from rtradar.system.files import temporary_folder
+from rtradar.system.threads import environment_of, thread_limit
 
 if TYPE_CHECKING:
     from distributed import Client

@@ -18,7 +18,7 @@ from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec, check_s
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion
 from rtradar.radar import Radar
-from rtradar.seeds import stream
+from rtradar.system.seeds import stream
 
 _SYNTHETIC_LICENCE = "none: made by rtradar"
 _PATIENCE_S = 2.0

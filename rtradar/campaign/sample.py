@@ -18,12 +18,12 @@ from numpy.typing import NDArray
 from rtradar.clouds.sample import Sample
 from rtradar.clouds.sample_file import FORMAT
 from rtradar.errors import ValidityWarning
-from rtradar.files import open_regular
 from rtradar.motion import Motion, cut, synthetic_motion
 from rtradar.pipeline import clouds_of
 from rtradar.radar import Radar
 from rtradar.scene import Scene
-from rtradar.seeds import stream
+from rtradar.system.files import open_regular
+from rtradar.system.seeds import stream
 
 SPATIAL_POINTS = 3000
 """Most points kept of the spatial cloud, as many as the RDT cloud has; of more a uniform sample."""

@@ -13,15 +13,15 @@ from typing import Any
 
 from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec, check_samples
 from rtradar.campaign.windows import WINDOW_KEYS, Windows
-from rtradar.checks import check_number, check_text, check_vector, inside, shown
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS
 from rtradar.radar import Radar
 from rtradar.scatter import RUNGS
 from rtradar.scene import Scene
-from rtradar.seeds import check_seed
-from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
+from rtradar.system.checks import check_number, check_text, check_vector, inside, shown
+from rtradar.system.seeds import check_seed
+from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 _TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
 _EACH: Mapping[str, list[Any]] = {

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from rtradar.checks import check_number
 from rtradar.errors import InputError
+from rtradar.system.checks import check_number
 
 WINDOW_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
 """As files call them."""

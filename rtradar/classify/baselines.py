@@ -20,7 +20,7 @@ from rtradar.classify.source import Clouds
 from rtradar.classify.splits import make_splits, values_of
 from rtradar.classify.study import Study, classes_of, learnt_from
 from rtradar.errors import InputError
-from rtradar.seeds import word
+from rtradar.system.seeds import word
 
 
 def _centroid(seed: int) -> BaseEstimator:

@@ -11,7 +11,7 @@ from typing import Any, BinaryIO, NamedTuple
 import torch
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, open_regular
+from rtradar.system.files import atomic_file, open_regular
 
 _MOST_BYTES = 1_000_000_000  # of PointNet with its optimiser: 42 MB
 _KEYS = ("network", "optimiser", "epochs", "history")

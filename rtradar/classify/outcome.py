@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rtradar.classify.source import Clouds
 from rtradar.classify.splits import Split
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json
+from rtradar.system.files import atomic_file, read_json
 
 HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "seconds")
 """What was measured in every epoch."""

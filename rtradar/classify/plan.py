@@ -9,7 +9,7 @@ from typing import Any
 
 from rtradar.classify.recipes import Recipe
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json
+from rtradar.system.files import atomic_file, read_json
 
 PLAN = "plan.json"
 _PLAN_KEYS = ("data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings")

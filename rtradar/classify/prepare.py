@@ -22,7 +22,7 @@ from torch import Tensor
 from rtradar.classify.recipes import Augmentation, Scaling
 from rtradar.classify.source import Clouds
 from rtradar.errors import InputError
-from rtradar.seeds import stream
+from rtradar.system.seeds import stream
 
 PHYSICAL_SCALES = (0.5, 0.5, 2.5)
 """Time [s], range [m], velocity [m/s] that become 1: about the spread of a person's motion, so that all axes count alike."""

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from rtradar.classify.source import Clouds
 from rtradar.errors import InputError
-from rtradar.seeds import word
+from rtradar.system.seeds import word
 
 SCHEMES = ("folds", "recording", "subject", "recorded", "across:COLUMN")
 """Folds over clouds (the paper's), recordings, subjects; synthetic to recorded; each value of a column to every other."""

@@ -25,7 +25,7 @@ from rtradar.classify.source import Clouds
 from rtradar.classify.splits import chosen, make_splits, values_of
 from rtradar.classify.training import Examples, check_points, predict, train_network
 from rtradar.errors import InputError
-from rtradar.files import remove_parts
+from rtradar.system.files import remove_parts
 
 _CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
 _MADE = (

@@ -19,7 +19,7 @@ from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import drawn, for_training, scaled
 from rtradar.classify.recipes import Precision, Recipe
 from rtradar.errors import BackendError, InputError
-from rtradar.seeds import stream
+from rtradar.system.seeds import stream
 
 SKEWNESS_WEIGHT = 1e-3
 """Of the feature transform's distance from a rotation, in the loss (Qi et al.)."""

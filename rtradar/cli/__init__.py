@@ -63,7 +63,7 @@ def _flushed(status: int) -> int:
 def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     # After the first moments, in which a signal would still show a traceback.
     from rtradar.cli.values import fail
-    from rtradar.files import DISK_ERRORS
+    from rtradar.system.files import DISK_ERRORS
 
     warnings.showwarning = _show_warning
     # Where it has no folder of its own it makes one for the moment, and would tell in two lines each time.

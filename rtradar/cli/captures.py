@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 from rtradar.cli.values import decibels, number, path, seconds, whole
 from rtradar.errors import InputError
-from rtradar.files import check_place, write_json
 from rtradar.radar import PRESETS
+from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from rtradar.cli.values import path, seconds, whole
-from rtradar.files import check_place
+from rtradar.system.files import check_place
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands

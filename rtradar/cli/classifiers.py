@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rtradar.cli.values import number, numbers, path, whole
 from rtradar.errors import InputError
-from rtradar.files import check_place, write_json
+from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -108,8 +108,8 @@ def _train(options: argparse.Namespace) -> int:
 def _evaluate(options: argparse.Namespace) -> int:
     check_place(options.json)
     from rtradar.classify.study import load_study
-    from rtradar.output_folder import atomic_folder
-    from rtradar.report.evaluation import EVALUATION_FILES, write_evaluation
+    from rtradar.report.pages.evaluation import EVALUATION_FILES, write_evaluation
+    from rtradar.system.output_folder import atomic_folder
 
     studies = [load_study(folder) for folder in options.trained]
     baselines = {}

@@ -2,8 +2,8 @@
 
 A KeyboardInterrupt would be raised wherever the main thread is. In the callbacks of compilers and tracers that gives crashes,
 hangs and swallowed interrupts, and in long compiled loops it comes too late. So a thread waits for the signal instead, takes away
-what is unfinished (`rtradar.files`), and ends the process. It needs the interpreter's lock for that, which tracers, compiled
-loops and linear algebra release.
+what is unfinished (`rtradar.system.files`), and ends the process. It needs the interpreter's lock for that, which tracers,
+compiled loops and linear algebra release.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from collections.abc import Callable
 from multiprocessing import resource_tracker
 from pathlib import Path
 
-from rtradar.files import discard_unfinished
+from rtradar.system.files import discard_unfinished
 
 _SIGNALS = {"SIGINT": "stopped by the user", "SIGTERM": "ended by SIGTERM", "SIGHUP": "its terminal was closed"}
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)

@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING
 
 from rtradar.cli.values import path
-from rtradar.files import check_place, write_json
+from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from rtradar.cli.values import path, seconds
 from rtradar.errors import InputError
-from rtradar.files import check_place, write_json
+from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
     from rtradar.cli.values import Subcommands
@@ -39,7 +39,7 @@ def _view(options: argparse.Namespace) -> int:
     check_place(options.json)
     if options.time is not None and options.still is None:
         raise InputError("--time: it is of a still; give --still FILE.png too, or leave it out")
-    from rtradar.pipeline.view import view
+    from rtradar.pipeline.pictures.run_view import view
 
     page = options.out or (None if options.still else _own_page(options.folder))
     told = view(options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour)
@@ -58,7 +58,7 @@ def _view(options: argparse.Namespace) -> int:
 
 def _own_page(folder: Path) -> Path:
     """Where the page goes unless told otherwise; InputError where that would replace what rtradar did not write."""
-    from rtradar.report.page import is_page
+    from rtradar.report.pages.frame import is_page
 
     page = folder / "view.html"
     if os.path.lexists(page) and not is_page(page):

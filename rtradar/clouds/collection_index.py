@@ -8,10 +8,10 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from rtradar.checks import shown
 from rtradar.clouds.sample_file import FORMAT
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_json, remove_parts
+from rtradar.system.checks import shown
+from rtradar.system.files import atomic_file, read_json, remove_parts
 
 INDEX = "collection.json"
 """Name of the file that says which samples belong to the collection."""

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.system.files import atomic_file
 
 RDT_AXES = ("time", "range", "velocity")
 """Names of the coordinates of an RDT cloud."""

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.clouds.sample_file import DIGEST, FORMAT
-from rtradar.files import atomic_file, open_regular
+from rtradar.system.files import atomic_file, open_regular
 
 
 @dataclass(frozen=True)

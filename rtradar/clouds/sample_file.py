@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.files import open_regular
+from rtradar.system.files import open_regular
 
 FORMAT = 1
 """Of a sample's file and of the index; a reader refuses others."""

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.seeds import check_seed, stream
+from rtradar.system.seeds import check_seed, stream
 
 _WITH_REPLACEMENT = 1
 """Marks the random stream that draws with replacement, apart from that of the keys."""

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
-from rtradar.process.angle import AngleSpectra
-from rtradar.process.peaks import Peaks, find_peaks
+from rtradar.process.angles.peaks import Peaks, find_peaks
+from rtradar.process.angles.spectra import AngleSpectra
 from rtradar.radar import Radar
+from rtradar.system.files import atomic_file
 
 SPATIAL_AXES = ("x", "y", "z")
 """Names of the coordinates of a spatial cloud, world axes."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rtradar.clouds import RDT_AXES, RDT_UNITS
 from rtradar.clouds.spatial import SPATIAL_AXES, measured_alone
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_arrays, read_bytes
+from rtradar.system.files import atomic_file, read_arrays, read_bytes
 
 _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
 """What a spatial cloud tells of its points beside their places."""

@@ -16,7 +16,7 @@ from rtradar.exchange.int16 import read_int16, write_int16
 from rtradar.exchange.mat import read_mat, write_mat
 from rtradar.exchange.netcdf import read_netcdf, write_netcdf
 from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
-from rtradar.output_folder import check_whole
+from rtradar.system.output_folder import check_whole
 
 _T = TypeVar("_T")
 

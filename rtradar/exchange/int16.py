@@ -12,7 +12,7 @@ import numpy as np
 
 from rtradar.errors import InputError
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import atomic_file, open_regular, read_json
+from rtradar.system.files import atomic_file, open_regular, read_json
 
 _LARGEST = 32767
 _WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"

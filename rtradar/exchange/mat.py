@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rtradar.exchange.recording import IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import LastingFile, atomic_file, open_regular, stored
+from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
 
 _HEADER = b"MATLAB 7.3 MAT-file, Platform: rtradar, Created on: Thu Jan  1 00:00:00 1970 HDF5 schema 1.00 ."
 """Text of the file; the same time always, so that the same samples give the same file."""

@@ -9,7 +9,7 @@ import h5py
 import numpy as np
 
 from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
-from rtradar.files import LastingFile, atomic_file, open_regular, stored
+from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
 
 _PARTS = ("if_real", "if_imag")
 """netCDF knows no complex numbers."""

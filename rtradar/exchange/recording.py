@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from rtradar.checks import printable
 from rtradar.errors import InputError
-from rtradar.files import read_json
-from rtradar.output_folder import check_whole
 from rtradar.radar import Radar
+from rtradar.system.checks import printable
+from rtradar.system.files import read_json
+from rtradar.system.output_folder import check_whole
 
 IF_AXES = ("chirp", "tx", "rx", "sample")
 """Axes of a cube: the chirps of each Tx by themselves (a TDM cycle gives one of each), then Tx, Rx and fast time."""

@@ -6,13 +6,13 @@ import inspect
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.files import special_kind
-from rtradar.motion.amc import load_amc
-from rtradar.motion.asf import load_skeleton
-from rtradar.motion.bvh import load_bvh
-from rtradar.motion.c3d import load_c3d
+from rtradar.motion.formats.amc import load_amc
+from rtradar.motion.formats.asf import load_skeleton
+from rtradar.motion.formats.bvh import load_bvh
+from rtradar.motion.formats.c3d import load_c3d
 from rtradar.motion.motion import Motion
-from rtradar.registry import Registry
+from rtradar.system.files import special_kind
+from rtradar.system.registry import Registry
 
 READERS = Registry(
     "rtradar.readers",

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
-from rtradar.checks import printable
 from rtradar.errors import InputError
 from rtradar.motion.quaternions import rotate, sign_continuous
-from rtradar.spool import in_blocks, let_go, spooled
+from rtradar.system.checks import printable
+from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
 _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
@@ -121,7 +121,7 @@ class Motion:
     @cached_property
     def positions(self) -> NDArray[np.float64]:
         """Joints at the frames, (frame, joint, 3) [m], world."""
-        return spooled(self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations))
+        return file_backed(self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations))
 
     # -- at any time -----------------------------------------------------------------------------------------------
 
@@ -186,7 +186,7 @@ class Motion:
                 frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
                 times = self.first_frame_s + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
                 found = PchipInterpolator(times, self.root_positions[frames]), CubicSpline(times, self.rotations[frames])
-                let_go(self.root_positions, self.rotations)
+                release_pages(self.root_positions, self.rotations)
                 while len(self._kept_splines) >= _STRETCHES_KEPT:
                     self._kept_splines.pop(next(iter(self._kept_splines)))
                 self._kept_splines[stretch] = found
@@ -219,7 +219,7 @@ class Motion:
         """
         if not (math.isfinite(factor) and factor > 0):
             raise InputError(f"Motion.scaled: factor = {factor}; it must be positive")
-        moved = spooled(roots * factor for (roots,) in in_blocks(self.root_positions))
+        moved = file_backed(roots * factor for (roots,) in in_blocks(self.root_positions))
         return dataclasses.replace(self, offsets=self.offsets * factor, root_positions=moved, girth=self.girth * factor)
 
     def turned(self, yaw_rad: float) -> Motion:
@@ -243,8 +243,8 @@ class Motion:
 
         return dataclasses.replace(
             self,
-            root_positions=spooled(rotate(half, roots) for (roots,) in in_blocks(self.root_positions)),
-            rotations=spooled(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
+            root_positions=file_backed(rotate(half, roots) for (roots,) in in_blocks(self.root_positions)),
+            rotations=file_backed(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
         )
 
     def shifted(self, by_m: ArrayLike) -> Motion:
@@ -259,5 +259,5 @@ class Motion:
         -------
         Motion
         """
-        moved = spooled(roots + np.asarray(by_m, dtype=np.float64) for (roots,) in in_blocks(self.root_positions))
+        moved = file_backed(roots + np.asarray(by_m, dtype=np.float64) for (roots,) in in_blocks(self.root_positions))
         return dataclasses.replace(self, root_positions=moved)

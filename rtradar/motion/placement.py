@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.motion.joints import to_nodes
 from rtradar.motion.motion import Motion
-from rtradar.motion.names import NODES
-from rtradar.spool import column
+from rtradar.motion.retarget import to_nodes
+from rtradar.motion.skeleton_names import NODES
+from rtradar.system.row_files import column
 
 MARGIN_FRAMES = 16
 """Frames kept before and after the interval, where there are any.

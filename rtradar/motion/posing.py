@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from rtradar.compiled import compiled
+from rtradar.kernels.jit import compiled
 
 
 @compiled(fastmath={"contract"})

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.spool import in_blocks, spooled
+from rtradar.system.row_files import file_backed, in_blocks
 
 
 def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -34,7 +34,7 @@ def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose the sign of each quaternion (frame, ..., 4) so that it lies in the half-space of the frame before it."""
     if all(same_side.all() for _, same_side in _sides(quaternions)):
         return quaternions  # not copied: a recording that was only moved shares its rotations with the one before
-    return spooled(_turned_over(quaternions))
+    return file_backed(_turned_over(quaternions))
 
 
 def _turned_over(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:

@@ -14,14 +14,14 @@ from tqdm import tqdm
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
-from rtradar.files import not_to_be_parted
-from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.rooms.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import FftDevices, range_spectrum, with_cpu_in_reserve
+from rtradar.process import FftDevices, range_spectrum, with_cpu_fallback
 from rtradar.radar import Radar
 from rtradar.scatter import Rung
 from rtradar.signal import Noise, receive, separate, synthesize
+from rtradar.system.files import uninterruptible
 
 
 class Taker(Protocol):
@@ -115,12 +115,12 @@ class Capture:
                 noise.add(received, radar, first)
             if kept is not None:
                 # Its folders are made as they are needed, which must not be after they have been removed.
-                with stages.time("write"), not_to_be_parted():
+                with stages.time("write"), uninterruptible():
                     begin = first * len(received) // len(samples)
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
                 apart = separate(received, radar, first)
-                return with_cpu_in_reserve(partial(range_spectrum, apart, radar, out=transformed[:n]), self.fft_devices.range)
+                return with_cpu_fallback(partial(range_spectrum, apart, radar, out=transformed[:n]), self.fft_devices.range)
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

@@ -18,24 +18,24 @@ from numpy.typing import NDArray
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion
-from rtradar.output_folder import atomic_folder
-from rtradar.pipeline.if_array import if_array
-from rtradar.pipeline.moments import moments
-from rtradar.pipeline.output_files import RUN_FILES
-from rtradar.pipeline.pictures import draw_pictures
+from rtradar.pipeline.output.if_array import if_array
+from rtradar.pipeline.output.output_files import RUN_FILES
+from rtradar.pipeline.output.summary import cost, plain, summary_of
+from rtradar.pipeline.pictures.room_pictures import draw_room_pictures
+from rtradar.pipeline.pictures.run_pictures import draw_pictures
+from rtradar.pipeline.pictures.snapshots import moments
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.room_pictures import draw_room_pictures
-from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
 from rtradar.process import build_detector
 from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.report.moments import save_moments
+from rtradar.report.view.snapshots import save_moments
 from rtradar.scene import Scene
+from rtradar.system.output_folder import atomic_folder
 
 
 @dataclass(frozen=True)

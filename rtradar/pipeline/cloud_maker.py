@@ -20,7 +20,7 @@ from rtradar.process import (
     cell_spectra,
     measures_angle,
     power_map,
-    with_cpu_in_reserve,
+    with_cpu_fallback,
 )
 from rtradar.radar import Radar
 
@@ -107,7 +107,7 @@ class CloudMaker:
             with stages.time("clutter removal"):
                 cube = self._removal.window(window)
             with stages.time("doppler"):
-                power = with_cpu_in_reserve(partial(power_map, cube, radar), self._doppler_device)
+                power = with_cpu_fallback(partial(power_map, cube, radar), self._doppler_device)
             with stages.time("cfar"):
                 mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])

@@ -14,17 +14,17 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.output_folder import atomic_folder
 from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
 from rtradar.pipeline.chain import Result, run
-from rtradar.pipeline.output_files import comparison_files
-from rtradar.pipeline.pictures import busiest_window, removed, thinned
+from rtradar.pipeline.output.output_files import comparison_files
+from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
-from rtradar.report.comparison_page import write_comparison
-from rtradar.report.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
-from rtradar.report.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
+from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
+from rtradar.report.pages.comparison import write_comparison
 from rtradar.scatter import RUNGS
 from rtradar.scene import Scene
+from rtradar.system.output_folder import atomic_folder
 
 _MEASURES = (
     # key, heading, digits

@@ -12,10 +12,9 @@ import numpy as np
 
 from rtradar.body import Body
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.gpu import has_nvidia_gpu
 from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.indoors import indoors
+from rtradar.pipeline.rooms.indoors import indoors
 from rtradar.pipeline.survey import survey
 from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
@@ -23,12 +22,13 @@ from rtradar.process import FftDevices, fastest_fft_devices
 from rtradar.radar import Radar
 from rtradar.scatter import Rung, build_rung, takes_backend
 from rtradar.scatter.antenna_gain import is_shaped
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.multipath import Multipath
+from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter.specular_point.solver import mirror
 from rtradar.scene import Scene
-from rtradar.seeds import check_seed
 from rtradar.signal import Noise
-from rtradar.trace.backend import select
+from rtradar.system.gpu import has_nvidia_gpu
+from rtradar.system.seeds import check_seed
+from rtradar.trace.backends.backend import select
 
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
@@ -99,7 +99,7 @@ def prepare(
             of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
             rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
         echoes = (paths or rung).echoes(np.arange(2 * radar.n_tx))
-        # Not every rung has mirror points; the report shows them of all.
+        # Not every rung has specular points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
     warm_up_processing(echoes, radar)
     # Who names a backend of the CPU wants the work done there.

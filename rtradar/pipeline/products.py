@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.pipeline.cloud_maker import RANGE_TIME_S, CloudMaker, Clouds, window_angles
+from rtradar.pipeline.output.map_store import MapStore
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.store import MapStore
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     ClutterRemoval,

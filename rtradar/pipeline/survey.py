@@ -11,15 +11,15 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.pipeline.inside import Inside
-from rtradar.process.angle import folded_angle_deg
+from rtradar.pipeline.rooms.inside_walls import Inside
+from rtradar.process.angles.spectra import folded_angle_deg
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter import Rung
-from rtradar.scatter.poses import anchor_step
+from rtradar.scatter.common.poses import anchor_step
 from rtradar.scene import Scene
 from rtradar.signal import in_band
-from rtradar.spool import Spool, let_go
+from rtradar.system.row_files import FileBackedRows, release_pages
 
 _CHIRPS_AT_ONCE = 64
 
@@ -112,7 +112,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     """
     chirps = np.arange(0, n_chirps, anchor_step(radar))
     n_parts = len(body.part_names)
-    powers, shares_hidden = Spool(), Spool()
+    powers, shares_hidden = FileBackedRows(), FileBackedRows()
     concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
     small_parts: set[str] = set()
     seen_in_band = False
@@ -148,7 +148,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
     looked_at = radar.centres_of(chirps)
     power = float(power_at.sum())
     indoors = solid.found(power_at.sum(axis=0))
-    let_go(power_at)
+    release_pages(power_at)
     if power == 0:
         # A point of 1 m^2 at the world's origin stands in for the person.
         warnings.warn(
@@ -229,7 +229,7 @@ def _distance(place: NDArray[np.float64], semi_axes: NDArray[np.float64]) -> flo
 
 
 def _small_curvature(radar: Radar, body: Body, times: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where the smaller radius of curvature at the mirror point, seen from the array's centre, is too small (time, part)."""
+    """Where the smaller radius of curvature at the specular point, seen from the array's centre, is too small (time, part)."""
     centres, frames, semi_axes = body.at(times)
     sight = np.einsum("tpji,tpj->tpi", frames, np.asarray(radar.position_m) - centres)
     sight /= np.linalg.norm(sight, axis=-1, keepdims=True)

@@ -13,15 +13,15 @@ from pathlib import Path
 import numpy as np
 
 from rtradar.clouds import spatial_points
-from rtradar.compiled import is_on_disk
 from rtradar.echoes import Echoes
+from rtradar.kernels.jit import is_on_disk
 from rtradar.pipeline.capture import chirps_of
 from rtradar.pipeline.cloud_maker import window_angles
 from rtradar.process import measures_angle, os_cfar, power_map, range_azimuth, range_elevation, range_spectrum
 from rtradar.radar import Radar
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.signal.tones import add_tones
-from rtradar.threads import environment_of, thread_count
+from rtradar.system.threads import environment_of, thread_count
 
 _LONGEST_S = 120.0
 """For a second process; what it has not done by then is done here."""

@@ -1,21 +1,21 @@
 """From IF samples to range-Doppler maps, their detections, directions and spectrograms."""
 
-from rtradar.process.angle import AngleSpectra, angle, angle_spectra
-from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
+from rtradar.process.angles.maps import angle_grid, range_azimuth, range_elevation
+from rtradar.process.angles.spectra import AngleSpectra, angle, angle_spectra
+from rtradar.process.angles.steering import measured_angles, measures_angle
 from rtradar.process.cells import cell_spectra
-from rtradar.process.cfar import ca_cfar, os_cfar
-from rtradar.process.cfar_law import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
-from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
-from rtradar.process.detectors import DETECTORS, Detector, build_detector, register_detector
-from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_in_reserve
+from rtradar.process.detection.cfar import ca_cfar, os_cfar
+from rtradar.process.detection.cfar_thresholds import ca_scale, os_scale
+from rtradar.process.detection.clutter_map import ClutterMap, clutter_map_scale
+from rtradar.process.detection.detectors import DETECTORS, Detector, build_detector, register_detector
+from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_fallback
+from rtradar.process.frames import SlidingWindows
 from rtradar.process.power_maps import power_map, range_time
 from rtradar.process.sliding_range_time import SlidingRangeTime
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
-from rtradar.process.steering import measured_angles, measures_angle
-from rtradar.process.windows import SlidingWindows
 
 __all__ = [
     "CLUTTER_REMOVALS",
@@ -54,5 +54,5 @@ __all__ = [
     "register_detector",
     "spectrogram",
     "window_cycles",
-    "with_cpu_in_reserve",
+    "with_cpu_fallback",
 ]

@@ -12,10 +12,10 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.steering import range_walk
-from rtradar.process.tapers import hann
+from rtradar.process.angles.steering import range_walk
+from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
-from rtradar.threads import in_threads
+from rtradar.system.threads import in_threads
 
 _CACHE_BYTES = 2_500_000
 """What a thread transforms at once: several channels of a short window, of a long one (77 GHz: 666 cycles) each by itself."""

@@ -37,8 +37,8 @@ import numpy as np
 from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.compiled import compiled
 from rtradar.errors import InputError
+from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import ValidityWarning
-from rtradar.gpu import first_line, gpu_for_ffts, has_nvidia_gpu
 from rtradar.process.power_maps import power_map
 from rtradar.process.spectra import range_spectrum
 from rtradar.radar import Radar
+from rtradar.system.gpu import first_line, gpu_for_ffts, has_nvidia_gpu
 
 _CHIRPS = 512
 """Transformed in range to see who is faster: as many of 8 receivers and 256 samples as a run takes at once."""
@@ -75,7 +75,7 @@ def fastest_fft_devices(radar: Radar, n_chirps: int, n_windows: int) -> FftDevic
     return FftDevices(*(gpu if on_gpu[kind] < on_cpu[kind] else "cpu" for kind in range(2)))
 
 
-def with_cpu_in_reserve(transform: Callable[..., NDArray[Any]], device: str) -> NDArray[Any]:
+def with_cpu_fallback(transform: Callable[..., NDArray[Any]], device: str) -> NDArray[Any]:
     """Transform on a device; on the CPU where that fails, for others may fill a GPU's memory while a run lasts.
 
     Parameters

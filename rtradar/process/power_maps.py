@@ -8,15 +8,15 @@ import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.compiled import compiled
 from rtradar.errors import InputError
+from rtradar.kernels.jit import compiled
 from rtradar.process import torch_transforms
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
-from rtradar.process.tapers import weights
+from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
-from rtradar.threads import in_threads
+from rtradar.system.threads import in_threads
 
 
 def range_time(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.power_maps import mean_power, range_time, range_time_steps, step_cycles
 from rtradar.radar import Radar
-from rtradar.threads import in_threads
+from rtradar.system.threads import in_threads
 
 
 class _Step(NamedTuple):

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, on_cache_lines, taken_in
+from rtradar.kernels.jit import compiled, inlined, on_cache_lines
 
 _LARGEST = 40
 """Factor: plain sums grow with its square."""
@@ -133,17 +133,17 @@ def add_doppler_power(
 # each, the compiler would have every call ask first whether any two overlap.
 
 
-@taken_in()
+@inlined()
 def _row(store, number):  # type: ignore[no-untyped-def]
     return store[number * _ROW : (number + 1) * _ROW]
 
 
-@taken_in()
+@inlined()
 def _powers(store, number):  # type: ignore[no-untyped-def]
     return store[number * _COLUMNS : (number + 1) * _COLUMNS]
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _read(samples, weight, out):  # type: ignore[no-untyped-def]
     """Fill ``out (row,)``: real parts of what is read, then imaginary ones, weighted."""
     for c in range(len(samples)):
@@ -151,7 +151,7 @@ def _read(samples, weight, out):  # type: ignore[no-untyped-def]
         out[_COLUMNS + c] = samples[c].imag * weight
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _fold(near, far, even, odd):  # type: ignore[no-untyped-def]
     """Sum of two rows, and their difference times -j, which the sine has before it."""
     for c in range(_COLUMNS):
@@ -162,7 +162,7 @@ def _fold(near, far, even, odd):  # type: ignore[no-untyped-def]
         odd[_COLUMNS + c] = far_re - near_re
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _read_folded(near, near_weight, far, far_weight, even, odd):  # type: ignore[no-untyped-def]
     """The same of what is read, weighted."""
     for c in range(len(near)):
@@ -174,13 +174,13 @@ def _read_folded(near, near_weight, far, far_weight, even, odd):  # type: ignore
         odd[_COLUMNS + c] = far_re - near_re
 
 
-@taken_in()
+@inlined()
 def _put(row, out):  # type: ignore[no-untyped-def]
     for i in range(_ROW):
         out[i] = row[i]
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _add_products(table, begin, terms, out):  # type: ignore[no-untyped-def]
     """Add to three rows ``out``: those of ``terms``, times what the table has for the three frequencies from ``begin`` on."""
     a, b, c = table[begin], table[begin + 1], table[begin + 2]
@@ -194,7 +194,7 @@ def _add_products(table, begin, terms, out):  # type: ignore[no-untyped-def]
             out[2 * _ROW + i] = out[2 * _ROW + i] + c0 * r0 + c1 * r1 + c2 * r2
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _add_signed(terms, count, sign, out):  # type: ignore[no-untyped-def]
     """Add rows to one: all of them, or (``sign`` -1) with signs that alternate."""
     factor = sign
@@ -205,20 +205,20 @@ def _add_signed(terms, count, sign, out):  # type: ignore[no-untyped-def]
         factor *= sign
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _add_squares(row, out):  # type: ignore[no-untyped-def]
     for c in range(_COLUMNS):
         out[c] += row[c] * row[c] + row[_COLUMNS + c] * row[_COLUMNS + c]
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _unfold(one, other, low, high):  # type: ignore[no-untyped-def]
     """Fill ``low`` with the sum of two parts, and ``high``, of the mirrored frequency, with their difference."""
     for i in range(_ROW):
         low[i], high[i] = one[i] + other[i], one[i] - other[i]
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _add_unfolded_squares(cosine, sine, low, high):  # type: ignore[no-untyped-def]
     """The same, but squared magnitudes, added."""
     for c in range(_COLUMNS):

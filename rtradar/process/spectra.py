@@ -16,13 +16,13 @@ import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.checks import array_to_fill
-from rtradar.compiled import compiled
 from rtradar.errors import InputError
+from rtradar.kernels.jit import compiled
 from rtradar.process import torch_transforms
-from rtradar.process.tapers import weights
+from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
-from rtradar.threads import in_threads
+from rtradar.system.checks import array_to_fill
+from rtradar.system.threads import in_threads
 
 _CHIRPS_PER_BATCH = 128
 """Chirps transformed at once: 8 receivers x 256 samples x 8 bytes make 2 MB, which stays in the cache of a core."""

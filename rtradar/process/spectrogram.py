@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.doppler_division import without_copies
-from rtradar.process.tapers import hann
+from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
 
 WINDOW_CYCLES = 128

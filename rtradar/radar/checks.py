@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from rtradar.antenna import Antenna
-from rtradar.checks import shown
 from rtradar.errors import InputError
+from rtradar.system.checks import shown
 
 _POSITIVE = (
     "start_frequency_hz",

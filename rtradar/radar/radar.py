@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Literal
 
 from rtradar.antenna import Antenna
-from rtradar.checks import printable
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_array, check_multiplexing, checked_values
 from rtradar.radar.schedule import Schedule
-from rtradar.registry import Registry
-from rtradar.toml_tables import check_keys, read_toml
+from rtradar.system.checks import printable
+from rtradar.system.registry import Registry
+from rtradar.system.toml_tables import check_keys, read_toml
 
 PRESETS = Registry(
     "rtradar.radars", "radar", {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"}

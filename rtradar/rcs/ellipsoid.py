@@ -21,7 +21,7 @@ def ellipsoid(a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: A
     Returns
     -------
     ndarray of float64
-        Cross-section [m^2], pi R1 R2 with the principal radii of curvature at the mirror point.
+        Cross-section [m^2], pi R1 R2 with the principal radii of curvature at the specular point.
 
     Raises
     ------

@@ -13,13 +13,13 @@ from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.poses import Accountable, ChirpPoses, Rung, chirp_poses
+from rtradar.scatter.common.poses import Accountable, ChirpPoses, Rung, chirp_poses
 
 
-def mirror_points(at: ChirpPoses) -> NDArray[np.float64]:
+def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
     """Where each part has its normal halfway between Tx and Rx as its centre sees them, (chirp, rx, part, 3) [m].
 
-    The mirror point but for terms of the part's size over its distance, and what is seen of a part lies about it.
+    The specular point but for terms of the part's size over its distance, and what is seen of a part lies about it.
     """
     tx, rx = (_unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None]))
     normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
@@ -33,7 +33,7 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
 
     The square root of the power pattern of the Tx in the direction of the part, times that of the Rx.
     """
-    points = mirror_points(at)
+    points = specular_points(at)
     gain = np.ones(points.shape[:-1])
     for antenna, place in ((radar.tx_antenna, at.tx[:, None, None]), (radar.rx_antenna, at.rx[:, :, None])):
         if antenna is not None:

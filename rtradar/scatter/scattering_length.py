@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter.analytic import far_field_echo
-from rtradar.scatter.validity import warn_of_small_radii
+from rtradar.scatter.common.validity import warn_of_small_radii
+from rtradar.scatter.models.analytic import far_field_echo
 
 if TYPE_CHECKING:
     import trimesh
@@ -35,10 +35,10 @@ class _Home(NamedTuple):
 _HOMES = {
     "analytic": _Home("scattering_length", "_analytic_field", meshes=False, hides=False),
     "specular": _Home("scattering_length", "_specular_field", meshes=False),
-    "fresnel": _Home("fresnel", "fresnel_scattering", meshes=False),
-    "physical-optics": _Home("facet_scattering", "facet_scattering", meshes=True),
-    "reference": _Home("facet_scattering", "facet_scattering", meshes=True),
-    "rays": _Home("rays_scattering", "rays_scattering", meshes=True),
+    "fresnel": _Home("models.fresnel", "fresnel_scattering", meshes=False),
+    "physical-optics": _Home("facets.target", "facet_scattering", meshes=True),
+    "reference": _Home("facets.target", "facet_scattering", meshes=True),
+    "rays": _Home("ray_tubes.target", "rays_scattering", meshes=True),
 }
 _COMMON = ("target", "tx", "rx", "frequency", "polarization")
 
@@ -136,9 +136,9 @@ def _specular_field(
     polarization: Literal["v", "h"],
     variant: str = "auto",
 ) -> NDArray[np.complex128]:
-    from rtradar.scatter.mirror import mirror
-    from rtradar.scatter.occlusion import unobstructed
-    from rtradar.trace.backend import select, use
+    from rtradar.scatter.specular_point.solver import mirror
+    from rtradar.scatter.specular_point.visibility import unobstructed
+    from rtradar.trace.backends.backend import select, use
     from rtradar.trace.body_tracer import BodyTracer
 
     length, amplitude, points = mirror(tx, rx[:, None], *_poses(target, len(tx)), polarization=polarization, points=True)

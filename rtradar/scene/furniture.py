@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from rtradar.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
 from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
+from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
 
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
 """What furniture may measure in its longest direction."""

@@ -19,9 +19,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rtradar.checks import check_number, check_text, shown
 from rtradar.errors import InputError
 from rtradar.scene.permittivity import ColeCole, Conductor, PowerLaw
+from rtradar.system.checks import check_number, check_text, shown
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.checks import shown
 from rtradar.errors import InputError
-from rtradar.files import open_regular, read_bytes
 from rtradar.scene.mesh_headers import refuse_hostile_header
+from rtradar.system.checks import shown
+from rtradar.system.files import open_regular, read_bytes
 
 MESH_ENDINGS = (".ply", ".obj", ".stl", ".glb")
 MOST_FACES = 2_000_000

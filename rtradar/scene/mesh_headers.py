@@ -6,8 +6,8 @@ import json
 import re
 import struct
 
-from rtradar.checks import shown
 from rtradar.errors import InputError
+from rtradar.system.checks import shown
 
 _MOST_PLY_HEADER = 65_536
 _MOST_GLB_HEADER = 16_000_000

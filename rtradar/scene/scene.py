@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rtradar.checks import Vector, check_number, check_vector, shown
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import Material
 from rtradar.scene.walls import Wall
+from rtradar.system.checks import Vector, check_number, check_vector, shown
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,14 +6,14 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from rtradar.checks import check_text, inside, printable, shown
 from rtradar.errors import InputError
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.scene import Scene
 from rtradar.scene.walls import ROOM_SIDES, Surface, Wall, room_walls
-from rtradar.toml_tables import Table, check_keys, read_toml, table_at, tables_at
+from rtradar.system.checks import check_text, inside, printable, shown
+from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 Made = TypeVar("Made")
 

@@ -9,9 +9,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.checks import Vector, check_number, check_text, check_vector, shown
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
+from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 """Least x, largest x, least y, largest y, z = 0 and the top."""

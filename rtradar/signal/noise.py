@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled
+from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
-from rtradar.seeds import check_seed, stream
-from rtradar.threads import in_threads
+from rtradar.system.seeds import check_seed, stream
+from rtradar.system.threads import in_threads
 
 _CYCLES_AT_ONCE = 16
 """By one thread: whoever comes back to Python more often waits for the other threads there."""

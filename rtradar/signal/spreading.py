@@ -16,9 +16,9 @@ from numba import prange
 from numpy.typing import NDArray
 from scipy import fft
 
-from rtradar.compiled import compiled
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.phasor import phasor
+from rtradar.kernels.jit import compiled
+from rtradar.kernels.phasor import phasor
 
 _POWERS = 3
 """Powers of the sample number that one grid takes: all of an amplitude given at up to three frequencies."""

@@ -8,14 +8,14 @@ import warnings
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
 
-from rtradar.checks import array_to_fill
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
 from rtradar.radar import Radar
 from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
 from rtradar.signal.tones import LANES, MIDDLE, add_tones, first_powers, series
-from rtradar.threads import in_threads, thread_count
+from rtradar.system.checks import array_to_fill
+from rtradar.system.threads import in_threads, thread_count
 
 MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""

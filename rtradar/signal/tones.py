@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, on_cache_lines, taken_in
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.jit import compiled, inlined, on_cache_lines
 
 LANES = 32
 """Samples that are made side by side."""
@@ -54,7 +54,7 @@ def first_powers(kind: type[np.floating]) -> NDArray[np.floating]:
 _HALF, _ONE, _TWO, _THREE = np.float32(0.5), np.float32(1), np.float32(2), np.float32(3)
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _reduce(turns, angle, quadrant, place):  # type: ignore[no-untyped-def]
     """Whole quarters taken out in float64, of which the quadrant is told; the rest is an angle of up to an eighth of a turn."""
     quarters = np.floor(4 * turns + 0.5)
@@ -62,7 +62,7 @@ def _reduce(turns, angle, quadrant, place):  # type: ignore[no-untyped-def]
     quadrant[place] = quarters - 4 * np.floor(0.25 * quarters)
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _phasors(count, angle, quadrant, sines, cosines, re, im):  # type: ignore[no-untyped-def]
     """exp(j angle) of what `_reduce` left, side by side, in the precision of the arrays."""
     for i in range(count):
@@ -77,7 +77,7 @@ def _phasors(count, angle, quadrant, sines, cosines, re, im):  # type: ignore[no
         im[i] = -up if quadrant[i] >= _TWO else up
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _lanes(row, rest, ramp, sines, cosines, out):  # type: ignore[no-untyped-def]
     """Powers of a tone side by side: those of the next step on the grid, turned by the rest [rad a sample] times each.
 
@@ -92,14 +92,14 @@ def _lanes(row, rest, ramp, sines, cosines, out):  # type: ignore[no-untyped-def
         out[lane + LANES] = row[lane] * sine + row[lane + LANES] * cosine
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _together(w, x, i):  # type: ignore[no-untyped-def]
     """The sum over `_TOGETHER` tones of their weights times what ``x`` has of each at a place ``i`` of its lanes."""
     first = w[0] * x[i] + w[1] * x[i + _NEXT] + w[2] * x[i + 2 * _NEXT]
     return first + w[3] * x[i + 3 * _NEXT] + w[4] * x[i + 4 * _NEXT] + w[5] * x[i + 5 * _NEXT]
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  # type: ignore[no-untyped-def]
     """Add tones to ``out``, two blocks at a time, of which ``middle (pair * tone,)`` are the values in their middle.
 
@@ -131,7 +131,7 @@ def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  #
             early_im[i] += sums[2 * LANES - 1 - i] - sums[3 * LANES - 1 - i]
 
 
-@taken_in()
+@inlined()
 def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im):  # type: ignore[no-untyped-def]
     """Coefficients ``now (tone,)`` of a power of the sample number, and whether any is other than 0.
 
@@ -154,7 +154,7 @@ def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, w
     return any_there
 
 
-@taken_in()
+@inlined()
 def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: ignore[no-untyped-def]
     """Which echoes (echo,) are in the band and not hidden; ``amplitude (node, echo)``. Their count."""
     count = 0

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.scene.mitsuba_scene import triangle_mesh
+from rtradar.trace.backends.jit_threads import grow_for
 from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.jit_threads import grow_for
 from rtradar.trace.rays import rays_of
 
 _LIFT_OF_PART = 1e-3

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 
-from rtradar.compiled import taken_in
+from rtradar.kernels.jit import inlined
 
 
-@taken_in()
+@inlined()
 def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-def]
     """Least distance of the way from antenna to point from the ellipsoid's middle, in its own unit, less 1.
 
@@ -27,7 +27,7 @@ def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-d
     return beside_ball(start_square, along, span)
 
 
-@taken_in()
+@inlined()
 def beside_ball(start_square, along, span):  # type: ignore[no-untyped-def]
     """Least distance of a way from the middle of the unit ball, less 1.
 
@@ -37,7 +37,7 @@ def beside_ball(start_square, along, span):  # type: ignore[no-untyped-def]
     return math.sqrt(max(start_square + nearest * (2 * along + nearest * span), 0.0)) - 1
 
 
-@taken_in()
+@inlined()
 def into_ball(part, other, antenna, centres, frames, semi_axes, turn, shift, start):  # type: ignore[no-untyped-def]
     """From the axes of a part to those of another in which it is the unit ball; and the antenna in these."""
     for i in range(3):

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, taken_in
+from rtradar.kernels.jit import compiled, inlined
 from rtradar.trace.clearance import into_ball
 from rtradar.trace.outlines import VIEWS, may_hide, outlines
 from rtradar.trace.unit_sphere import UnitSphere
@@ -23,12 +23,12 @@ _NEAR = 0.01
 """Lines of sight are traced that pass a part, outside or inside of its outline, by less than this share of its semi-axes."""
 
 
-@taken_in(fastmath=True)
-def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: ignore[no-untyped-def]
-    """What a hider, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
+@inlined(fastmath=True)
+def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):  # type: ignore[no-untyped-def]
+    """What a occluder, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
 
     ``first`` becomes its number where it certainly hides a vertex, and does so before ``entry``, the share of the way at
-    which what hides it was met. ``nearest`` is the share at which the way comes nearest to the hider's middle, where that
+    which what hides it was met. ``nearest`` is the share at which the way comes nearest to the occluder's middle, where that
     is near its outline; else -1.
     """
     s0, s1, s2 = start[0], start[1], start[2]
@@ -46,7 +46,7 @@ def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: i
         hides, near = least < inside * span, least < outside * span
         met = (back - math.sqrt(max(back * back - span * (square - 1), 0.0))) / span
         before = hides and met < entry[vertex]
-        first[vertex] = hider if before else first[vertex]
+        first[vertex] = occluder if before else first[vertex]
         entry[vertex] = met if before else entry[vertex]
         doubt = near and not hides
         nearest[vertex] = min(back / span, 1.0) if doubt else -1.0
@@ -54,7 +54,7 @@ def _pass(x, y, z, start, turn, shift, hider, entry, first, nearest):  # type: i
     return count
 
 
-@taken_in(fastmath={"contract"})
+@inlined(fastmath={"contract"})
 def _facing(local, x, y, z, axes, margin, faces, begin):  # type: ignore[no-untyped-def]
     """Whether a vertex ``faces`` an antenna, or not away by more than the margin.
 
@@ -78,7 +78,7 @@ def _facing(local, x, y, z, axes, margin, faces, begin):  # type: ignore[no-unty
         begin[vertex] = met if along < 0 and chord > 0 else 1.0
 
 
-@taken_in()
+@inlined()
 def _grown(rays):  # type: ignore[no-untyped-def]
     """Twice the room; number by number, as to assign slices takes seconds to compile."""
     rows, columns = rays.shape
@@ -99,7 +99,7 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start, local, way = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     low, high, near, far = np.empty((every, VIEWS)), np.empty((every, VIEWS)), np.empty(every), np.empty(every)
-    chosen, hiders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
+    chosen, occluders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
     faces, begins, begin, places = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices), np.empty((3, n_vertices))
     rays, whose, count = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64), 0
     entry, first, nearest = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
@@ -114,7 +114,7 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
             found = 0
             for other in range(every):
                 if other != part and may_hide(part, other, low, high, near, far):
-                    hiders[found] = other
+                    occluders[found] = other
                     found += 1
             if found == 0:
                 continue
@@ -122,7 +122,7 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                 local[i] = 0.0
                 for j in range(3):
                     local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
-            # Hider by hider and coordinate by coordinate: these loops run in vector lanes.
+            # Occluder by occluder and coordinate by coordinate: these loops run in vector lanes.
             all_x, all_y, all_z = vertices[part, 0], vertices[part, 1], vertices[part, 2]
             _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
             x, y, z, facing = places[0], places[1], places[2], np.uint64(0)
@@ -136,8 +136,8 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                 entry[i], first[i] = math.inf, -1.0
             before, slot = count, (a * len(parts) + n) * n_vertices
             for k in range(found):
-                into_ball(part, hiders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
-                if _pass(x, y, z, start, turn, shift, float(hiders[k]), entry, first, nearest) == 0:
+                into_ball(part, occluders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
+                if _pass(x, y, z, start, turn, shift, float(occluders[k]), entry, first, nearest) == 0:
                     continue
                 for i in range(facing):
                     if nearest[i] < 0 or nearest[i] > begin[i]:
@@ -153,7 +153,7 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                     for j in range(3):
                         rays[j, count], rays[3 + j, count] = start[j] + ahead * way[j], way[j] / distance
                     rays[6, count] = (1 - ahead) * distance
-                    whose[0, count], whose[1, count] = i, hiders[k]
+                    whose[0, count], whose[1, count] = i, occluders[k]
                     count += 1
             # What certainly hides a vertex needs no rays to what stands behind it.
             kept = before
@@ -215,7 +215,7 @@ class FacetTracer:
             Another part that hides it, nearer to the antenna than its own part on the same line; else -1.
         """
         hidden = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
-        rays, (slot, hider) = _choose(
+        rays, (slot, occluder) = _choose(
             np.ascontiguousarray(antennas, dtype=np.float64),
             np.ascontiguousarray(parts, dtype=np.int64),
             np.ascontiguousarray(centres, dtype=np.float64),
@@ -226,5 +226,5 @@ class FacetTracer:
             hidden,
         )
         met = self._sphere.meets(rays)
-        hidden.ravel()[slot[met]] = hider[met]
+        hidden.ravel()[slot[met]] = occluder[met]
         return hidden

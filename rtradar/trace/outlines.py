@@ -6,25 +6,25 @@ import math
 
 import numpy as np
 
-from rtradar.compiled import taken_in
+from rtradar.kernels.jit import inlined
 
 VIEWS = 8
 """Directions across the line of sight in which two outlines are compared."""
 
 
-@taken_in()
+@inlined()
 def _normalize(vector):  # type: ignore[no-untyped-def]
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     for i in range(3):
         vector[i] /= length
 
 
-@taken_in()
+@inlined()
 def _cross(a, b, out):  # type: ignore[no-untyped-def]
     out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@taken_in()
+@inlined()
 def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type: ignore[no-untyped-def]
     """How parts stand before an antenna: from where to where (part, view) across the view, and along it (part,).
 
@@ -76,7 +76,7 @@ def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type
             low[part, view], high[part, view] = middle - half, middle + half
 
 
-@taken_in()
+@inlined()
 def may_hide(part, other, low, high, near, far):  # type: ignore[no-untyped-def]
     """Whether one part may stand before another: it begins before that ends, and no view shows a gap between them."""
     if near[other] >= far[part]:

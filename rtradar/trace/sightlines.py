@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.compiled import compiled, taken_in
+from rtradar.kernels.jit import compiled, inlined
 from rtradar.trace.clearance import clearance
 
 DOUBTFUL = 0.005
@@ -57,7 +57,7 @@ def clearances(
     return out
 
 
-@taken_in()
+@inlined()
 def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
     """Mean (own, 3) of one end of the lines to each part, and how far (own,) squared they stray from it; added to zeros."""
     for ray in range(len(own)):

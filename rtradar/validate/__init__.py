@@ -13,7 +13,7 @@ from pathlib import Path
 from tqdm import tqdm
 
 from rtradar.errors import InputError
-from rtradar.files import check_place, write_json
+from rtradar.system.files import check_place, write_json
 from rtradar.validate.claims import Claim, choose, claims, validation_folder
 from rtradar.validate.outcome import Outcome, Row, by_key, run_claim, used_up, worst
 from rtradar.validate.readme import BEGIN, END, KEYS, around_table, markdown, write_readme

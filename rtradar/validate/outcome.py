@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rtradar.files import temporary_folder
+from rtradar.system.files import temporary_folder
 from rtradar.validate.claims import Claim
 
 Row = dict[str, Any]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.files import atomic_file, read_bytes
+from rtradar.system.files import atomic_file, read_bytes
 from rtradar.validate.outcome import Outcome, Row, used_up
 
 BEGIN, END = "<!-- validation: begin -->", "<!-- validation: end -->"

@@ -27,7 +27,7 @@ from rtradar.clouds import Collection, Sample
 from rtradar.clouds.collection_index import sweep, write_index
 from rtradar.clouds.sample import sample_path
 from rtradar.errors import CampaignError, InputError
-from rtradar.output_folder import alone_in
+from rtradar.system.output_folder import alone_in
 
 RECIPES = [
     Recipe(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
@@ -189,7 +189,7 @@ def test_half_samples_of_own_workers_go_as_the_process_has_to_end(tmp_path: Path
 import contextlib, os
 from pathlib import Path
 from rtradar.campaign import build
-from rtradar.files import discard_unfinished
+from rtradar.system.files import discard_unfinished
 folder = Path({str(tmp_path)!r})
 
 @contextlib.contextmanager

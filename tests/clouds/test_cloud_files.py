@@ -6,7 +6,7 @@ import trimesh
 
 from rtradar.clouds import save_cloud_npz, save_ply
 from rtradar.errors import InputError
-from rtradar.files import atomic_file
+from rtradar.system.files import atomic_file
 
 POINTS = np.random.default_rng(0).normal(size=(40, 3))
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar import spool
-from rtradar.motion import Motion, amc, bvh
+from rtradar.motion import Motion
+from rtradar.motion.formats import amc, bvh
+from rtradar.system import row_files
 
 ASF = """# a comment
 :version 1.10
@@ -75,8 +76,8 @@ def in_pieces(monkeypatch: pytest.MonkeyPatch) -> Callable[[], None]:
     """From then on blocks are of three or four frames, and wait in files."""
 
     def cut() -> None:
-        monkeypatch.setattr(spool, "_MOST_IN_MEMORY", 0)
-        monkeypatch.setattr(spool, "_ROWS_AT_ONCE", 3)
+        monkeypatch.setattr(row_files, "_MOST_IN_MEMORY", 0)
+        monkeypatch.setattr(row_files, "_ROWS_AT_ONCE", 3)
         for reader in (amc, bvh):
             monkeypatch.setattr(reader, "FRAMES_AT_ONCE", 4)
 

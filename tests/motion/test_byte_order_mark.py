@@ -10,9 +10,9 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.files import read_json
-from rtradar.motion.textfile import read_lines
-from rtradar.toml_tables import read_toml
+from rtradar.motion.formats.text_file import read_lines
+from rtradar.system.files import read_json
+from rtradar.system.toml_tables import read_toml
 
 ASF = """:version 1.10
 :units

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.motion import load_motion
-from rtradar.motion.c3d import LONGEST_GAP_S, _Bounded, read_markers
-from rtradar.motion.joints import to_nodes
-from rtradar.motion.markers import CENTRES, NEEDED, SHANK_M
-from rtradar.motion.names import NODES
+from rtradar.motion.formats.c3d import LONGEST_GAP_S, _Bounded, read_markers
+from rtradar.motion.formats.markers import CENTRES, NEEDED, SHANK_M
+from rtradar.motion.retarget import to_nodes
+from rtradar.motion.skeleton_names import NODES
 
 FRAMES, RATE = 90, 120.0
 
@@ -119,10 +119,10 @@ def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
     """Markers of somebody of this height, and the centres of the joints, of the left side: forward, left, up [m].
 
     He stands with his forearms forward, his thumbs up and his gaze level. Heights and breadths are fractions of the standing
-    height after Drillis and Contini (see `rtradar.motion.figure`): chin 0.870, eyes 0.936, shoulders 0.818 high and 0.129 to
-    the side, hips 0.530 and 0.048, knees 0.285, ankles 0.039. Markers lie on the skin, about 3 to 6 cm from the centre of a
-    limb; waist markers are worn on the crest of the hip bone, 0.60 high, and wrist bars stand off the back of the hand's wrist.
-    The head is carried before the spine: the ear lies 50 degrees above the horizontal of the seventh cervical vertebra.
+    height after Drillis and Contini (see `rtradar.motion.synthetic.figure`): chin 0.870, eyes 0.936, shoulders 0.818 high and
+    0.129 to the side, hips 0.530 and 0.048, knees 0.285, ankles 0.039. Markers lie on the skin, about 3 to 6 cm from the centre
+    of a limb; waist markers are worn on the crest of the hip bone, 0.60 high, and wrist bars stand off the back of the hand's
+    wrist. The head is carried before the spine: the ear lies 50 degrees above the horizontal of the seventh cervical vertebra.
     """
     arm, elbow = 0.118, 0.818 - 0.186
     joints = {

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion, synthetic_motion
-from rtradar.motion.joints import multiply, to_nodes
-from rtradar.motion.names import ASF_JOINTS, CHAIN_24, NODE_PARENT, NODES, plain
+from rtradar.motion.retarget import multiply, to_nodes
+from rtradar.motion.skeleton_names import ASF_JOINTS, CHAIN_24, NODE_PARENT, NODES, plain
 
 
 def test_31_to_24_to_22() -> None:

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion import ACTIVITIES, Motion, load_motion, place, synthetic_motion, textfile
-from rtradar.motion.names import NODES
+from rtradar.motion import ACTIVITIES, Motion, load_motion, place, synthetic_motion
+from rtradar.motion.formats import text_file as textfile
+from rtradar.motion.skeleton_names import NODES
 
 
 @pytest.mark.parametrize("frames", [1, 3, 4, 5, 8, 11])

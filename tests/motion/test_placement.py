@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion, cut, place, synthetic_motion
-from rtradar.motion.names import NODES
 from rtradar.motion.placement import MARGIN_FRAMES, hip_headings, median_heading, walk_direction
+from rtradar.motion.skeleton_names import NODES
 
 
 @pytest.fixture(scope="module")

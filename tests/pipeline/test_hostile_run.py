@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.pipeline.view import load_linked, view
+from rtradar.pipeline.pictures.run_view import load_linked, view
 from rtradar.radar import Radar
-from rtradar.report.moments import Moments, save_moments
+from rtradar.report.view.snapshots import Moments, save_moments
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=4, chirp_duration_s=1e-3, frame_duration_s=4e-3)
 MAPS: dict[str, Any] = {

@@ -11,9 +11,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
-from rtradar.pipeline.indoors import ghosts
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.scatter.multipath import Multipath
+from rtradar.pipeline.rooms.indoors import ghosts
+from rtradar.scatter.multipath.multipath import Multipath
 
 RADAR = rt.Radar(
     name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=256, frame_duration_s=0.05

@@ -12,7 +12,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
-from rtradar.pipeline.inside import Inside
+from rtradar.pipeline.rooms.inside_walls import Inside
 from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_rung
 from rtradar.scene import Furniture, Scene, Wall, material

@@ -1,4 +1,4 @@
-"""What a run keeps of body and echoes: held against spheres, whose mirror points and ranges are closed forms."""
+"""What a run keeps of body and echoes: held against spheres, whose specular points and ranges are closed forms."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.pipeline import moments as module
-from rtradar.pipeline.moments import moments
+from rtradar.pipeline.pictures import snapshots as module
+from rtradar.pipeline.pictures.snapshots import moments
 from rtradar.scatter import build_rung
-from rtradar.scatter.multipath import Multipath
+from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Scene, Wall, material
 
 # One antenna at one place, so that lengths are those of a radar in the middle of its array.

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import rtradar as rt
 from rtradar.exchange import read_cloud
-from rtradar.pipeline.view import load_linked, view
+from rtradar.pipeline.pictures.run_view import load_linked, view
 
 LINES = {"y": {"tx_y": 2, "tx_z": 0, "rx_y": 4, "rx_z": 0}, "z": {"tx_y": 0, "tx_z": 2, "rx_y": 0, "rx_z": 4}}
 

@@ -5,10 +5,10 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.pipeline.room import RoomIf
+from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.radar import Radar
-from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.clutter_shadow import ClutterShadow
+from rtradar.scatter.clutter.body_shadow import ClutterShadow
+from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 from rtradar.signal import synthesize
 

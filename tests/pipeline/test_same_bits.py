@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import rtradar
-from rtradar.threads import environment_of
+from rtradar.system.threads import environment_of
 
 RADAR = "tx_y = 2\ntx_z = 2\nrx_y = 4\nrx_z = 4\nchirp_duration_s = 125e-6\nsamples_per_chirp = 128\nframe_duration_s = 0.05\n"
 
@@ -79,11 +79,11 @@ def compiled_functions() -> dict[tuple[Path, str], tuple[set[str], bool]]:
     for path in sorted(Path(rtradar.__file__).parent.rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             made = [ast.unparse(one) for one in node.decorator_list] if isinstance(node, ast.FunctionDef) else []
-            if any(words.startswith(("compiled(", "taken_in(", "njit(")) for words in made):
+            if any(words.startswith(("compiled(", "inlined(", "njit(")) for words in made):
                 calls = {
                     call.func.id for call in ast.walk(node) if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
                 }
-                found[path, node.name] = calls, made[0].startswith("taken_in(") or "inline=" in made[0]
+                found[path, node.name] = calls, made[0].startswith("inlined(") or "inline=" in made[0]
     return found
 
 
@@ -92,8 +92,8 @@ def test_compiled_functions_take_in_those_they_call() -> None:
     assert len(functions) > 50
     linked = [
         f"{path.name}: {name}"
-        for (path, name), (_, taken_in) in functions.items()
+        for (path, name), (_, inlined) in functions.items()
         for (other, _), (calls, _) in functions.items()
-        if name in calls and not taken_in and (other == path or re.search(rf"import .*\b{name}\b", other.read_text("utf-8")))
+        if name in calls and not inlined and (other == path or re.search(rf"import .*\b{name}\b", other.read_text("utf-8")))
     ]
     assert linked == []

@@ -17,8 +17,8 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.pipeline.view import load_linked, view
-from rtradar.report.linked_page import COLOURS
+from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.report.view.page import COLOURS
 
 
 @pytest.fixture(scope="module")

@@ -14,12 +14,12 @@ from rtradar.pipeline import prepare as preparing
 from rtradar.pipeline import warm_up
 from rtradar.pipeline.warm_up import processing_compiled_beside
 from rtradar.radar import Radar
-from rtradar.threads import THREADS_VARIABLE
+from rtradar.system.threads import THREADS_VARIABLE
 
 FIRST_USE = """
 import tempfile, rtradar as rt
 from rtradar.process.slow_time_dft import _add_power
-from rtradar.scatter.mirror import _mirror
+from rtradar.scatter.specular_point.solver import _mirror
 from rtradar.signal.tones import add_tones
 motion, radar = rt.synthetic_motion("walk", seed=0, duration_s=0.15), rt.Radar.preset("paper-12ghz")
 rt.run(motion, radar, fidelity="analytic", snr_db=20, out=tempfile.mkdtemp())

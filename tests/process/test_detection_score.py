@@ -12,7 +12,7 @@ from hypothesis.extra import numpy as hnp
 
 from rtradar.errors import InputError
 from rtradar.process import power_map, range_spectrum
-from rtradar.process.detection_score import DetectionScore, cell_noise_power, score, target_cells
+from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
 from rtradar.radar import Radar
 
 MASKS = hnp.arrays(np.bool_, (5, 7))

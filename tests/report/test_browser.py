@@ -14,7 +14,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.html import write_report
+from rtradar.report.pages.run_page import write_report
 
 pytestmark = pytest.mark.slow
 

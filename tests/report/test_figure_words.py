@@ -27,9 +27,9 @@ from rtradar.report import (
     draw_spatial_cloud,
     draw_spectrogram,
 )
-from rtradar.report.field_units import FieldUnit
-from rtradar.report.figures import new_figure, save_figure
-from rtradar.report.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
+from rtradar.report.figures.field_units import FieldUnit
+from rtradar.report.figures.maps import new_figure, save_figure
+from rtradar.report.figures.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
 from rtradar.signal import synthesize
 
 RADAR = rt.Radar(samples_per_chirp=16, tx_y=1, tx_z=0, rx_y=2, rx_z=0)
@@ -135,7 +135,7 @@ def test_a_sphere_reads_its_own_cross_section(drawn: list[Figure], preset: str, 
     radar = dataclasses.replace(radar, frame_duration_s=0.02)
     distance = (row + offset) * radar.range_bin_m
     middle = np.asarray(radar.position_m) + np.array([distance + radius, 0, 0])
-    # To the nearest point of the sphere and back, from the closed form of its mirror point for antennas close to each other.
+    # To the nearest point of the sphere and back, from the closed form of its specular point for antennas close to each other.
     legs = [np.linalg.norm(antennas - middle, axis=1) - radius for antennas in (radar.tx, radar.rx)]
     chirps = np.arange(radar.chirps_per_frame)
     tx = radar.tx_of_chirp(chirps)

@@ -20,9 +20,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.html import write_report
-from rtradar.report.sections import limits_table, quantity
-from rtradar.report.viewer import MOST_FRAMES, MOST_POINTS, figure_data, rdt_data, spatial_data
+from rtradar.report.pages.run_page import write_report
+from rtradar.report.pages.sections import limits_table, quantity
+from rtradar.report.view.three_d import MOST_FRAMES, MOST_POINTS, figure_data, rdt_data, spatial_data
 
 RADAR = rt.Radar.preset("paper-12ghz")
 EVIL = "walk</script><script>alert('1')</script><img src=x>&\"amc"

@@ -12,12 +12,12 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.levels import Levels
-from rtradar.report.linked import Linked
-from rtradar.report.linked_page import linked_data
-from rtradar.report.moments import Moments
-from rtradar.report.part_groups import GROUPS, group_of_parts
-from rtradar.report.viewer import semi_axis_poses
+from rtradar.report.figures.decibels import Levels
+from rtradar.report.figures.part_groups import GROUPS, group_of_parts
+from rtradar.report.view.page import linked_data
+from rtradar.report.view.run_view import Linked
+from rtradar.report.view.snapshots import Moments
+from rtradar.report.view.three_d import semi_axis_poses
 
 RADAR = rt.Radar.preset("paper-12ghz")
 LOW_DB = -60.0

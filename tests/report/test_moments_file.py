@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.report.moments import Moments, load_moments, save_moments
+from rtradar.report.view.snapshots import Moments, load_moments, save_moments
 
 
 def example() -> Moments:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rtradar.radar import Radar
-from rtradar.report import room_figures
+from rtradar.report.figures import rooms as room_figures
 from rtradar.scene import Furniture, Scene, material
 
 

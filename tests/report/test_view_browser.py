@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline.view import load_linked, view
-from rtradar.report.linked import Linked
+from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.report.view.run_view import Linked
 from rtradar.scene import Furniture, material
 
 pytestmark = pytest.mark.slow
@@ -75,7 +75,7 @@ def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked], bes
         np.testing.assert_allclose(centres(browser), moments.poses[step, :, 0], atol=1e-5)
         time = moments.times[step]
         assert browser.evaluate("document.getElementById('clock').textContent").startswith(f"{time:.2f} / ")
-        # Direct paths: antenna, mirror point, gap, for each echo above the floor.
+        # Direct paths: antenna, specular point, gap, for each echo above the floor.
         own = np.flatnonzero(linked.seen[step] & moments.direct)
         lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(len(own), 3, 3)
         np.testing.assert_allclose(lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6)

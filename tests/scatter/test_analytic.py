@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
-from rtradar.scatter.analytic import Analytic, far_field_echo, plane_wave_echo
+from rtradar.scatter.models.analytic import Analytic, far_field_echo, plane_wave_echo
 from rtradar.signal import synthesize
 
 Array = NDArray[np.float64]
@@ -116,7 +116,7 @@ def test_along_an_axis_the_surface_is_a_semi_axis_nearer(aspect: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_at_four_metres_it_is_the_shortest_path_but_for_a_millimetre(seed: int) -> None:
-    # Fermat: the true mirror point makes the path over the surface shortest. Ours is where a far radar would see it.
+    # Fermat: the true specular point makes the path over the surface shortest. Ours is where a far radar would see it.
     body = toy(parts=1, seed=seed)
     tx, rx = np.array([-4.0, 1.2, 1.0]), np.array([-4.0, 0.9, 1.0])
     length, _ = one(tx, rx, body)

@@ -20,10 +20,20 @@ from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_rung
-from rtradar.scatter.auto import Auto
-from rtradar.scatter.forecast import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, REFERENCE, SPECULAR, WAYS, Forecast, forecast
-from rtradar.scatter.plan import choose
-from rtradar.trace.backend import Backend
+from rtradar.scatter.models.auto import Auto
+from rtradar.scatter.models.auto_errors import (
+    ANALYTIC,
+    FRESNEL,
+    LEFT_OUT,
+    PHYSICAL_OPTICS,
+    REFERENCE,
+    SPECULAR,
+    WAYS,
+    Forecast,
+    forecast,
+)
+from rtradar.scatter.models.auto_plan import choose
+from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 RADAR = rt.Radar.preset("paper-12ghz")
@@ -50,7 +60,7 @@ def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() ->
 def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
     told = forecast(RADAR, two_spheres(1.0))
     assert told.in_view.all()
-    # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the mirror point, by both ways.
+    # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by both ways.
     distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
     assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
     assert told.true[0, 0] == pytest.approx(np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02)
@@ -62,14 +72,14 @@ def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
     beam = dataclasses.replace(RADAR, tx_antenna=Antenna(pattern="cosine", exponent=9.0))
     told, plain = (forecast(radar, poses) for radar in (beam, RADAR))
     way = poses.centres[0] - np.asarray(RADAR.position_m)
-    # By the directions of the centres; those of the mirror points lie up to a degree beside them.
+    # By the directions of the centres; those of the specular points lie up to a degree beside them.
     expected = (way[:, 0] / np.linalg.norm(way, axis=1)) ** 9
     for name in ("true", "wrong", "optics", "power"):
         before, after = getattr(plain, name)[0], getattr(told, name)[0]
         np.testing.assert_allclose(after, before * expected, rtol=0.05, err_msg=name)
 
 
-def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_mirror_point_errs_by_half() -> None:
+def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_point_errs_by_half() -> None:
     # Seen from 4.2 m, the edge of a sphere of 0.2 m that is 1 m nearer touches the line to the middle of the far one.
     distance = np.linalg.norm(np.asarray(RADAR.position_m))
     # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a right triangle.
@@ -95,7 +105,7 @@ def forecast_of(wrong: list[list[float]], true: list[float], hidden: list[bool] 
         optics=np.zeros_like(squares),
         in_view=np.ones((1, len(true)), dtype=bool),
         hidden=np.array([hidden or [False] * len(true)]),
-        hiders=np.zeros((1, len(true), len(true)), dtype=bool),
+        occluders=np.zeros((1, len(true), len(true)), dtype=bool),
     )
 
 
@@ -134,7 +144,7 @@ def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(seed: int, power
         optics=np.zeros((5, len(WAYS), 6)),
         in_view=np.zeros((5, 6), dtype=bool),
         hidden=rng.random((5, 6)) < 0.1,
-        hiders=np.zeros((5, 6, 6), dtype=bool),
+        occluders=np.zeros((5, 6, 6), dtype=bool),
     )
     chosen = choose(told, power_share, complex_share)[:, None]
     whole = true.sum(axis=1)

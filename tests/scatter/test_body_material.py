@@ -12,7 +12,7 @@ from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_rung
-from rtradar.scatter.body_material import antenna_field, body_material, body_reflection, material_factor
+from rtradar.scatter.common.body_material import antenna_field, body_material, body_reflection, material_factor
 from rtradar.scene import material
 
 Array = NDArray[np.float64]

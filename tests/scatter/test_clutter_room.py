@@ -7,7 +7,7 @@ import pytest
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.clutter import Clutter
+from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 from rtradar.signal import synthesize
 

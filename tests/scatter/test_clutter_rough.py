@@ -7,11 +7,11 @@ import pytest
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.clutter_returns import RoomEchoes
-from rtradar.scatter.clutter_rough import rough_returns
-from rtradar.scatter.room_walls import reflect
+from rtradar.scatter.clutter.diffuse import rough_returns
+from rtradar.scatter.clutter.returns import RoomEchoes
+from rtradar.scatter.multipath.wall_interaction import reflect
 from rtradar.scene import Scene, Wall, material, slab
-from rtradar.trace.backend import select, use
+from rtradar.trace.backends.backend import select, use
 from rtradar.trace.room_tracer import RoomTracer
 
 RADAR = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=(-8, 0, 1), samples_per_chirp=1024)

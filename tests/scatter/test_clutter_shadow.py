@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.clutter_shadow import ClutterShadow, smooth
+from rtradar.scatter.clutter.body_shadow import ClutterShadow, smooth
+from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 
 Array = NDArray[np.float64]

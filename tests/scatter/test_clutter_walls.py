@@ -10,10 +10,10 @@ import trimesh
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.clutter_returns import RoomEchoes
-from rtradar.scatter.clutter_walls import mirror_returns
+from rtradar.scatter.clutter.returns import RoomEchoes
+from rtradar.scatter.clutter.specular_walls import mirror_returns
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
-from rtradar.trace.backend import select, use
+from rtradar.trace.backends.backend import select, use
 from rtradar.trace.room_tracer import RoomTracer
 
 SIZE, CORNER = (6.0, 4.5, 2.6), (-4.8, -2.0)

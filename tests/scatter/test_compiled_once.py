@@ -9,8 +9,8 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.scatter import build_rung
-from rtradar.threads import THREADS_VARIABLE
-from rtradar.trace.backend import Backend
+from rtradar.system.threads import THREADS_VARIABLE
+from rtradar.trace.backends.backend import Backend
 
 RADAR = rt.Radar.preset("paper-12ghz")
 

@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter.facet_integral import facet_integral
-from rtradar.scatter.facet_scattering import facet_scattering
-from rtradar.scatter.facets import ellipsoid_facets, mesh_facets, subdivisions_for
-from rtradar.scatter.polarization import copolar
-from rtradar.scatter.triangle_share import positive_share
-from rtradar.trace.backend import use
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.facets.integral import facet_integral
+from rtradar.scatter.facets.surfaces import ellipsoid_facets, mesh_facets, subdivisions_for
+from rtradar.scatter.facets.target import facet_scattering
+from rtradar.scatter.facets.triangle_fraction import positive_share
+from rtradar.trace.backends.backend import use
 from rtradar.trace.clearance import clearance
 from rtradar.trace.facet_visibility import FacetTracer
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from rtradar.scatter.first_come import FirstCome
+from rtradar.scatter.common.keyframe_cache import FirstCome
 
 
 def test_a_second_pass_from_the_start_finds_the_first_ones_again() -> None:

@@ -15,13 +15,14 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter import fresnel, fresnel_anchors
-from rtradar.scatter.fresnel import Fresnel, fresnel_scattering, sweep_nodes
-from rtradar.scatter.fresnel_meridians import RIM, zone_rays
-from rtradar.scatter.fresnel_zone import zone_shares
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.specular import Specular
-from rtradar.trace.backend import Backend
+from rtradar.scatter.fresnel_zones import keyframes as fresnel_anchors
+from rtradar.scatter.fresnel_zones.grid import RIM, zone_rays
+from rtradar.scatter.fresnel_zones.visible_fraction import zone_shares
+from rtradar.scatter.models import fresnel
+from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering, sweep_nodes
+from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 C = 299_792_458.0
@@ -62,8 +63,8 @@ def share_behind_plate(radius: float, frequency: float, edge: float) -> complex:
     poses = (np.array([[np.zeros(3), below]]), np.tile(np.eye(3), (1, 2, 1, 1)), np.array([[radius] * 3, [1e-4, 20.0, 1.0]]))
     point = np.array([[-radius, 0.0, 0.0]])
     ends, zero = ANTENNA[None], np.zeros(1, dtype=np.int64)
-    hiders = np.array([[False, True]])
-    share = zone_shares(ends, ends, point, zero, zero, poses, ends[None], np.array([[0, 0]]), hiders, k[None], k)
+    occluders = np.array([[False, True]])
+    share = zone_shares(ends, ends, point, zero, zero, poses, ends[None], np.array([[0, 0]]), occluders, k[None], k)
     assert share.shape == (1, 1, 1)
     return complex(share[0, 0, 0])
 
@@ -197,7 +198,7 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
     # 5 cm on either side, four Fresnel radii: a round edge diffracts a little more than the 0.1 of a straight one.
     assert np.abs(share[0]) < 0.15
     assert np.abs(share[-1] - 1) < 0.15
-    # The mirror point comes free as the edge crosses y = 0: a straight edge leaves a half there, a round one a little more.
+    # The specular point comes free as the edge crosses y = 0: a straight edge leaves a half there, a round one a little more.
     assert share[200] == pytest.approx(0.5, abs=0.1)
     poses = body.at(radar.chirp_times(len(chirps), 200))
     exact = []

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
-from rtradar.scatter.ghost_echoes import Nearby, nearby_echoes
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.polarization import copolar
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.specular_point.nearby import Nearby, nearby_echoes
+from rtradar.scatter.specular_point.solver import mirror
 
 Array = NDArray[np.float64]
 

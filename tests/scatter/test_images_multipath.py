@@ -13,14 +13,14 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.multipath import ANCHORS_S, Multipath
-from rtradar.scatter.polarization import copolar
-from rtradar.scatter.poses import anchor_step, chirp_poses
-from rtradar.scatter.specular import Specular
-from rtradar.scatter.wall_paths import images, wall_paths
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.poses import anchor_step, chirp_poses
+from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.multipath.image_paths import images, wall_paths
+from rtradar.scatter.multipath.multipath import ANCHORS_S, Multipath
+from rtradar.scatter.specular_point.solver import mirror
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls
-from rtradar.trace.backend import Backend
+from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 SIDES = {
@@ -124,7 +124,7 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str,
     )
     # Of third order in the distance of a receiver from the middle of its line: 4 cm.
     np.testing.assert_allclose(echoes.length[..., number], length[..., 0], rtol=0, atol=1e-7)
-    # Between the ends of a line of antennas the polarisation is drawn straight, and the return is that of one mirror point.
+    # Between the ends of a line of antennas the polarisation is drawn straight, and the return is that of one specular point.
     np.testing.assert_allclose(echoes.amplitude[0, ..., number], amplitude[..., 0], rtol=0.01)
     assert echoes.bounces[number] == 3
     assert echoes.part[number] == 0
@@ -448,7 +448,7 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(backend: Backend) -> None:
         Multipath(single(), body, scene, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
         for name in ("perfect-conductor", "skin")
     )
-    # The mirror point is met at 20 degrees by a field across the plane of incidence: TE by hand, and nearly alike.
+    # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand, and nearly alike.
     eta = material("skin").eta(metal.frequency)[0]
     ratio = skin.amplitude[0, 0, 0, 1] / metal.amplitude[0, 0, 0, 1]
     image = np.array([-4.0, 4.0, 1.0])

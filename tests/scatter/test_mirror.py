@@ -1,4 +1,4 @@
-"""The mirror point: against spheres in closed form, Fermat, and the symmetries of space."""
+"""The specular point: against spheres in closed form, Fermat, and the symmetries of space."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar import rcs
-from rtradar.scatter.mirror import mirror
+from rtradar.scatter.specular_point.solver import mirror
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -40,7 +40,7 @@ def test_a_sphere_between_equally_distant_antennas(distance: float, half_angle: 
     a = 0.1
     tx, rx = (distance * np.array([np.cos(x), np.sin(x), 0.0]) for x in (half_angle, -half_angle))
     length, amplitude, point = solve(tx, rx, np.full(3, a), polarization=polarization)
-    # By symmetry the mirror point lies on the bisector.
+    # By symmetry the specular point lies on the bisector.
     leg = np.sqrt(distance**2 + a**2 - 2 * distance * a * np.cos(half_angle))
     cosine = (distance * np.cos(half_angle) - a) / leg
     # Divergence of a bundle in the plane of incidence and across it; co-polar is 1, for E_r = 2 (n.E) n - E_i there.
@@ -200,6 +200,6 @@ def test_grazing_rays_have_no_reflection_but_a_length() -> None:
     length, amplitude, _ = mirror(tx, rx, centres, frames, np.full((1, 3), 0.12))
     assert np.isfinite(length).all()
     assert np.isfinite(amplitude).all()
-    # Where the sphere stands in the line there is no mirror point, and well beside it there is one.
+    # Where the sphere stands in the line there is no specular point, and well beside it there is one.
     assert (amplitude[np.abs(across) < 0.11] == 0).all()
     assert (amplitude[np.abs(across) > 0.13] > 0).all()

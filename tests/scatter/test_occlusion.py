@@ -1,4 +1,4 @@
-"""Which mirror points are seen, and how they fade: on bodies whose shadows are known."""
+"""Which specular points are seen, and how they fade: on bodies whose shadows are known."""
 
 from dataclasses import dataclass
 
@@ -8,12 +8,13 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung, occlusion
-from rtradar.scatter.mirror import mirror
-from rtradar.scatter.mirror_starts import MirrorStarts
-from rtradar.scatter.occlusion import MirrorVisibility, trace_anchor, unobstructed
-from rtradar.scatter.poses import ChirpPoses, anchor_step, chirp_poses
-from rtradar.trace.backend import Backend, use
+from rtradar.scatter import build_rung
+from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
+from rtradar.scatter.specular_point import visibility as occlusion
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.start_points import MirrorStarts
+from rtradar.scatter.specular_point.visibility import MirrorVisibility, trace_anchor, unobstructed
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
@@ -63,7 +64,7 @@ def test_points_behind_another_part_are_hidden_on_either_leg(backend: Backend) -
     np.testing.assert_array_equal(seen[:, 1], [True, True, True])
 
 
-def test_an_anchor_knows_visibility_and_a_mirror_point_of_each_part(backend: Backend) -> None:
+def test_an_anchor_knows_visibility_and_a_specular_point_of_each_part(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(0.0)
     poses = body.at(np.zeros(radar.n_tx))
     at = ChirpPoses(np.arange(2), radar.tx, radar.rx[radar.rx_of_tx], *poses)
@@ -168,7 +169,7 @@ def test_some_parts_are_as_among_all(backend: Backend) -> None:
             np.testing.assert_array_equal(of_some, start[:, parts])
 
 
-def test_starts_are_mirror_points_of_the_anchor_before_and_lead_to_the_same_points() -> None:
+def test_starts_are_specular_points_of_the_anchor_before_and_lead_to_the_same_points() -> None:
     radar, body = small_radar(), Curtain(speed=0.5)
     chirps = np.array([100, 104, 109, 110, 133])
     starts = MirrorStarts(radar, body)  # type: ignore[arg-type]

@@ -15,12 +15,12 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter.array_nodes import array_nodes, spread_nodes
-from rtradar.scatter.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch
-from rtradar.scatter.facet_scattering import facet_scattering
-from rtradar.scatter.physical_optics import PhysicalOptics
-from rtradar.scatter.reference import Reference
-from rtradar.scatter.specular import Specular
+from rtradar.scatter.common.array_interpolation import array_nodes, spread_nodes
+from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch
+from rtradar.scatter.facets.target import facet_scattering
+from rtradar.scatter.models.physical_optics import PhysicalOptics
+from rtradar.scatter.models.reference import Reference
+from rtradar.scatter.models.specular import Specular
 
 Array = NDArray[np.float64]
 
@@ -107,7 +107,7 @@ def test_spreading_can_be_left_out() -> None:
         Reference(radar, body, facets=1280, spreading=spread).echoes(np.array([60]))  # type: ignore[arg-type]
         for spread in (True, False)
     )
-    # Nearly monostatic: R_T = R_R = length / 2 at the mirror point, and facets that count stand within 2 cm of 3.5 m.
+    # Nearly monostatic: R_T = R_R = length / 2 at the specular point, and facets that count stand within 2 cm of 3.5 m.
     seen = np.abs(near.amplitude) > 1e-4
     np.testing.assert_allclose(np.abs(free.amplitude)[seen], (np.abs(near.amplitude) * (near.length / 2) ** 2)[seen], rtol=0.01)
 

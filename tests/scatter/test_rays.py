@@ -13,11 +13,11 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter import build_rung
-from rtradar.scatter.rays import Rays
-from rtradar.scatter.rays_scattering import rays_scattering
-from rtradar.scatter.triangle_mean import mean_of_phasor
-from rtradar.scatter.tubes import EllipsoidGrid, MeshGrid
-from rtradar.trace.backend import Backend
+from rtradar.scatter.facets.triangle_mean import mean_of_phasor
+from rtradar.scatter.models.rays import Rays
+from rtradar.scatter.ray_tubes.target import rays_scattering
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid
+from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 FAR = 1e6

@@ -1,4 +1,4 @@
-"""Walls in closed form: mirror points by Fermat, slab coefficients by hand, energy."""
+"""Walls in closed form: specular points by Fermat, slab coefficients by hand, energy."""
 
 import numpy as np
 import pytest
@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.scatter import room_walls as rw
-from rtradar.scatter.wall_series import whole_walls
+from rtradar.scatter.multipath import wall_interaction as rw
+from rtradar.scatter.multipath.slab_series import whole_walls
 from rtradar.scene import Scene, Wall, material, own_material, slab
 
 # A tilted front, so that no axis is special.
@@ -41,10 +41,10 @@ def wave(seed: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize("back", [False, True])
-def test_the_mirror_point_is_the_shortest_way_over_the_face(back: bool) -> None:
+def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> None:
     side = -1 if back else 1
     tx, rx = (MIDDLE + side * away * WALL.normal + [0.1 * away, 0.2, shift] for away, shift in ((1.5, 0.4), (0.7, -0.3)))
-    point, valid = rw.mirror_point(WALL, tx, rx, back=back)
+    point, valid = rw.specular_point(WALL, tx, rx, back=back)
     corner = WALL.corners[0] - (WALL.thickness_m if back else 0) * WALL.normal
     u, v = np.array(WALL.edge_u_m), np.array(WALL.edge_v_m)
 
@@ -60,12 +60,12 @@ def test_the_mirror_point_is_the_shortest_way_over_the_face(back: bool) -> None:
     np.testing.assert_allclose(length, found.fun, rtol=0, atol=1e-12)
 
 
-def test_no_mirror_point_on_the_other_side_or_beside_the_rectangle() -> None:
+def test_no_specular_point_on_the_other_side_or_beside_the_rectangle() -> None:
     before, behind = MIDDLE + WALL.normal, MIDDLE - WALL.normal
     up = np.array([0, 0, 6.0])
-    _, valid = rw.mirror_point(WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up]))
+    _, valid = rw.specular_point(WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up]))
     np.testing.assert_array_equal(valid, [False, False, False])
-    _, valid = rw.mirror_point(WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True)
+    _, valid = rw.specular_point(WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True)
     np.testing.assert_array_equal(valid, [False, True, False])
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rtradar.scatter.triangle_phase import SERIES, _phasor, _sine, sum_large, sum_small
+from rtradar.scatter.facets.triangle_phase import SERIES, _phasor, _sine, sum_large, sum_small
 
 
 def test_series_of_sine_and_cosine_are_as_exact_as_they_say() -> None:

@@ -13,13 +13,13 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
-from rtradar.scatter.clutter import Clutter
-from rtradar.scatter.multipath import Multipath
-from rtradar.scatter.specular import Specular
-from rtradar.scatter.wall_series import Term, room_series
+from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter.multipath.slab_series import Term, room_series
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material, slab
 from rtradar.scene.slab import slab_passes
-from rtradar.trace.backend import Backend
+from rtradar.trace.backends.backend import Backend
 
 Array = NDArray[np.float64]
 C = SPEED_OF_LIGHT_MPS
@@ -162,7 +162,7 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(b
         ways = start[:, None] - antennas
         cosine = ways[..., 0] / np.linalg.norm(ways, axis=-1)
         expected += 0.24 * (np.sqrt(3.91 - 1 + cosine**2) - cosine)
-    # The mirror point is not just where this takes it to be, 2 cm away at most.
+    # The specular point is not just where this takes it to be, 2 cm away at most.
     np.testing.assert_allclose(farther, expected, atol=1.5e-3)
     assert np.ptp(farther) > 2e-3
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy import stats
 
-import rtradar.threads
+import rtradar.system.threads
 from rtradar.radar import Radar
 from rtradar.signal import Noise
 
@@ -102,7 +102,7 @@ def test_seed() -> None:
 def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
     usual = noise(1.0, SMALL, 300)
     with ThreadPoolExecutor(threads) as pool:
-        monkeypatch.setattr(rtradar.threads, "_pool", lambda: pool)
+        monkeypatch.setattr(rtradar.system.threads, "_pool", lambda: pool)
         np.testing.assert_array_equal(noise(1.0, SMALL, 300), usual)
 
 

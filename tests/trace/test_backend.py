@@ -12,11 +12,11 @@ from pathlib import Path
 import pytest
 
 from rtradar.errors import BackendError, InputError
-from rtradar.trace import backend as backends
-from rtradar.trace import llvm, verdict
-from rtradar.trace.backend import Backend, BackendWarning, select, use
-from rtradar.trace.llvm import ENVIRONMENT_VARIABLE, Library
-from rtradar.trace.verdict import Verdict
+from rtradar.trace.backends import backend as backends
+from rtradar.trace.backends import llvm, verdict
+from rtradar.trace.backends.backend import Backend, BackendWarning, select, use
+from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
+from rtradar.trace.backends.verdict import Verdict
 
 BAD = Library("/lib/libLLVM-15.so.1", "environment")
 WHEEL = Library("/venv/lib/libLLVM.so.23.1", "wheel")
@@ -337,7 +337,7 @@ def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
         pytest.skip("this machine has no libLLVM that is bad")
     script = """
 import warnings
-from rtradar.trace.backend import loaded_llvm_version, select, use
+from rtradar.trace.backends.backend import loaded_llvm_version, select, use
 warnings.simplefilter("ignore")
 backend = select("cpu")
 mi = use(backend)

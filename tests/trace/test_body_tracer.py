@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar.body import Ellipsoids
-from rtradar.trace.backend import Backend, use
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer, Hits
 
 Array = NDArray[np.float64]

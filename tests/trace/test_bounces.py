@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.trace.backend import Backend, use
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.bounces import BodySurfaces, MeshSurfaces
 
 Array = NDArray[np.float64]

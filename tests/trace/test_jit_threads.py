@@ -13,8 +13,8 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.scatter import build_rung
-from rtradar.threads import THREADS_VARIABLE, in_threads
-from rtradar.trace.backend import Backend, use
+from rtradar.system.threads import THREADS_VARIABLE, in_threads
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.unit_sphere import UnitSphere
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
@@ -73,9 +73,9 @@ def in_a_new_process(program: str, threads: int) -> list[str]:
 def test_dr_jit_has_one_thread_until_many_rays_come(backend: Backend) -> None:
     program = f"""
 import numpy as np
-from rtradar.trace.backend import select, use
+from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import BodySurfaces
-from rtradar.trace.jit_threads import MANY_RAYS
+from rtradar.trace.backends.jit_threads import MANY_RAYS
 mi = use(select("{backend.kind}"))
 import drjit as dr
 surfaces = BodySurfaces(mi, np.ones((1, 3)))
@@ -91,8 +91,8 @@ for rays in ({"1," if backend.kind == "scalar" else "1, MANY_RAYS - 1, MANY_RAYS
 
 def test_threads_of_who_came_first_are_left_alone(backend: Backend) -> None:
     program = f"""
-from rtradar.trace.backend import select, use
-from rtradar.trace.jit_threads import MANY_RAYS, grow_for
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.backends.jit_threads import MANY_RAYS, grow_for
 backend = select("{backend.kind}")
 import os
 os.environ["DRJIT_LIBLLVM_PATH"] = backend.llvm_path or ""

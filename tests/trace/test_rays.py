@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtradar.trace.backend import Backend, use
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.rays import rays_of
 from rtradar.trace.unit_sphere import UnitSphere
 

@@ -8,7 +8,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from rtradar.scene import Furniture, Scene, material
-from rtradar.trace.backend import Backend, use
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.room_tracer import CLEAR_M, RoomTracer
 
 Array = NDArray[np.float64]

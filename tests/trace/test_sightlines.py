@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.trace.backend import Backend, use
+from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.sightlines import clearances, outline_rays
 

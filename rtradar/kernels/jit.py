@@ -1,0 +1,283 @@
+"""How Numba compiles loops: on first use, kept on disk for every later one, and no slower than need be."""
+
+from __future__ import annotations
+
+import gc
+import multiprocessing
+import warnings
+from collections.abc import Callable
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numba import njit, types
+from numba.core import event
+from numba.core.caching import CompileResultCacheImpl, IndexDataCacheFile, NullCache
+from numba.extending import register_jitable
+
+from rtradar.kernels.code_stamp import note_options, stamp_of
+
+_Function = Callable[..., Any]
+
+
+class CacheWarning(UserWarning):
+    """Compiled code cannot be kept on disk: what is done is right, but the next process compiles again."""
+
+
+def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
+    """Compile a function that Python calls.
+
+    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code is loaded again for as long as
+    all that went into it is the same, functions and constants of other modules included. Where it cannot be kept, a
+    `CacheWarning` says so once.
+
+    Parameters
+    ----------
+    parallel : bool
+        Whether Numba shares its ``prange`` among threads.
+    fastmath : bool or set of str
+        Liberties that LLVM may take with floating point: all of them, or those named.
+
+    Returns
+    -------
+    decorator
+    """
+    numba_decorator: Callable[[_Function], Any] = njit(nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath)
+
+    def decorator(function: _Function) -> _Function:
+        dispatcher = numba_decorator(function)
+        if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
+            dispatcher._cache = _CodeOnDisk(dispatcher)
+            dispatcher.compile = _with_room(dispatcher.compile)
+        return dispatcher
+
+    return decorator
+
+
+def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
+    """Have a function compiled into each compiled one that calls it; called by Python it is plain Python.
+
+    Nothing is made that only Python or a later process would use, which takes time. And only what is taken in rounds alike
+    whether its caller was just compiled or comes from disk.
+
+    Parameters
+    ----------
+    fastmath : bool or set of str
+        As of `compiled`, for what this function does.
+
+    Returns
+    -------
+    decorator
+    """
+    options = {"forceinline": True, "error_model": "numpy", "fastmath": fastmath}
+    numba_decorator: Callable[[_Function], _Function] = register_jitable(**options)
+
+    def decorator(function: _Function) -> _Function:
+        note_options(function, options)
+        return numba_decorator(function)
+
+    return decorator
+
+
+@inlined()
+def on_cache_lines(count, like):  # type: ignore[no-untyped-def]
+    """An array (count,) of the kind of ``like`` that begins where a cache line does.
+
+    From elsewhere, every load of 64 bytes would touch two lines.
+    """
+    store = np.empty(count + 64 // like.itemsize, dtype=like.dtype)
+    begin = (-store.ctypes.data % 64) // like.itemsize
+    return store[begin : begin + count]
+
+
+_ROOM = 2**16 + 2**10
+"""Places of a frame: with a few more than half a megabyte it gets a chunk of one, and leaves the rest to what it calls."""
+
+
+def _with_room(call: _Function) -> _Function:
+    """Call it where Python has room for the frames of what it calls.
+
+    CPython keeps frames in chunks of 16 KB. A recursion to and fro across the end of one, as that of Numba's compiler, has the
+    next chunk mapped and unmapped by the system each time; a frame too large for such a chunk gets a larger one.
+    """
+
+    def in_a_chunk_of_its_own(*arguments: Any) -> Any:
+        return call(*arguments)
+
+    in_a_chunk_of_its_own.__code__ = in_a_chunk_of_its_own.__code__.replace(co_stacksize=_ROOM)
+    return in_a_chunk_of_its_own
+
+
+class _CodeOnDisk(NullCache):
+    """Machine code of one function on disk. Numba asks for it before it compiles, and hands over what it has compiled.
+
+    Numba's own cache looks only at the file in which a function stands, not at what the function takes in from others. Here code
+    is kept under the function's stamp (`code_stamp`), taken whenever code is needed. Places and formats are Numba's.
+
+    Whatever goes wrong, be it a damaged file, a full disk or a Numba that does this otherwise, the function is compiled.
+    """
+
+    def __init__(self, dispatcher: Any) -> None:
+        self.trouble = ""
+        self._dispatcher = dispatcher
+        self._stamp = ""
+        self._file: Any = None
+
+    @cached_property
+    def _format(self) -> Any:
+        """Where this function's code is kept, and how it is written; None where no folder can be written."""
+        try:
+            return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
+        except Exception as error:
+            self._tell("no folder for it can be written" if "no locator available" in str(error) else error)
+            return None
+
+    @property
+    def cache_path(self) -> Any:
+        return None if self._format is None else self._format.locator.get_cache_path()
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        target_context.refresh()
+        file = self._take_stamp()
+        try:
+            found = None if file is None else file.load(self._key(sig))
+            if found is None:
+                return None
+            # Processes that compile for other arguments, or from another text, may have written the same file at the same time.
+            stamp, arguments, code = found
+            return self._format.rebuild(target_context, code) if (stamp, arguments) == (self._stamp, sig) else None
+        except Exception:  # a damaged file raises almost anything
+            return None
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        file = self._file
+        try:
+            if file is None or not self._format.check_cachable(data):
+                return
+            self._format.locator.ensure_cache_path()
+            entry = self._stamp, sig, self._format.reduce(data)
+            try:
+                file.save(self._key(sig), entry)
+            except OSError:
+                raise
+            except Exception:  # a damaged index
+                file.flush()
+                file.save(self._key(sig), entry)
+        except Exception as error:
+            self._tell(error)
+
+    def has_code(self) -> bool:
+        """Whether there is code of the function as it stands now."""
+        file = self._take_stamp()
+        try:
+            return file is not None and bool(file._load_index())
+        except Exception:
+            return False
+
+    def _take_stamp(self) -> Any:
+        """File of the function as it stands now; None where it has none."""
+        self._file = None
+        if self._format is not None:
+            try:
+                self._stamp = stamp_of(self._dispatcher)
+                self._file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
+                    cache_path=self.cache_path, filename_base=self._format.filename_base, source_stamp=self._stamp
+                )
+            except Exception as error:
+                self._tell(error)
+        return self._file
+
+    def _key(self, sig: Any) -> Any:
+        return sig, self._dispatcher.targetctx.codegen().magic_tuple()
+
+    def _tell(self, why: object) -> None:
+        """Tell once a process that code is not kept. Of workers, the process that starts them tells."""
+        global _told
+        told = why.strerror if isinstance(why, OSError) and why.strerror else str(why)
+        self.trouble = " ".join(told.split()) or type(why).__name__
+        if not _told and multiprocessing.parent_process() is None:
+            _told = True
+            warnings.warn(f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}", CacheWarning, stacklevel=2)
+
+
+_told = False
+
+CACHE_ADVICE = "every process compiles anew, for a minute or so: name a folder that can be written in NUMBA_CACHE_DIR"
+"""What it means that compiled code is not kept, and what helps."""
+
+
+def is_on_disk(function: _Function) -> bool:
+    """Whether any process here has compiled it before, or none can do so for this one.
+
+    Parameters
+    ----------
+    function : callable
+        Made by `compiled`.
+
+    Returns
+    -------
+    bool
+        True, too, where code is not kept and where nothing is compiled (``NUMBA_DISABLE_JIT``).
+    """
+    cache = getattr(function, "_cache", None)
+    return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
+
+
+def check_cache() -> None:
+    """Tell by a `CacheWarning` where no folder for compiled code can be written: before workers start, which tell nothing."""
+    is_on_disk(compiled()(_increment))
+
+
+def try_cache() -> tuple[str, str]:
+    """Compile a function, keep its code and load it again.
+
+    Returns
+    -------
+    finding : str
+        Where code is kept, or why it is not.
+    advice : str
+        What to do about it; empty where all is well.
+    """
+    dispatcher: Any = compiled()(_increment)
+    if not hasattr(dispatcher, "compile"):
+        return "nothing is compiled", "NUMBA_DISABLE_JIT is set, which makes all of it very slow: unset it"
+    cache, sig = dispatcher._cache, (types.int64,)
+    cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first
+    dispatcher._cache = NullCache()  # whatever is there, it is compiled
+    dispatcher.compile(sig)
+    cache.save_overload(sig, dispatcher.overloads[sig])
+    trouble = cache.trouble
+    if not trouble and cache.load_overload(sig, dispatcher.targetctx) is None:
+        trouble = "what was written could not be loaded again"
+    if trouble:
+        return f"not kept: {trouble}", f"compiled code is not kept; {CACHE_ADVICE}"
+    return f"kept, for one in {cache.cache_path}", ""
+
+
+def _increment(number):  # type: ignore[no-untyped-def]
+    return number + 1
+
+
+class _CollectorAtRest(event.Listener):
+    """Python's garbage collector rests while Numba compiles.
+
+    Compiling makes so many objects that the collector would go through all of Numba's own again and again.
+    """
+
+    def __init__(self) -> None:
+        self._depth, self._was_on = 0, False
+
+    # One thread compiles at a time, by Numba's lock; what a function calls is compiled meanwhile.
+    def on_start(self, _: event.Event) -> None:
+        if self._depth == 0:
+            self._was_on = gc.isenabled()
+            gc.disable()
+        self._depth += 1
+
+    def on_end(self, _: event.Event) -> None:
+        self._depth -= 1
+        if self._depth == 0 and self._was_on:
+            gc.enable()
+
+
+event.register("numba:compile", _CollectorAtRest())  # type: ignore[no-untyped-call]

@@ -1,0 +1,1 @@
+"""Readers of motion files, one module for each format."""

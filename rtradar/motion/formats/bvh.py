@@ -1,0 +1,276 @@
+"""BVH motions: any channel order, positions on any joint, y up.
+
+The global rotation of a joint turns the offsets of its children, so joint j of the `Motion` carries the rotation of its
+parent. End sites become joints named ``<parent>_end``, so that the rotation of a last joint is kept even where its end
+site has no length.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from contextlib import closing
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from rtradar.errors import InputError
+from rtradar.motion.axes import quaternions_to_world, to_world
+from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import rotate
+from rtradar.system.row_files import FileBackedRows, column, in_blocks
+
+UNITS_M = {"metre": 1.0, "CMU unit (0.45 inch)": 0.0254 / 0.45, "inch": 0.0254, "centimetre": 0.01, "millimetre": 0.001}
+"""Length units that BVH files use; the format itself has none."""
+
+_REACH_M = (0.7, 1.5)
+"""Length of bones from the root to the farthest end, person: 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
+
+_SHORTEST_S, _LONGEST_S = 1e-6, 10.0
+"""What a frame may last."""
+
+_STRETCH_M = 0.02
+"""Bones whose position channels move more than this are not rigid."""
+
+
+@dataclass
+class _Joint:
+    name: str
+    parent: int
+    line: int
+    offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
+    channels: tuple[str, ...] = ()
+    column: int = 0
+    """Of its first channel among those of all joints."""
+
+
+def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
+    """Read a BVH file.
+
+    Position channels of joints below the root replace the joint's offset; they must be constant but for the joint
+    that carries the whole body (Bandai-Namco: ``Hips`` under a still ``joint_Root``), which becomes the root.
+
+    Parameters
+    ----------
+    path : Path
+    unit_m : float, optional
+        Metres in one unit of the file; found from the size of the person where not given.
+
+    Raises
+    ------
+    InputError
+        Naming file and line.
+    """
+    with closing(read_lines(path, "BVH motion")) as text:
+        lines = enumerate(text, start=1)
+        joints = _read_hierarchy(lines, path)
+        n_frames, rate_hz = _read_header(lines, path)
+        values = _read_frames(lines, n_frames, joints, path)
+
+    top = _carrier(joints, values)
+    kept = [j for j in range(len(joints)) if top in _chain(joints, j)]
+    renumber = {j: k for k, j in enumerate(kept)}
+    offsets, spreads = np.zeros((len(kept), 3)), np.zeros(len(kept))
+    for k, j in enumerate(kept[1:], start=1):
+        places = _places(joints[j], values)
+        offsets[k] = np.median(places, axis=0)
+        spreads[k] = np.linalg.norm(places - offsets[k], axis=1).max()
+    scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
+    if not 0 < scale < np.inf:
+        raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
+    for k, j in enumerate(kept[1:], start=1):
+        stretch = spreads[k] * scale
+        if stretch > _STRETCH_M:
+            raise fail(
+                path, joints[j].line, f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid"
+            )
+    carriers = [kept[0]] + [joints[j].parent for j in kept[1:]]
+    roots, rotations = FileBackedRows(), FileBackedRows()
+    for (frames,) in in_blocks(values):
+        quaternions = _quaternions(joints, frames)
+        places = np.zeros((len(frames), 3))
+        for ancestor in _chain(joints, top):  # from the file's root down to the joint that carries the body
+            parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
+            places = places + (own if parent < 0 else rotate(quaternions[:, parent], own))
+        roots.append(to_world(places * scale))
+        rotations.append(quaternions_to_world(quaternions[:, carriers]))
+    return Motion(
+        name=path.stem,
+        joints=tuple(joints[j].name for j in kept),
+        parents=(-1, *(renumber[joints[j].parent] for j in kept[1:])),
+        offsets=to_world(offsets * scale),
+        root_positions=roots.rows(),
+        rotations=rotations.rows(),
+        rate_hz=rate_hz,
+    )
+
+
+def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> list[_Joint]:
+    """Joints in the file's order (parents first), up to MOTION."""
+    joints: list[_Joint] = []
+    stack: list[int] = []
+    pending, number, begun = -1, 0, False
+    for number, raw in lines:
+        words = raw.split()
+        if not words or words[0] == "HIERARCHY":
+            begun |= bool(words)
+            continue
+        if not begun:
+            raise fail(path, number, "no HIERARCHY before it; this is not a BVH file")
+        key = words[0].upper()
+        if key == "MOTION":
+            if stack or not joints:
+                raise fail(path, number, "MOTION before the hierarchy ends; a brace is missing")
+            for before, joint in itertools.pairwise(joints):
+                joint.column = before.column + len(before.channels)
+            return joints
+        if key in ("ROOT", "JOINT", "END"):
+            if (key == "ROOT") == bool(joints):
+                raise fail(path, number, "a BVH file must have exactly one ROOT, first")
+            if key != "ROOT" and not stack:
+                raise fail(path, number, f"{words[0]} outside the braces of the root")
+            parent = stack[-1] if stack else -1
+            name = f"{joints[parent].name}_end" if key == "END" else " ".join(words[1:])
+            if not name or any(joint.name == name for joint in joints):
+                raise fail(path, number, f"joint {name!r}: every joint needs a name of its own")
+            joints.append(_Joint(name, parent, number))
+            check_size(path, len(joints))
+            pending = len(joints) - 1
+        elif key == "{":
+            if pending < 0:
+                raise fail(path, number, "an opening brace without a joint before it")
+            stack.append(pending)
+            pending = -1
+        elif key == "}":
+            if not stack:
+                raise fail(path, number, "a closing brace too many")
+            stack.pop()
+        elif key == "OFFSET" and stack:
+            offset = numbers(words[1:], path, number)
+            if len(offset) != 3:
+                raise fail(path, number, f"OFFSET has {len(offset)} values; it needs three")
+            joints[stack[-1]].offset = np.array(offset)
+        elif key == "CHANNELS" and stack:
+            joints[stack[-1]].channels = _channel_names(words, path, number)
+        else:
+            raise fail(path, number, f"{words[0][:40]!r} is not expected in a BVH hierarchy")
+    raise fail(path, number, "no MOTION; the file may be cut off")
+
+
+def _channel_names(words: list[str], path: Path, line: int) -> tuple[str, ...]:
+    names = tuple(word.lower() for word in words[2:])
+    allowed = {axis + kind for axis in "xyz" for kind in ("position", "rotation")}
+    if len(words) < 2 or words[1] != str(len(names)) or not set(names) <= allowed or len(set(names)) != len(names):
+        raise fail(path, line, "CHANNELS needs a count and as many different Xposition ... Zrotation")
+    return names
+
+
+def _read_header(lines: Iterator[tuple[int, str]], path: Path) -> tuple[int, float]:
+    """Number of frames, and frames per second."""
+    number = 0
+    frames: int | None = None
+    interval: float | None = None
+    for number, raw in lines:
+        words = raw.replace(":", ": ").split()
+        if not words:
+            continue
+        if words[0].lower() == "frames:":
+            count = numbers(words[1:2], path, number)
+            if not count or count[0] < 1 or count[0] != int(count[0]):
+                raise fail(path, number, "Frames: needs a positive whole number")
+            frames = int(count[0])
+        elif [word.lower() for word in words[:2]] == ["frame", "time:"]:
+            time = numbers(words[2:3], path, number)
+            if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
+                raise fail(path, number, f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}")
+            interval = time[0]
+        else:
+            raise fail(path, number, "Frames: and Frame Time: must stand before the values")
+        if frames is not None and interval is not None:
+            rate_hz = 1 / interval
+            # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
+            return frames, (round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz)
+    raise fail(path, number, "no Frames: or Frame Time:; the file may be cut off")
+
+
+def _read_frames(lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_Joint], path: Path) -> NDArray[np.float64]:
+    """Values (frame, channel)."""
+    width, read = joints[-1].column + len(joints[-1].channels), 0
+    values, rows = FileBackedRows(), list[list[float]]()
+    for number, raw in lines:
+        words = raw.split()
+        if not words:
+            continue
+        row = numbers(words, path, number)
+        if len(row) != width:
+            raise fail(path, number, f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels")
+        rows.append(row)
+        read += 1
+        check_size(path, len(joints), read)
+        if len(rows) == FRAMES_AT_ONCE:
+            values.append(np.array(rows))
+            rows.clear()
+    if read != n_frames:
+        raise InputError(f"{path}: {read} frames where the header promises {n_frames}; the file may be cut off")
+    values.append(np.array(rows).reshape(-1, width))
+    return values.rows()
+
+
+def _places(joint: _Joint, values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Where a joint is seen from its parent, (frame, 3), or (1, 3) where it has no position channels."""
+    moved = [k for k, name in enumerate(joint.channels) if name.endswith("position")]
+    if not moved:
+        return joint.offset[None]
+    places = np.tile(joint.offset, (len(values), 1))
+    places[:, ["xyz".index(joint.channels[k][0]) for k in moved]] = column(values, [joint.column + k for k in moved])
+    return places
+
+
+def _quaternions(joints: list[_Joint], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Rotations of all joints (frame, joint, 4) in the axes of the file."""
+    world: list[Rotation] = []
+    for joint in joints:
+        turns = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
+        order = "".join(joint.channels[k][0].upper() for k in turns)
+        angles = values[:, [joint.column + k for k in turns]]
+        local = Rotation.from_euler(order, angles, degrees=True) if order else Rotation.identity(len(values))
+        world.append(local if joint.parent < 0 else world[joint.parent] * local)
+    return np.stack([rotation.as_quat() for rotation in world], axis=1)
+
+
+def _chain(joints: list[_Joint], joint: int) -> list[int]:
+    chain = [joint]
+    while joints[chain[0]].parent >= 0:
+        chain.insert(0, joints[chain[0]].parent)
+    return chain
+
+
+def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
+    """The joint that carries the body: the last of an unbranched chain from the root whose own position moves."""
+    top, carrier = 0, 0
+    while True:
+        children = [j for j, joint in enumerate(joints) if joint.parent == top]
+        if len(children) != 1:
+            return carrier
+        top = children[0]
+        # A joint that holds its place in its parent to a millionth of its distance is a bone, not a carrier.
+        if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (1 + np.abs(joints[top].offset).max()):
+            carrier = top
+
+
+def _unit(joints: list[_Joint], kept: list[int], offsets: NDArray[np.float64], path: Path) -> float:
+    reach = {kept[0]: 0.0}
+    for j, offset in zip(kept[1:], offsets[1:], strict=True):
+        reach[j] = reach[joints[j].parent] + float(np.linalg.norm(offset))
+    longest = max(reach.values())
+    fitting = [unit for unit in UNITS_M.values() if _REACH_M[0] <= longest * unit <= _REACH_M[1]]
+    if len(fitting) != 1:
+        raise InputError(
+            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of {', '.join(UNITS_M)}; "
+            f"give unit_m (metres a unit)"
+        )
+    return fitting[0]

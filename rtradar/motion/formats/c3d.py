@@ -1,0 +1,215 @@
+"""C3D recordings of optical markers, with the marker set of CMU and HDM05.
+
+World axes are those of the file: Vicon's z is up, and C3D (x, y, z) = AMC (z, x, y), which is the world's (x, y, z). A file
+whose POINT:Y_SCREEN says that y is up is turned.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from rtradar.errors import InputError
+from rtradar.motion.axes import to_world
+from rtradar.motion.formats.markers import NEEDED, joint_centres
+from rtradar.motion.formats.rigid import rigid_motion
+from rtradar.motion.motion import Motion
+from rtradar.system.checks import shown
+from rtradar.system.files import open_regular
+
+UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+"""Values of POINT:UNITS."""
+
+LONGEST_GAP_S = 0.1
+"""Gaps of a marker up to this long are bridged."""
+
+_STANDS_M = 0.5
+"""The head is at least this far above the ankles in the median: else z is not up, or the unit is wrong."""
+
+_SHANK_M = (0.2, 0.7)
+"""Distance of knee and ankle markers of people, children included."""
+
+
+@dataclass(frozen=True)
+class Markers:
+    """What a C3D file holds of the markers that are asked for.
+
+    Parameters
+    ----------
+    path : Path
+        Where it came from, for messages.
+    names : tuple of str
+        In upper case, without the subject's prefix.
+    positions : (frame, marker, 3) float64
+        World [m]; NaN where the marker was not seen.
+    rate_hz : float
+        Frames per second.
+    first_frame : int
+        Number that the file gives its first frame.
+    says_up : bool
+        Whether the file says which axis is up.
+    """
+
+    path: Path
+    names: tuple[str, ...]
+    positions: NDArray[np.float64]
+    rate_hz: float
+    first_frame: int
+    says_up: bool
+
+
+def load_c3d(path: Path, unit_m: float | None = None) -> Motion:
+    """Read a C3D file and find the 22 joints from its markers.
+
+    Parameters
+    ----------
+    path : Path
+    unit_m : float, optional
+        Metres in one unit of the file, for files that do not say (POINT:UNITS).
+
+    Returns
+    -------
+    Motion
+        On the 22 nodes, rigid; how joints are found tells `rtradar.motion.formats.markers`.
+
+    Raises
+    ------
+    InputError
+        Where the file is none or damaged, or a marker is missing or unseen for longer than `LONGEST_GAP_S`; naming it and the
+        frames, by the file's numbers.
+    """
+    seen = read_markers(path, NEEDED, unit_m)
+    positions = bridged(seen)
+    markers = {name: positions[:, k] for k, name in enumerate(seen.names)}
+    _check_size(seen, markers)
+    centres, pelvis, thorax = joint_centres(markers)
+    return rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
+
+
+def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None) -> Markers:
+    """Read some markers of a C3D file, gaps and all.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be read, is damaged or cut off, or a marker is not in it.
+    """
+    try:
+        with _Bounded(open_regular(path).detach()) as handle, warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            labels, points, rate_hz, first, unit, upward = _read(handle)
+    except OSError as error:
+        raise InputError(f"{path}: cannot read this C3D file ({error.strerror or error}); check the path") from None
+    except MemoryError:
+        raise
+    except Exception as error:  # the reader fails in many ways on bytes that are no C3D file
+        reason = " ".join(str(error).split())[:100]
+        raise InputError(f"{path}: not a C3D file, or a damaged one ({reason}); export it again") from None
+    if any("end of file" in str(warning.message) for warning in caught):
+        raise InputError(f"{path}: ends after {len(points)} frames where its header promises more; the file is cut off")
+    if not len(points):
+        raise InputError(f"{path}: no frame of markers in this C3D file; export it again")
+    if not 1.0 <= rate_hz <= 100_000.0:
+        raise InputError(f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the file")
+    if upward not in ("", "+Z", "+Y"):
+        raise InputError(f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the recording")
+    scale = unit_m if unit_m is not None else UNITS_M.get(unit.lower())
+    if scale is None or not 0 < scale < np.inf:
+        said = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {unit[:20]!r}"
+        raise InputError(f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, positive)")
+    chosen = points[:, [_column(path, labels, name) for name in names]]
+    # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
+    hidden = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
+    places = chosen[..., :3].astype(np.float64) * scale
+    if upward == "+Y":
+        places = to_world(places)
+    places[hidden] = np.nan
+    return Markers(path, names, places, rate_hz, first, bool(upward))
+
+
+def bridged(seen: Markers) -> NDArray[np.float64]:
+    """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines.
+
+    Raises
+    ------
+    InputError
+        Where a gap is longer, or at an end of the recording, where there is nothing to go on.
+    """
+    positions = seen.positions.copy()
+    frames = np.arange(len(positions))
+    for k, name in enumerate(seen.names):
+        hidden = np.isnan(positions[:, k, 0])
+        if not hidden.any():
+            continue
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], hidden, [False]]).astype(np.int8)))
+        for begin, end in zip(edges[::2], edges[1::2], strict=True):
+            where = f"{seen.path}: marker {name} is not seen in frames {seen.first_frame + begin} to {seen.first_frame + end - 1}"
+            if begin == 0 or end == len(positions):
+                raise InputError(f"{where}, at an end of the recording; cut these frames off, or fill the gap")
+            if end - begin > LONGEST_GAP_S * seen.rate_hz:
+                raise InputError(
+                    f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s are bridged, fill this one"
+                )
+        positions[hidden, k] = CubicSpline(frames[~hidden], positions[~hidden, k])(frames[hidden])
+    return positions
+
+
+class _Bounded(io.BufferedReader):
+    """A file that gives no more than it has: for what a damaged one promises, Python would first take the memory."""
+
+    def read(self, size: int | None = -1, /) -> bytes:
+        return super().read(size if size is None or size < 0 else min(size, os.fstat(self.fileno()).st_size))
+
+
+def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, str, str]:
+    """Labels, points (frame, point, 5), rate, first frame, unit, and which axis is up, as the file says."""
+    import c3d  # not before a file asks for it
+
+    reader = c3d.Reader(handle)
+    if reader.point_used < 1:
+        raise ValueError("it holds no points")
+
+    def text(key: str) -> str:
+        parameter = reader.get(key)
+        return "" if parameter is None else str(parameter.string_value).strip(" \0")
+
+    labels = [str(label) for label in reader.point_labels]
+    frames = [points for _, points, _ in reader.read_frames(copy=True)]
+    points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
+    return labels, points, float(reader.point_rate), int(reader.first_frame), text("POINT:UNITS"), text("POINT:Y_SCREEN").upper()
+
+
+def _column(path: Path, labels: list[str], name: str) -> int:
+    found = [k for k, label in enumerate(labels) if re.sub(r"^.*:", "", label.strip(" \0")).upper() == name]
+    if not found:
+        some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
+        raise InputError(
+            f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers of CMU and HDM05 are "
+            "understood, rename or add it"
+        )
+    if len(found) > 1:
+        raise InputError(f"{path}: marker {name} is there {len(found)} times; keep one person's markers")
+    return found[0]
+
+
+def _check_size(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
+    shank = float(np.median([np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"]))
+    if not _SHANK_M[0] <= shank <= _SHANK_M[1]:
+        raise InputError(
+            f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's {_SHANK_M[0]} to {_SHANK_M[1]} m; "
+            "check POINT:UNITS and the markers' names"
+        )
+    above = float(np.median(markers["LFHD"][:, 2] - (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2))
+    if above < _STANDS_M and not seen.says_up:
+        raise InputError(
+            f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to tell what is up, give one who "
+            "stands, or POINT:Y_SCREEN (+Z or +Y)"
+        )

@@ -1,0 +1,1 @@
+"""Synthetic actors: how they are built, and how they move."""

@@ -1,0 +1,1 @@
+"""What a run leaves in its folder: maps, IF samples, the summary and the list of files."""

@@ -1,0 +1,1 @@
+"""Pictures of a run, and the snapshots that the linked view shows."""

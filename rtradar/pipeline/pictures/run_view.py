@@ -1,0 +1,286 @@
+"""What a run left in its folder, read again for `rtradar view`."""
+
+from __future__ import annotations
+
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.errors import InputError
+from rtradar.pipeline.pictures.run_pictures import thinned
+from rtradar.radar import Radar
+from rtradar.report.figures.decibels import MOST_LEVEL, Levels
+from rtradar.report.figures.field_units import HANN_BINS, FieldUnit, field_unit
+from rtradar.report.view.page import COLOURS, write_view
+from rtradar.report.view.run_view import Linked
+from rtradar.report.view.snapshots import Moments, load_moments
+from rtradar.report.view.still import draw_still
+from rtradar.system.checks import printable
+from rtradar.system.files import open_regular, read_arrays, read_json, stored
+from rtradar.system.output_folder import check_whole
+
+_MOST_ROWS, _MOST_COLUMNS = 256, 200
+"""Of a range-Doppler map; of larger ones neighbours are put together, the strongest for all."""
+
+_MAPS = {
+    "range_doppler": ("time", "range", "velocity"),
+    "spectrogram": ("spectrogram_time", "spectrogram_velocity"),
+}
+"""What is read of ``maps.h5``, with its axes."""
+
+_LARGEST = 1e9
+"""Of coordinates and rates, in whatever unit; what is larger is damage."""
+
+_MOST_LETTERS = 200
+"""Of a name from the summary."""
+
+_DYNAMIC_RANGE_DB = 60.0
+_SAMPLED = 16
+"""Maps whose median tells the noise."""
+
+_DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
+_MEND = "make it anew with: rtradar run"
+
+
+def view(
+    folder: str | Path,
+    *,
+    page: str | Path | None = None,
+    still: str | Path | None = None,
+    time_s: float | None = None,
+    colour: str = "part",
+) -> dict[str, Any]:
+    """Show what `run` left in a folder: a page that moves, a still, or both.
+
+    Parameters
+    ----------
+    folder : path
+        As ``run(..., out=folder)`` leaves it.
+    page : path, optional
+        HTML file to write, with all it needs inside.
+    still : path, optional
+        PNG file to draw.
+    time_s : float, optional
+        Of the still, the nearest window [s]; the middle of the capture if left out.
+    colour : {"part", "power", "velocity"}
+        What colours mean, at first on the page.
+
+    Returns
+    -------
+    dict
+        ``windows`` and ``echoes`` shown, ``first_s`` and ``last_s`` of the windows, and with each file its path and bytes.
+
+    Raises
+    ------
+    InputError
+        Where a file of the folder is missing or damaged, the time lies outside of the capture, a colour is unknown, or a file
+        cannot be written.
+    """
+    if colour not in COLOURS:
+        raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
+    if not os.path.isdir(folder):
+        raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
+    check_whole(Path(folder))
+    linked = load_linked(Path(folder))
+    times = linked.moments.times
+    if time_s is not None and not times[0] - linked.radar.frame_duration_s <= time_s <= times[-1] + linked.radar.frame_duration_s:
+        raise InputError(f"time_s = {time_s}; the capture has windows from {times[0]:.3f} to {times[-1]:.3f} s (--time)")
+    told: dict[str, Any] = {
+        "windows": len(times),
+        "echoes": len(linked.moments.echo_part),
+        "first_s": float(times[0]),
+        "last_s": float(times[-1]),
+    }
+    if page is not None:
+        write_view(page, linked, name=printable(Path(folder).resolve().name), colour=colour)
+        told["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
+    if still is not None:
+        step = linked.moments.nearest(float(times.mean()) if time_s is None else time_s)
+        draw_still(still, linked, step, colour=colour)
+        told["still"] = {"path": str(still), "bytes": Path(still).stat().st_size, "time_s": float(times[step])}
+    return told
+
+
+def load_linked(folder: Path) -> Linked:
+    """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
+
+    Raises
+    ------
+    InputError
+        Where one of them is missing or damaged, or they are not of one run.
+    """
+    if not os.path.isfile(folder / "summary.json"):
+        raise InputError(f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named")
+    summary, radar = _summary(folder / "summary.json")
+    parameters = summary["parameters"]
+    spreading = parameters.get("spreading", True) is not False
+    moments = load_moments(folder / "view.npz")
+    rdt = _archive(folder / "cloud_rdt.npz", ("points",))
+    spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",))
+    path = folder / "maps.h5"
+    try:
+        with open_regular(path) as raw, h5py.File(raw) as file:
+            maps = _maps(file)
+            if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
+                raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
+            range_doppler = _range_doppler(maps, moments, radar, spreading)
+            spectrogram = _spectrogram(maps, radar, spreading)
+            points = rdt["points"].reshape(-1, 3)
+            rdt_power_db = _at_points(maps, points, radar, spreading)
+    except InputError:
+        raise
+    except _DAMAGE as error:
+        why = error.strerror if isinstance(error, FileNotFoundError) else "is damaged, or of another kind"
+        raise InputError(f"'{path}': {why}; {_MEND}") from None
+    try:
+        cloud = SpatialCloud(**spatial)
+    except (InputError, TypeError) as error:
+        raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
+    fidelity, scene = _line(summary.get("fidelity", "")), _line(parameters.get("scene", "free-space"))
+    removal = _line(parameters.get("clutter_removal", "none"))
+    cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
+    return Linked(
+        heading=_line(parameters.get("motion", "Recording")),
+        subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]) + cleaned,
+        moments=moments,
+        radar=radar,
+        range_doppler=range_doppler,
+        spectrogram=spectrogram,
+        rdt_points=points,
+        rdt_power_db=rdt_power_db,
+        spatial=cloud,
+        spreading=spreading,
+    )
+
+
+def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
+    try:
+        summary = read_json(path)
+        return summary, Radar(**summary["parameters"]["radar"])
+    except InputError as error:
+        raise InputError(f"'{path}': {error}; {_MEND}") from None
+    except _DAMAGE:
+        raise InputError(f"'{path}' is damaged; {_MEND}") from None
+
+
+def _line(value: Any) -> str:
+    """As a page shows it: JSON may hold half of a character, which no file can."""
+    return printable(str(value)[:_MOST_LETTERS])
+
+
+def _archive(path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+    try:
+        arrays = read_arrays(path)
+        for name in names:
+            _finite(np.nan_to_num(arrays[name], nan=0.0) if name in may_be_nan else arrays[name])
+        return {name: arrays[name].astype(np.float64) for name in names}
+    except _DAMAGE as error:
+        why = "is not there" if isinstance(error, FileNotFoundError) else "is damaged"
+        raise InputError(f"'{path}' {why}; {_MEND}") from None
+
+
+def _finite(values: NDArray[Any]) -> NDArray[Any]:
+    if values.dtype not in (np.float32, np.float64) or not (np.abs(values) <= _LARGEST).all():
+        raise ValueError("a value is no number, or too large")
+    return values
+
+
+# -- maps ----------------------------------------------------------------------------------------------------------------
+
+
+def _maps(file: h5py.File) -> dict[str, Any]:
+    """Datasets of `_MAPS` and their axes, checked but for the maps' values."""
+    maps = {name: stored(file, name) for names in _MAPS.items() for name in (names[0], *names[1])}
+    for name, axes in _MAPS.items():
+        if maps[name].dtype not in (np.float32, np.float64) or maps[name].shape != tuple(
+            len(_finite(maps[axis][:])) for axis in axes
+        ):
+            raise ValueError(f"{name} does not fit its axes")
+    if not all(len(maps[axis]) for axis in _MAPS["range_doppler"]):
+        raise ValueError("it is empty")
+    return maps
+
+
+def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
+    if not np.isfinite(power).all():
+        raise ValueError("a power is not finite")
+    return power.astype(np.float64)
+
+
+def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDArray[np.uint8]:
+    return np.asarray(np.clip(np.rint((level_db - low_db) / step_db), 0, MOST_LEVEL), dtype=np.uint8)
+
+
+def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
+    """Lowest level and the step between levels [dB]: from 3 dB below the noise, or 60 dB below the peak, up to the peak."""
+    low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
+    return low, (top_db - low) / MOST_LEVEL
+
+
+def _range_doppler(maps: Any, moments: Moments, radar: Radar, spreading: bool) -> Levels:
+    """Maps of the moments' windows, mean of the channels."""
+    power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
+    unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
+    scale = np.asarray(unit.scale) / radar.n_channels
+    windows = moments.window.tolist()
+    top = max(float((power[window] * scale).max()) for window in windows)
+    noise = [float(np.median(power[window] * scale)) for window in windows[:: math.ceil(len(windows) / _SAMPLED)]]
+    scaled = FieldUnit(unit.name, 1.0)
+    low_db, step_db = _scale(*scaled.level(_powers(np.array([top, np.median(noise)]))).tolist())
+    rows, columns = math.ceil(len(distance) / _MOST_ROWS), math.ceil(len(velocity) / _MOST_COLUMNS)
+
+    def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
+        by_row = np.maximum.reduceat(values, np.arange(0, len(distance), rows), axis=0)
+        return np.asarray(np.maximum.reduceat(by_row, np.arange(0, len(velocity), columns), axis=1))
+
+    def centres(values: NDArray[np.float64], together: int) -> tuple[float, float]:
+        bin_width = float(values[1] - values[0]) if len(values) > 1 else 1.0
+        return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
+
+    return Levels(
+        level=np.stack([_levels(scaled.level(_powers(pooled(power[window] * scale))), low_db, step_db) for window in windows]),
+        low_db=low_db,
+        step_db=step_db,
+        label=unit.label("mean of channels"),
+        across=centres(velocity, columns),
+        up=centres(distance, rows),
+    )
+
+
+def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
+    """Velocity up, time across."""
+    velocity = maps["spectrogram_velocity"][:]
+    up = (float(velocity[0]), float(velocity[1] - velocity[0]))
+    if not len(maps["spectrogram_time"]):
+        none = np.zeros((1, len(velocity), 0), dtype=np.uint8)
+        return Levels(level=none, low_db=0.0, step_db=1.0, label="", across=(0.0, 1.0), up=up)
+    found, times = thinned(maps, "spectrogram", "spectrogram_time")
+    power = _powers(found.T) / HANN_BINS
+    unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
+    level_db = unit.level(power)
+    low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))
+    step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
+    level, across = _levels(level_db, low_db, step_db)[None], (float(times[0]), step_s)
+    return Levels(level=level, low_db=low_db, step_db=step_db, label=unit.label("one channel"), across=across, up=up)
+
+
+def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool) -> NDArray[np.float64]:
+    """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB]."""
+    if not len(points):
+        return np.zeros(0)
+    nearest = []
+    for axis, column in zip(_MAPS["range_doppler"], points.T, strict=True):
+        values = maps[axis][:]
+        nearest.append(np.searchsorted((values[1:] + values[:-1]) / 2, column))  # which is in the middle goes to the lower
+    found = np.zeros(len(points))
+    for window in np.unique(nearest[0]).tolist():
+        own = nearest[0] == window
+        found[own] = maps["range_doppler"][window][nearest[1][own], nearest[2][own]]
+    unit = field_unit(radar, spreading=spreading, range_m=maps["range"][:][nearest[1]])
+    return unit.level(_powers(found) / radar.n_channels)

@@ -1,0 +1,206 @@
+"""Body, room, and echoes with their ways at the middles of windows: what a run keeps for `rtradar view`."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.radar import Radar
+from rtradar.report.view.snapshots import Moments
+from rtradar.report.view.three_d import semi_axis_poses
+from rtradar.scatter import Rung
+from rtradar.scatter.multipath.image_paths import WallPath, corners, images
+from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scene import Scene, Triangles
+
+MOST_STEPS = 400
+"""10 s at the full rate; of longer captures fewer windows a second are kept, so that the file does not grow."""
+
+STEPS_HZ = 40.0
+"""Most moments a second."""
+
+MOST_ECHOES = 400
+"""The strongest by mean power; a person in a room of six walls has 273 of one wall."""
+
+MOST_FACES = 2000
+"""Of a piece of furniture; a finer mesh is kept as its box."""
+
+_AT_ONCE = 16
+_RATE_CYCLES = 2
+"""Before and after a moment, over which range rates are taken."""
+
+Key = tuple[int, int, int]
+
+
+class _Looked(NamedTuple):
+    """Some steps: ``keys (path, part, bounces)`` of echoes, and ``range_m``, ``velocity_mps``, ``power_m2 (step, key)``."""
+
+    keys: list[Key]
+    range_m: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
+    power_m2: NDArray[np.float64]
+
+
+def moments(rung: Rung, radar: Radar, body: Body, scene: Scene, windows: NDArray[np.int64], n_chirps: int) -> Moments:
+    """Look at the middle of windows.
+
+    Parameters
+    ----------
+    rung : Rung
+        Its echoes, by the Tx nearest to the middle of the array, summed up by path, part and bounces.
+    radar : Radar
+        Where it stands in the scene.
+    body : Body
+    scene : Scene
+    windows : (window,) int64
+        First cycle of each.
+    n_chirps : int
+        In the capture.
+
+    Returns
+    -------
+    Moments
+        Of evenly chosen windows; as large for any length of the capture.
+    """
+    hop_s = radar.frame_hop_s if len(windows) < 2 else float(np.diff(windows).mean()) * radar.cycle_duration_s
+    every = max(math.ceil(len(windows) / MOST_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
+    window = np.arange(0, len(windows), every)
+    times = np.minimum(radar.window_times(windows[window]), body.duration_s)
+    paths = rung.paths if isinstance(rung, Multipath) else (WallPath((), ()),)
+    keys, looked = _look(rung, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx)
+    chosen = _strongest(keys, looked.power_m2)
+    keys = [keys[number] for number in chosen]
+    used = sorted({path for path, _, _ in keys})
+    vertices, faces, piece = _furniture(scene)
+    return Moments(
+        times=times,
+        window=window,
+        part_names=np.array(body.part_names),
+        poses=semi_axis_poses(body, times).astype(np.float32),
+        path_names=np.array([paths[number].name for number in used], dtype=np.str_),
+        echo_path=np.array([used.index(path) for path, _, _ in keys], dtype=np.int64),
+        echo_part=np.array([part for _, part, _ in keys], dtype=np.int64),
+        echo_bounces=np.array([bounces for _, _, bounces in keys], dtype=np.int64),
+        range_m=looked.range_m[:, chosen],
+        velocity_mps=looked.velocity_mps[:, chosen],
+        power_m2=looked.power_m2[:, chosen],
+        corners=_corners(radar, body, paths, keys, times).astype(np.float32),
+        wall_names=np.array([wall.name for wall in scene.walls], dtype=np.str_),
+        walls=np.array([wall.corners for wall in scene.walls]).reshape(-1, 4, 3),
+        furniture_names=np.array([one.name for one in scene.furniture], dtype=np.str_),
+        furniture_vertices=vertices,
+        furniture_faces=faces,
+        furniture_piece=piece,
+    )
+
+
+# -- echoes ------------------------------------------------------------------------------------------------------------
+
+
+def _look(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> tuple[list[Key], _Looked]:
+    """Echoes about some cycles, with one column for each key that ever comes."""
+    looked = [_look_at(rung, radar, cycles[first : first + _AT_ONCE], n_cycles) for first in range(0, len(cycles), _AT_ONCE)]
+    keys = list(dict.fromkeys(key for one in looked for key in one.keys))
+    place = {key: column for column, key in enumerate(keys)}
+    tables = {name: np.zeros((len(cycles), len(keys))) for name in ("range_m", "velocity_mps", "power_m2")}
+    for number, one in enumerate(looked):
+        columns = [place[key] for key in one.keys]
+        for name, table in tables.items():
+            table[number * _AT_ONCE : (number + 1) * _AT_ONCE, columns] = getattr(one, name)
+    return keys, _Looked(keys, **tables)
+
+
+def _look_at(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> _Looked:
+    middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
+    ends = np.clip(cycles[:, None] + [-_RATE_CYCLES, _RATE_CYCLES], 0, n_cycles - 1)
+    chirps, where = np.unique((ends * radar.n_tx + middle).astype(np.int64), return_inverse=True)
+    where = where.reshape(ends.shape)
+    echoes = rung.echoes(chirps)
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[where]  # (cycle, before and after, rx, echo)
+    length = echoes.length[where]
+    # By the power at both ends: where a receiver sees an echo at one end only, its length jumps to one of no meaning.
+    weight = power.min(axis=1)
+    power = np.where(weight > 0, power.mean(axis=1), 0.0).mean(axis=1)
+    weight = np.where(weight.sum(axis=1, keepdims=True) > 0, weight, 1.0)
+    weight /= weight.sum(axis=1, keepdims=True)
+    before, after = (weight * length[:, 0]).sum(axis=1), (weight * length[:, 1]).sum(axis=1)
+    apart_s = np.diff(ends, axis=1) * radar.cycle_duration_s
+    rate = np.divide(after - before, apart_s, out=np.zeros_like(before), where=apart_s > 0)
+    owned = list(zip(_path_of_echoes(rung, len(echoes.part)), echoes.part.tolist(), echoes.bounces.tolist(), strict=True))
+    keys = list(dict.fromkeys(owned))
+    column = np.array([keys.index(key) for key in owned], dtype=np.int64) if len(keys) < len(owned) else np.arange(len(owned))
+    shape = (len(cycles), len(keys))
+    total = np.zeros(shape)
+    np.add.at(total.T, column, power.T)
+    share = np.where(total[:, column] > 0, power, 1.0)
+    sums = np.zeros((3, *shape))
+    for table, values in zip(sums, (share, share * (before + after) / 4, share * rate / 2), strict=True):
+        np.add.at(table.T, column, values.T)
+    return _Looked(keys, sums[1] / sums[0], sums[2] / sums[0], total)
+
+
+def _path_of_echoes(rung: Rung, n_echoes: int) -> list[int]:
+    """Number of each echo's path; without walls there is one."""
+    if not isinstance(rung, Multipath):
+        return [0] * n_echoes
+    numbers = {path.name: number for number, path in enumerate(rung.paths)}
+    return [numbers[name] for name in rung.path_names]
+
+
+def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
+    """Direct echoes, and of those others that are ever seen the strongest, in the order in which they came."""
+    mean = power_m2.mean(axis=0)
+    mean[[bounces == 1 for _, _, bounces in keys]] = np.inf
+    order = np.argsort(-mean, kind="stable")[:MOST_ECHOES]
+    return sorted(int(number) for number in order if mean[number] > 0)
+
+
+# -- where they run ------------------------------------------------------------------------------------------------------
+
+
+def _corners(
+    radar: Radar, body: Body, paths: tuple[WallPath, ...], keys: list[Key], times: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Places of reflection (step, echo, corner, 3), from and to the middle of the array; NaN where not known.
+
+    A leg over walls is straight from the image of the array, and the specular point is that of both images.
+    """
+    centre = np.broadcast_to(np.asarray(radar.position_m, dtype=np.float64), (len(times), 3))
+    poses = body.at(times)
+    most = max(paths[path].order for path, _, _ in keys) + 1
+    out = np.full((len(times), len(keys), most, 3), np.nan)
+    for number in {path for path, _, _ in keys}:
+        path = paths[number]
+        _, _, point = mirror(images(path.out, centre), images(path.back, centre)[:, None], *poses, points=True)
+        there, back = (corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in (path.out, path.back))
+        course = np.stack([*there, *reversed(back[:-1])], axis=2)
+        for echo, (other, part, bounces) in enumerate(keys):
+            if other == number and bounces == path.order + 1:
+                out[:, echo, : course.shape[2]] = course[:, part]
+    return out
+
+
+def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
+    """Vertices (vertex, 3), faces (face, 3) and the piece of each vertex (vertex,)."""
+    vertices, faces, piece = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    for number, one in enumerate(scene.furniture):
+        triangles = one.triangles()
+        if len(triangles.faces) > MOST_FACES:
+            triangles = _box(triangles)
+        faces.append(triangles.faces + sum(map(len, vertices)))
+        vertices.append(triangles.vertices)
+        piece.append(np.full(len(triangles.vertices), number))
+    return np.concatenate(vertices).astype(np.float32), np.concatenate(faces), np.concatenate(piece)
+
+
+def _box(triangles: Triangles) -> Triangles:
+    low, high = triangles.vertices.min(axis=0), triangles.vertices.max(axis=0)
+    unit = np.array(list(np.ndindex(2, 2, 2)))
+    sides = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = np.array([face for a, b, c, d in sides for face in ((a, b, c), (a, c, d))])
+    return Triangles(low + unit * (high - low), faces, True)

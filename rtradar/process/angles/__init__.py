@@ -1,0 +1,1 @@
+"""Directions of echoes: spectra over angle, their peaks, and maps over range and angle."""

@@ -1,0 +1,103 @@
+"""Range-azimuth and range-elevation maps: the power of the detected cells laid out over range and angle."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.kernels.jit import compiled
+from rtradar.process.angles.spectra import AngleSpectra
+from rtradar.process.angles.steering import sine_grid
+from rtradar.radar import Radar
+
+
+def angle_grid(radar: Radar) -> NDArray[np.float64]:
+    """Azimuths, and elevations, of the maps (angle,) [rad]: uniform within the unambiguous angle.
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    (angle,) float64
+        [rad].
+    """
+    largest = math.radians(radar.max_angle_deg)
+    return np.linspace(-largest, largest, len(sine_grid(radar)))
+
+
+def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
+    """Power over range and azimuth, summed over cells.
+
+    The y-line tells u = sin(azimuth) cos(elevation); each cell's azimuths follow with the cosine of its strongest elevation.
+    Without a z-line elevation is not measured, and the map is over the cone angle asin(u) in place of azimuth.
+
+    Parameters
+    ----------
+    spectra : AngleSpectra
+        Of the detected cells of one window.
+    radar : Radar
+
+    Returns
+    -------
+    (range, azimuth) float64
+        On the range bins of the radar and on `angle_grid`, in the unit of ``spectra``. No cells: zero.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no y-line.
+    """
+    if spectra.y is None:
+        raise InputError(f"range_azimuth: radar '{radar.name}' has no line of at least 2 channels along y; give it one")
+    w = np.zeros(len(spectra.range_m)) if spectra.z is None else spectra.sines[spectra.z.argmax(axis=1)]
+    return _laid_out(spectra, spectra.y, np.sqrt(1 - w**2)[:, None] * np.sin(angle_grid(radar)), radar)
+
+
+def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
+    """Power over range and elevation, summed over cells; the z-line tells w = sin(elevation).
+
+    Parameters
+    ----------
+    spectra : AngleSpectra
+        Of the detected cells of one window.
+    radar : Radar
+
+    Returns
+    -------
+    (range, elevation) float64
+        On the range bins of the radar and on `angle_grid`, in the unit of ``spectra``. No cells: zero.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no z-line.
+    """
+    if spectra.z is None:
+        raise InputError(f"range_elevation: radar '{radar.name}' has no line of at least 2 channels along z; give it one")
+    sines = np.broadcast_to(np.sin(angle_grid(radar)), spectra.z.shape)
+    return _laid_out(spectra, spectra.z, sines, radar)
+
+
+def _laid_out(spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
+    """Power of each cell (cell, sine) read at its own sines (cell, angle), summed by range bin."""
+    total = np.zeros((radar.samples_per_chirp, sines.shape[1]))
+    bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
+    _add_up(power, np.ascontiguousarray(sines), spectra.sines[0], spectra.sines[1] - spectra.sines[0], bins, total)
+    return total
+
+
+@compiled()
+def _add_up(power, sines, first, step, bins, total):  # type: ignore[no-untyped-def]
+    """Add power (cell, sine), read at sines (cell, angle) between points of the uniform grid, to total (bin, angle)."""
+    last = power.shape[1] - 2
+    for cell in range(len(power)):
+        for angle in range(sines.shape[1]):
+            place = (sines[cell, angle] - first) / step
+            left = min(max(math.floor(place), 0), last)
+            share = place - left
+            total[bins[cell], angle] += (1 - share) * power[cell, left] + share * power[cell, left + 1]

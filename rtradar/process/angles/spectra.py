@@ -1,0 +1,256 @@
+"""Directions of echoes: power over the sines of the two virtual lines, and the angle of one cell.
+
+In one TDM cycle Tx k transmits k chirps late; meanwhile an echo of range rate v turns by 2 pi f_D k T, f_D = 2 v / lambda with
+the wavelength of the sweep centre. That is taken out with the velocity of the cell; an echo faster than the unambiguous
+velocity keeps a part of it, and shows in a wrong direction (`folded_angle_deg`).
+
+The line along y gives the sine u = y / r, the line along z the sine w = z / r; azimuth = atan2(y, x) = asin(u / sqrt(1 - w^2)),
+elevation = asin(w). A radar with one line alone measures the cone about that line: along y azimuth is asin(u), the cone angle,
+which is the true azimuth only at the height of the radar, and elevation is not measured; along z azimuth is not.
+
+Off the boresight an echo reaches the ends of the line up to several range bins before and behind its cell (12 GHz: 1 bin at
+14 degrees, 2 at 30, 3.3 at the unambiguous 59). Each element is therefore read in the bin where the echo from that direction
+stands. Read in the cell alone, a point at 30 degrees and 12 GHz would be seen 5.2 dB weaker, in a beam of 3.4 degrees instead
+of 2.1, and at 1 m/s half a degree beside its place, for the elements would see it at different times.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.kernels.jit import compiled
+from rtradar.process.angles.parabola import refine
+from rtradar.process.angles.steering import Taper, range_walk, sine_grid, steering, steering_everywhere, virtual_lines
+from rtradar.process.cells import cell_spectra
+from rtradar.process.spectra import range_spectrum
+from rtradar.radar import Radar
+from rtradar.system.threads import in_threads
+
+
+@dataclass(frozen=True)
+class AngleSpectra:
+    """Power over the sine of direction of a number of range-Doppler cells, on each virtual line.
+
+    Parameters
+    ----------
+    sines : (sine,) float64
+        Uniform grid within the unambiguous angle.
+    y, z : (cell, sine) float32, or None
+        Power over u = y / r and over w = z / r; an echo of amplitude 1 in every channel reads 1. None where the radar has no
+        such line.
+    range_m : (cell,) float64
+        Range of the cells [m].
+    velocity : (cell,) float64
+        Range rate of the cells [m/s].
+    """
+
+    sines: NDArray[np.float64]
+    y: NDArray[np.float32] | None
+    z: NDArray[np.float32] | None
+    range_m: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+def angle_spectra(
+    values: NDArray[np.complexfloating],
+    radar: Radar,
+    range_m: ArrayLike,
+    velocity: ArrayLike,
+    *,
+    focus: bool = True,
+    taper: Taper = "taylor",
+) -> AngleSpectra:
+    """Power over direction of range-Doppler cells, the motion within a TDM cycle taken out.
+
+    Parameters
+    ----------
+    values : (cell, offset, channel) complex
+        From `cell_spectra`.
+    radar : Radar
+    range_m : (cell,) float
+        Range of each cell [m]; the nearest range bin counts.
+    velocity : (cell,) float
+        Range rate of each cell [m/s].
+    focus : bool
+        Steer with the exact path over each element at the range of the cell; else with plane waves, which is a far-field FFT.
+    taper : {"taylor", "uniform"}
+        Weights along the line. ``taylor`` (side lobes at -25 dB) for several echoes in a cell: a uniform line has side lobes
+        at -13 dB, and two that meet pass for an echo; Hann widens the beam by 63 %, this by 20 %. ``uniform`` for a single echo.
+
+    Returns
+    -------
+    AngleSpectra
+
+    Raises
+    ------
+    InputError
+        Where the shapes do not fit each other or the radar, a number is not finite, a range lies outside the map, or the radar
+        has no line of at least 2 channels.
+
+    Notes
+    -----
+    Equation :eq:`tdm-phase` of the theory page is taken out; elements are added along :eq:`near-field`.
+    """
+    cells = np.asarray(values)
+    lines = virtual_lines(radar)
+    ranges, rates = np.asarray(range_m, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
+    expected = (2 * range_walk(radar) + 1, radar.n_channels)
+    if cells.ndim != 3 or cells.shape[1:] != expected or ranges.shape != cells.shape[:1] or rates.shape != cells.shape[:1]:
+        raise InputError(
+            f"angle: values, range_m and velocity have shapes {cells.shape}, {ranges.shape} and {rates.shape}; radar "
+            f"'{radar.name}' needs (cell, {expected[0]}, {expected[1]}), (cell,) and (cell,)"
+        )
+    if not (np.isfinite(cells).all() and np.isfinite(ranges).all() and np.isfinite(rates).all()):
+        raise InputError("angle: values, range_m or velocity hold NaN or infinity; all must be finite")
+    bins = np.rint(ranges / radar.range_bin_m).astype(np.int64)
+    if len(bins) and not 0 <= bins.min() <= bins.max() < radar.samples_per_chirp:
+        raise InputError(f"angle: range_m must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin")
+    # What a moving echo gains between the Tx of one cycle, and any echo on the way there and back by its Tx's own carrier.
+    turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
+    turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
+    samples = cells.astype(np.complex64, copy=False)
+    still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
+
+    def power(axis: int) -> NDArray[np.float32] | None:
+        line = lines[axis - 1]
+        if line is None:
+            return None
+        result = np.empty((len(cells), len(sine_grid(radar))), dtype=np.float32)
+        if not focus:
+            known, place = steering(radar, axis, None, taper), np.zeros_like(bins)
+        elif taper == "taylor":
+            known, place = steering_everywhere(radar, axis), bins
+        else:
+            used, place = np.unique(bins, return_inverse=True)
+            known = steering(radar, axis, used, taper)
+        given = samples, still, place, line.channels, known.weights, known.runs, known.starts, result
+        begins = range(0, len(samples), _CELLS_A_THREAD)
+        in_threads(lambda begin: _power(begin, min(begin + _CELLS_A_THREAD, len(samples)), *given), begins)
+        return result
+
+    return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)
+
+
+def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bool = True) -> tuple[float, float]:
+    """Direction of the strongest echo in one range-Doppler cell.
+
+    Parameters
+    ----------
+    x : (chirp, rx, sample) complex
+        IF samples of one window; chirp 0 comes from Tx 0. Whole TDM cycles are used.
+    radar : Radar
+    range_m, velocity : float
+        Range [m] and range rate [m/s] in the middle of the window; the nearest cell of the map is taken.
+    focus : bool
+        As in `angle_spectra`.
+
+    Returns
+    -------
+    azimuth, elevation : float
+        In the radar's frame [rad], within its unambiguous angle; NaN where the radar has no line for it. Without a line along z
+        azimuth is the cone angle asin(y / r).
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, a sample is not finite, the cell lies outside the map or holds nothing, or the
+        radar has no line of at least 2 channels.
+
+    Notes
+    -----
+    Equations :eq:`near-field` and :eq:`direction` of the theory page.
+    """
+    virtual_lines(radar)
+    samples = np.asarray(x)
+    spectra = range_spectrum(samples, radar)
+    if not np.isfinite(spectra).all():
+        raise InputError("angle: x holds NaN or infinity; every IF sample must be finite")
+    n_cycles = len(spectra) // radar.n_tx
+    if n_cycles < 1:
+        raise InputError(f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, one for each Tx")
+    row = _nearest(range_m / radar.range_bin_m, 0, radar.samples_per_chirp - 1)
+    if row is None:
+        raise InputError(f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin")
+    step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
+    column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
+    if column is None:
+        raise InputError(
+            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s, the unambiguous one"
+        )
+    cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
+    values = cell_spectra(cube, radar, [row], [(column + n_cycles // 2) % n_cycles])
+    found = angle_spectra(values, radar, [row * radar.range_bin_m], [column * step], focus=focus, taper="uniform")
+    u, w = (_peak(found.sines, power) for power in (found.y, found.z))
+    azimuth = math.nan if found.y is None else math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
+    return azimuth, math.nan if found.z is None else math.asin(w)
+
+
+def folded_angle_deg(radar: Radar) -> float:
+    """How far beside its direction an echo shows whose velocity is folded once, at broadside [deg].
+
+    With a range rate that is wrong by twice the unambiguous velocity one Tx after the other is turned by 1 / n_tx of a turn too
+    little or too much, which on a line of Tx d apart is what a direction does whose sine differs by lambda / (n_tx d).
+
+    Parameters
+    ----------
+    radar : Radar
+
+    Returns
+    -------
+    float
+        [deg]; 0 where Tx do not take turns, or no line has two of them.
+    """
+    taking_turns = radar.tx_delay_s[-1] > 0
+    on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
+    if not (taking_turns and on_a_line):
+        return 0.0
+    spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
+    return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
+
+
+def _nearest(bins: float, least: float, largest: float) -> int | None:
+    """The nearest whole number, or None where the bins lie half a bin or more outside; NaN does too."""
+    return round(bins) if least - 0.5 < bins < largest + 0.5 else None
+
+
+def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> float:
+    if power is None:
+        return 0.0
+    if not power.max() > 0:
+        raise InputError("angle: the cell holds no echo at all; choose one that was detected")
+    return float(refine(sines, power, power.argmax(axis=1)[:, None])[0][0, 0])
+
+
+_CELLS_A_THREAD = 64
+
+
+# By hand: for products of this size the threads of BLAS wait for each other longer than they work.
+@compiled(fastmath=True)
+def _power(begin, end, values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
+    """Fill power (cell, sine) of the cells from begin to end.
+
+    From values (cell, offset, channel) turned by still (cell, channel), weights by place.
+    """
+    n_sines = weights.shape[2]
+    real, imaginary = np.empty(n_sines, dtype=np.float32), np.empty(n_sines, dtype=np.float32)
+    for cell in range(begin, end):
+        for sine in range(n_sines):
+            real[sine], imaginary[sine] = 0.0, 0.0
+        for run in range(starts[place[cell]], starts[place[cell] + 1]):
+            element, offset, first, last = runs[run, 0], runs[run, 1], runs[run, 2], runs[run, 3]
+            channel = channels[element]
+            value = values[cell, offset, channel] * still[cell, channel]
+            # Counted from 0: an index that may be negative keeps the compiler from using vectors.
+            run_weights = weights[place[cell], element, first:last]
+            run_real, run_imaginary = real[first:last], imaginary[first:last]
+            for i in range(last - first):
+                run_real[i] += value.real * run_weights[i].real - value.imag * run_weights[i].imag
+                run_imaginary[i] += value.real * run_weights[i].imag + value.imag * run_weights[i].real
+        for sine in range(n_sines):
+            power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2

@@ -1,0 +1,1 @@
+"""CFAR detectors, their thresholds, and how detections are scored."""

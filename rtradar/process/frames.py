@@ -1,0 +1,143 @@
+"""Cuts a stream of range spectra into the overlapping processing windows of the radar, in constant memory."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.system.threads import in_threads
+
+_CHIRPS_AT_ONCE = 256
+"""Copied by one thread: 4 MB of 8 receivers and 256 samples."""
+
+
+class SlidingWindows:
+    """The processing windows of a stream of chirps, however the stream is cut into blocks.
+
+    The windows are those of `Radar.window_starts` for as many chirps as were pushed. The buffer holds one and a half
+    windows, whatever the size of the blocks: the half is there so that what is kept moves to its front at most once
+    for every half a window of new chirps.
+
+    Parameters
+    ----------
+    radar : Radar
+        Gives the schedule and the shape.
+
+    Attributes
+    ----------
+    n_chirps : int
+        Chirps pushed so far.
+    """
+
+    def __init__(self, radar: Radar) -> None:
+        self._radar = radar
+        window = radar.chirps_per_frame
+        self._buffer = np.empty((window + max(2 * radar.n_tx, window // 2), radar.n_rx, radar.samples_per_chirp), np.complex64)
+        self._first = 0  # chirp at the front of the buffer
+        self._held = 0  # chirps in the buffer
+        self._candidate = 0  # windows are counted by multiples of the hop ...
+        self._index = 0  # ... of which those that round to the same cycle are one window
+        self._last_start = -1
+        self._busy = False
+        self.n_chirps = 0
+
+    def push(self, spectra: NDArray[np.complexfloating]) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
+        """Take the next block of chirps and give every window that it completes.
+
+        Parameters
+        ----------
+        spectra : (chirp, rx, range) complex
+            Range spectra of the chirps that follow those of the last call, from `rtradar.process.range_spectrum`;
+            the first chirp of all comes from Tx 0.
+
+        Yields
+        ------
+        window_index : int
+            Counts the windows of the capture from 0.
+        start_cycle : int
+            First TDM cycle of the window.
+        cube : (cycle, tx, rx, range) complex64
+            A read-only view of the buffer, valid until the next step of the iteration: copy what is to be kept.
+
+        Raises
+        ------
+        InputError
+            Where the shape does not fit the radar.
+        RuntimeError
+            Where the windows of the last call were not all taken: the block is read while they are.
+        """
+        block = np.asarray(spectra)
+        if block.ndim != 3 or block.shape[1:] != self._buffer.shape[1:]:
+            raise InputError(
+                f"SlidingWindows: spectra have shape {block.shape}; radar '{self._radar.name}' needs "
+                f"(chirp, rx, range) = (any, {self._buffer.shape[1]}, {self._buffer.shape[2]})"
+            )
+        if self._busy:
+            raise RuntimeError("SlidingWindows: take every window of one push before the next push")
+        self._busy = True
+        return self._windows(block)
+
+    def _windows(self, block: NDArray[np.complexfloating]) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
+        taken = 0
+        while taken < len(block):
+            taken += self._take(block[taken:])
+            while (start := self._next_start()) is not None:
+                offset = start * self._radar.n_tx - self._first
+                view = self._buffer[offset : offset + self._radar.chirps_per_frame]
+                cube = view.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *view.shape[1:])
+                cube.flags.writeable = False
+                index = self._index
+                self._index += 1
+                yield index, start, cube
+        self._busy = False
+
+    def _take(self, block: NDArray[np.complexfloating]) -> int:
+        """Copy what fits of the block behind what is still needed; how many chirps were dealt with."""
+        wanted = self._start_of(self._candidate) * self._radar.n_tx  # no later window needs a chirp before this one
+        gone = min(max(wanted - self._first, 0), self._held)
+        room = len(self._buffer) - self._held
+        if self._held == gone:
+            self._first, self._held = self._first + gone, 0
+            skip = min(max(wanted - self._first, 0), len(block))  # a hop longer than the window leaves chirps unused
+            if skip:
+                self._first += skip
+                self.n_chirps += skip
+                return skip
+        elif room == 0:
+            kept = self._held - gone
+            # No farther at once than it goes: what overlaps NumPy copies twice, through new memory.
+            for begin in range(0, kept, gone):
+                end = min(begin + gone, kept)
+                _copy(self._buffer[begin + gone : end + gone], self._buffer[begin:end])
+            self._first, self._held = self._first + gone, kept
+        count = min(len(self._buffer) - self._held, len(block))
+        _copy(block[:count], self._buffer[self._held : self._held + count])
+        self._held += count
+        self.n_chirps += count
+        return count
+
+    def _start_of(self, candidate: int) -> int:
+        return round(candidate * self._radar.hop_cycles)
+
+    def _next_start(self) -> int | None:
+        """First cycle of the next window if its last chirp is there; the rule of `Radar.window_starts`, step by step."""
+        last = self.n_chirps // self._radar.n_tx - self._radar.cycles_per_frame
+        newest = math.floor((last + 0.5) / self._radar.hop_cycles)
+        while self._candidate <= newest and (start := self._start_of(self._candidate)) <= last:
+            self._candidate += 1
+            if start > self._last_start:
+                self._last_start = start
+                return start
+        return None
+
+
+def _copy(chirps: NDArray[np.complexfloating], to: NDArray[np.complex64]) -> None:
+    def some(first: int) -> None:
+        to[first : first + _CHIRPS_AT_ONCE] = chirps[first : first + _CHIRPS_AT_ONCE]
+
+    in_threads(some, range(0, len(chirps), _CHIRPS_AT_ONCE))

@@ -1,0 +1,1 @@
+"""Pictures of maps, clouds, rooms and classifiers as PNG files."""

@@ -1,0 +1,152 @@
+"""`report.html`: one run on one page, in one file that opens without a network."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from rtradar.body import Body
+from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
+from rtradar.radar import Radar
+from rtradar.report.pages.frame import player, write_page
+from rtradar.report.pages.sections import (
+    limits_box,
+    limits_table,
+    mapping_table,
+    picture,
+    stages_table,
+    table,
+    tiles,
+)
+from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
+
+_FIGURE = f"""<section id="figure"><h2>The recording before the radar</h2>
+<div class="scene tall" id="scene-figure"></div>
+{player()}
+<p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone. Drag to turn, scroll to come nearer.
+World axes: x from the radar to the person, y to the left seen from the radar, z up.</p></section>
+"""
+
+
+def write_report(
+    path: str | Path,
+    *,
+    body: Body,
+    radar: Radar,
+    summary: Mapping[str, Any],
+    pictures: Mapping[str, Path],
+    rdt_points: ArrayLike,
+    spatial: SpatialCloud | None = None,
+) -> None:
+    """Write one run as a page with a moving figure, clouds that can be turned, pictures and tables.
+
+    The file holds all it needs, plotly.js included (about 5 MB), and its content security policy forbids every request.
+
+    Parameters
+    ----------
+    path : path
+        HTML file.
+    body : Body
+        Placed before the radar.
+    radar : Radar
+    summary : mapping
+        As in ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``, ``versions`` and ``part_power_m2`` have
+        places of their own; other numbers and texts are listed under their names.
+    pictures : mapping of title to path
+        PNG files, in the order in which they shall stand.
+    rdt_points : (point, 3)
+        Time [s], range [m], velocity [m/s].
+    spatial : SpatialCloud, optional
+        Shown whole, and about the moving figure frame by frame.
+
+    Raises
+    ------
+    InputError
+        Where a picture is missing or no PNG, or ``rdt_points`` has a wrong shape or values that are not finite.
+    """
+    spreading = bool(summary.get("parameters", {}).get("spreading", True))
+    figure = figure_data(body, radar, summary.get("part_power_m2"), spreading=spreading)
+    data = {"figure": figure, "rdt": rdt_data(rdt_points)}
+    if spatial is not None:
+        data["spatial"] = spatial_data(spatial)
+    parameters = summary.get("parameters", {})
+    fidelity = str(summary.get("fidelity", ""))
+    top = limits_box(summary.get("limits", ())) + "\n" + tiles(_headline(summary))
+    write_page(
+        path,
+        kind="rtradar report",
+        heading=str(parameters.get("motion", "Recording")),
+        subtitle=", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))),
+        top=top,
+        body=chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
+        data=data,
+        scripts=("plots.js", "figure.js", "report.js"),
+    )
+
+
+def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
+    if "capture_s" in summary:
+        yield f"{summary['capture_s']:.2f} s", "of radar"
+    if "wall_s" in summary:
+        yield f"{summary['wall_s']:.1f} s", "to compute"
+    if "real_time_factor" in summary:
+        yield f"{summary['real_time_factor']:.2g} s", "for each second of radar"
+    if "peak_memory_mb" in summary:
+        yield f"{summary['peak_memory_mb']:.0f} MB", "peak memory"
+    if "detections" in summary:
+        yield f"{summary['detections']:,}".replace(",", "\u202f"), "detections"
+
+
+def _clouds(data: Mapping[str, Any]) -> str:
+    views = [("rdt", "Range-Doppler-time cloud", "The surface about the detections of all windows, sampled.")]
+    if "spatial" in data:
+        note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
+        measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
+        if not all(measured.values()):
+            angle = "azimuth" if measured["z"] else "elevation"
+            note += f" An array on one line does not measure {angle}: x is the distance from that line, added to the radar's x."
+        views.append(("spatial", "Spatial cloud", note))
+    parts = []
+    for name, title, note in views:
+        cloud = data[name]
+        thinned = "" if cloud["shown"] == cloud["count"] else f" {cloud['shown']} of {cloud['count']} points are shown."
+        scene = f'<div class="scene" id="scene-{name}"></div>' if cloud["count"] else '<p class="empty">Nothing was detected.</p>'
+        parts.append(f'<section id="{name}"><h2>{title}</h2>{scene}<p class="note">{note}{thinned}</p></section>\n')
+    return f'<div class="clouds">{"".join(parts)}</div>\n'
+
+
+def _pictures(pictures: Mapping[str, Path]) -> Iterator[str]:
+    if pictures:
+        yield '<section id="maps"><h2>Maps</h2><div class="pictures">'
+        for title, path in pictures.items():
+            yield picture(title, Path(path)) + "\n"
+        yield "</div></section>\n"
+
+
+def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
+    parameters = dict(summary.get("parameters", {}))
+    settings = parameters.pop("radar", {})
+    own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled")
+    modelled = summary.get("modelled", {})
+    ways = {**modelled.get("ways", {}), **modelled.get("why", {})}
+    power = summary.get("part_power_m2", {})
+    total = sum(power.values()) or 1.0
+    sections = (
+        ("Derived limits of the radar", limits_table(radar)),
+        ("Time of each stage", stages_table(summary.get("stages", {}))),
+        ("How parts were modelled, of all parts and time", table((name, f"{value:.1%}") for name, value in ways.items())),
+        ("Parameters", mapping_table(parameters)),
+        ("Radar", mapping_table(settings)),
+        ("Capture", mapping_table({key: value for key, value in summary.items() if key not in own})),
+        ("Echo power by part", table((name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items())),
+        ("Versions", table((name, str(value)) for name, value in summary.get("versions", {}).items())),
+    )
+    return (
+        '<div class="tables">'
+        + "".join(f"<section><h2>{t}</h2>{html}</section>\n" for t, html in sections if "<tr>" in html)
+        + "</div>\n"
+    )

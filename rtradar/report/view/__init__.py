@@ -1,0 +1,1 @@
+"""The linked view of a run: its data, its page and its stills."""

@@ -1,0 +1,185 @@
+"""``view.npz``: body, room, and echoes with their ways, moment by moment; what `rtradar view` needs beside maps and clouds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.system.files import atomic_file, read_arrays
+
+_FORMAT = 1
+_MOST_BYTES = 200_000_000
+"""Far above what a run writes, some 2 MB; a file that claims more is none of ours."""
+
+_LARGEST = 1e9
+
+_FIELDS: Mapping[str, tuple[str, tuple[str | int, ...]]] = {
+    "times": ("f8", ("step",)),
+    "window": ("i8", ("step",)),
+    "part_names": ("U", ("part",)),
+    "poses": ("f4", ("step", "part", 4, 3)),
+    "path_names": ("U", ("path",)),
+    "echo_path": ("i8", ("echo",)),
+    "echo_part": ("i8", ("echo",)),
+    "echo_bounces": ("i8", ("echo",)),
+    "range_m": ("f8", ("step", "echo")),
+    "velocity_mps": ("f8", ("step", "echo")),
+    "power_m2": ("f8", ("step", "echo")),
+    "corners": ("f4", ("step", "echo", "corner", 3)),
+    "wall_names": ("U", ("wall",)),
+    "walls": ("f8", ("wall", 4, 3)),
+    "furniture_names": ("U", ("piece",)),
+    "furniture_vertices": ("f4", ("vertex", 3)),
+    "furniture_faces": ("i8", ("face", 3)),
+    "furniture_piece": ("i8", ("vertex",)),
+}
+_MAY_BE_NAN = ("corners",)
+_POINTS_INTO = {
+    "echo_path": "path",
+    "echo_part": "part",
+    "furniture_faces": "vertex",
+    "furniture_piece": "piece",
+}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Moments:
+    """A capture at the middles of some of its windows; each field is an array of the same name in ``view.npz``.
+
+    Parameters
+    ----------
+    times : (step,) float64
+        Middles of the windows since the start of the capture [s], ascending.
+    window : (step,) int64
+        Which windows: indices along ``time`` of ``maps.h5``.
+    part_names : (part,) str
+    poses : (step, part, 4, 3) float32
+        Of each part its centre, then its three semi-axes as vectors, world [m].
+    path_names : (path,) str
+        Walls in the order in which the wave meets them, the body between them: ``floor > body``; the direct one is ``body``.
+    echo_path, echo_part, echo_bounces : (echo,) int64
+        Path and body part of each echo, and the reflections on its way.
+    range_m, velocity_mps : (step, echo) float64
+        Half the path from Tx to Rx [m] and its rate [m/s], positive receding; means over receivers weighted by power.
+    power_m2 : (step, echo) float64
+        |amplitude|^2, mean over receivers [m^2]; 0 where hidden, be it just before or after the moment.
+    corners : (step, echo, corner, 3) float32
+        Where the echo is reflected on its way from the middle of the array and back, world [m]: places in walls and the mirror
+        point on the part; NaN after the last, and where the way is not known.
+    wall_names : (wall,) str
+    walls : (wall, 4, 3) float64
+        Corners of their front faces, world [m].
+    furniture_names : (piece,) str
+    furniture_vertices : (vertex, 3) float32
+        World [m].
+    furniture_faces : (face, 3) int64
+        Into the vertices.
+    furniture_piece : (vertex,) int64
+        Which piece a vertex belongs to.
+
+    Raises
+    ------
+    InputError
+        Where the shapes do not fit each other, a value is not finite, or an index points nowhere.
+    """
+
+    times: NDArray[np.float64]
+    window: NDArray[np.int64]
+    part_names: NDArray[np.str_]
+    poses: NDArray[np.float32]
+    path_names: NDArray[np.str_]
+    echo_path: NDArray[np.int64]
+    echo_part: NDArray[np.int64]
+    echo_bounces: NDArray[np.int64]
+    range_m: NDArray[np.float64]
+    velocity_mps: NDArray[np.float64]
+    power_m2: NDArray[np.float64]
+    corners: NDArray[np.float32]
+    wall_names: NDArray[np.str_]
+    walls: NDArray[np.float64]
+    furniture_names: NDArray[np.str_]
+    furniture_vertices: NDArray[np.float32]
+    furniture_faces: NDArray[np.int64]
+    furniture_piece: NDArray[np.int64]
+
+    def __post_init__(self) -> None:
+        sizes: dict[str, int] = {}
+        for name, (kind, axes) in _FIELDS.items():
+            array = np.asarray(getattr(self, name))
+            if kind == "U" and array.size == 0:
+                array = array.astype("U")  # an empty list has no kind
+            if array.dtype.kind != np.dtype(kind).kind or array.dtype in (np.float16, np.longdouble):
+                raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
+            if array.ndim != len(axes):
+                raise InputError(f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})")
+            for axis, length in zip(axes, array.shape, strict=True):
+                wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
+                if length != wanted:
+                    raise InputError(f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}")
+            if kind != "U" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
+                raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
+            if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
+                raise InputError(f"view: {name} holds a value above {_LARGEST:g}; none is so large")
+            if kind == "U" and not all(word.isprintable() for word in array.ravel().tolist()):
+                raise InputError(f"view: {name} holds what is no line of text")
+            object.__setattr__(self, name, array if kind == "U" else array.astype(kind))
+        if not sizes["step"] or not sizes["part"]:
+            raise InputError("view: there is no moment or no body part; at least one of each is needed")
+        for name, axis in _POINTS_INTO.items():
+            index = getattr(self, name)
+            if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
+                raise InputError(f"view: {name} points at a {axis} that is not there; it must be from 0 to {sizes[axis] - 1}")
+        if (np.diff(self.times) <= 0).any() or (self.power_m2 < 0).any():
+            raise InputError("view: times must ascend, and power_m2 must not be negative")
+
+    @property
+    def direct(self) -> NDArray[np.bool_]:
+        """Which echoes come by no wall and no other part, (echo,)."""
+        return self.echo_bounces == 1
+
+    def nearest(self, time_s: float) -> int:
+        """The step whose time is nearest to this one [s]."""
+        return int(np.abs(self.times - time_s).argmin())
+
+
+def save_moments(path: str | Path, moments: Moments) -> None:
+    """Write them as a NumPy archive, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written.
+    """
+    arrays = {name: getattr(moments, name) for name in _FIELDS}
+    with atomic_file(path) as file:
+        np.savez_compressed(file, format=np.array(_FORMAT), **arrays)
+
+
+def load_moments(path: str | Path) -> Moments:
+    """Read them.
+
+    Raises
+    ------
+    InputError
+        Where there is no such file, or it is damaged or of another kind.
+    """
+    mend = "make it anew with: rtradar run"
+    try:
+        arrays = read_arrays(Path(path), _MOST_BYTES)
+        found: dict[str, Any] = {name: arrays[name] for name in ("format", *_FIELDS)}
+    except FileNotFoundError:
+        raise InputError(f"'{path}' is not there; {mend}") from None
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(f"'{path}' is damaged or no file of moments ({' '.join(str(error).split())}); {mend}") from None
+    if found.pop("format").tolist() != _FORMAT:
+        raise InputError(f"'{path}' is of another version of rtradar; {mend}")
+    try:
+        return Moments(**found)
+    except InputError as error:
+        raise InputError(f"'{path}': {error}; {mend}") from None

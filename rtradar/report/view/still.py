@@ -1,0 +1,223 @@
+"""A still of `rtradar view`: the same four views at one moment, as a PNG file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import unit_sphere
+from rtradar.report.figures.decibels import Levels
+from rtradar.report.figures.field_units import VELOCITY_LABEL
+from rtradar.report.figures.maps import new_figure, save_figure
+from rtradar.report.figures.part_groups import GROUPS, group_of_parts
+from rtradar.report.view.page import VELOCITY_COLOURS
+from rtradar.report.view.run_view import Linked
+from rtradar.system.files import atomic_file
+
+_HIDDEN = "#8c8c94"
+_NOW = "#e0389a"
+
+
+def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "part") -> None:
+    """Draw body, room and paths, the range-Doppler map, the cloud and the spectrogram at one moment.
+
+    Parameters
+    ----------
+    path : path
+        PNG file; replaced whole or not at all.
+    linked : Linked
+    step : int
+        Along the times of its moments.
+    colour : {"part", "power", "velocity"}
+
+    Raises
+    ------
+    InputError
+        Where the file cannot be written.
+    """
+    figure = new_figure(15, 9.5)
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
+    figure.suptitle(f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s", wrap=True)
+    paint = _Paint(linked, colour)
+    views = [figure.add_subplot(grid[row, column], projection=None if column else "3d") for row, column in np.ndindex(2, 2)]
+    _draw_body(views[0], linked, step, paint)
+    _draw_map(figure, views[1], linked, step, paint)
+    _draw_cloud(views[2], linked, step, paint)
+    _draw_spectrogram(figure, views[3], linked, step)
+    paint.legend(figure, views)
+    for artist in (one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)):
+        # A long box in 3D is wider than its axes, at whose edge the body would be cut; the layout knows the box already.
+        artist.set_clip_on(False)
+        artist.set_in_layout(False)
+    with atomic_file(path) as file:
+        save_figure(figure, file)
+
+
+class _Paint:
+    """Colours by part, power or velocity, of echoes, parts and points of the cloud."""
+
+    def __init__(self, linked: Linked, colour: str) -> None:
+        from matplotlib import colormaps
+        from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+
+        self.colour, self._linked = colour, linked
+        tints = ListedColormap(list(GROUPS.values()))
+        low, high = linked.power_range_db
+        rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
+        self.map = {"part": tints, "power": colormaps["viridis"], "velocity": rates}[colour]
+        self.norm = {
+            "part": Normalize(-0.5, len(GROUPS) - 0.5),
+            "power": Normalize(low, high),
+            "velocity": Normalize(-linked.fastest_mps, linked.fastest_mps),
+        }[colour]
+        groups = np.array(group_of_parts(linked.moments.part_names.tolist()))
+        self._echo = {
+            "part": np.broadcast_to(groups[linked.moments.echo_part], linked.moments.range_m.shape),
+            "power": linked.power_db,
+            "velocity": linked.moments.velocity_mps,
+        }[colour]
+        self._groups = groups
+
+    def echoes(self, step: int) -> NDArray[np.float64]:
+        """Of each echo (echo, rgba); grey where hidden."""
+        return self._rgba(self._echo[step].astype(np.float64))
+
+    def parts(self, step: int) -> NDArray[np.float64]:
+        """Of each part (part, rgba), by its strongest direct echo."""
+        moments = self._linked.moments
+        if self.colour == "part":
+            return self._rgba(self._groups.astype(np.float64))
+        out = np.full(len(moments.part_names), np.nan)
+        power = moments.power_m2[step]
+        for echo in np.argsort(power, kind="stable"):
+            if moments.direct[echo]:
+                out[moments.echo_part[echo]] = self._echo[step, echo]
+        return self._rgba(out)
+
+    def cloud(self) -> NDArray[np.float64]:
+        """Of each point of the cloud (point, rgba)."""
+        linked = self._linked
+        if self.colour == "part":
+            return self._rgba(linked.rdt_group().astype(np.float64))
+        return self._rgba(linked.rdt_power_db if self.colour == "power" else linked.rdt_points[:, 2])
+
+    def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        from matplotlib.colors import to_rgba
+
+        rgba = np.array(self.map(self.norm(np.nan_to_num(values, nan=0.0)))).reshape(-1, 4)
+        rgba[~np.isfinite(values)] = to_rgba(_HIDDEN)
+        return rgba
+
+    def legend(self, figure: Any, views: list[Any]) -> None:
+        """Say below the views what colours mean."""
+        from matplotlib.cm import ScalarMappable
+        from matplotlib.patches import Patch
+
+        if self.colour == "part":
+            patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
+            figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
+            return
+        label = {"power": self._linked.power_unit.label("of an echo"), "velocity": VELOCITY_LABEL}[self.colour]
+        bar = figure.colorbar(
+            ScalarMappable(self.norm, self.map), ax=views, location="bottom", shrink=0.4, aspect=50, pad=0.02, label=label
+        )
+        bar.ax.tick_params(labelsize=8)
+
+
+def _draw_body(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
+    from matplotlib.ticker import MultipleLocator
+    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
+
+    moments, radar = linked.moments, linked.radar
+    vertices, faces = unit_sphere(2)
+    poses = moments.poses[step].astype(np.float64)
+    for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
+        corners = (centre + vertices @ np.array(semi_axes))[faces]
+        axes.add_collection3d(Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0))
+    outlines = [np.concatenate([corners, corners[:1]]) for corners in moments.walls]
+    if outlines:
+        axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
+    if len(moments.furniture_faces):
+        triangles = moments.furniture_vertices[moments.furniture_faces].astype(np.float64)
+        axes.add_collection3d(Poly3DCollection(triangles, facecolors="#b08d57", alpha=0.18, linewidth=0))
+    place = np.array(radar.position_m)
+    rgba = paint.echoes(step)
+    for echo in np.flatnonzero(linked.seen[step]):
+        corners = moments.corners[step, echo].astype(np.float64)
+        corners = corners[np.isfinite(corners).all(axis=1)]
+        if len(corners):
+            line = np.concatenate([[place], corners, [place]])
+            direct = moments.direct[echo]
+            axes.plot(*line.T, color=rgba[echo], linewidth=1.2 if direct else 0.6, alpha=0.8 if direct else 0.35)
+    axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
+    axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
+    everything = np.concatenate(
+        [moments.poses[:, :, 0].reshape(-1, 3), moments.walls.reshape(-1, 3), moments.furniture_vertices, radar.tx, radar.rx]
+    )
+    low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
+    low[2] = min(low[2], 0.0)
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Body and paths")
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_major_locator(MultipleLocator(1.0))
+    axes.set_box_aspect(high - low, zoom=1.35)
+    axes.view_init(elev=22, azim=-75)
+    axes.legend(loc="upper left", fontsize=8)
+
+
+def _extent(levels: Levels) -> tuple[float, float, float, float]:
+    rows, columns = levels.level.shape[1:]
+    (x, dx), (y, dy) = levels.across, levels.up
+    return x - dx / 2, x + dx * (columns - 0.5), y - dy / 2, y + dy * (rows - 0.5)
+
+
+def _image(axes: Any, levels: Levels, number: int, colours: str) -> Any:
+    decibels = levels.low_db + levels.step_db * levels.level[number]
+    return axes.imshow(
+        decibels, origin="lower", aspect="auto", interpolation="nearest", cmap=colours, vmin=levels.low_db, vmax=levels.high_db,
+        extent=_extent(levels),
+    )  # fmt: skip
+
+
+def _draw_map(figure: Any, axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
+    moments = linked.moments
+    image = _image(axes, linked.range_doppler, step, "Greys")
+    rgba, velocity = paint.echoes(step), linked.shown_velocity()[step]
+    for direct, style in ((False, {"marker": "D", "s": 14, "facecolors": "none"}), (True, {"marker": "o", "s": 40})):
+        own = np.flatnonzero(linked.seen[step] & (moments.direct == direct))
+        edges = "white" if direct else rgba[own]
+        given = style | ({"color": rgba[own]} if direct else {})
+        axes.scatter(velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given)
+    across, up = linked.shown_box()
+    axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
+    axes.set_title("Range-Doppler map of this window, and where echoes are")
+    figure.colorbar(image, ax=axes, label=linked.range_doppler.label)
+
+
+def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
+    points, time = linked.rdt_points, linked.moments.times[step]
+    axes.set(
+        xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"Range-Doppler-time cloud: {len(points)} points"
+    )
+    axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
+    if not len(points):
+        return
+    rgba = paint.cloud()
+    own = np.abs(points[:, 0] - time) <= linked.radar.frame_duration_s / 2
+    axes.scatter(*points[~own].T, c=rgba[~own], s=1.5, alpha=0.35, depthshade=False)
+    axes.scatter(*points[own].T, c=rgba[own], s=12, depthshade=False)
+    (_, r0, v0), (_, r1, v1) = points.min(axis=0), points.max(axis=0)
+    axes.plot([time] * 5, [r0, r1, r1, r0, r0], [v0, v0, v1, v1, v0], color=_NOW, linewidth=1.2)
+
+
+def _draw_spectrogram(figure: Any, axes: Any, linked: Linked, step: int) -> None:
+    axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
+    if not linked.spectrogram.level.size:
+        axes.text(0.5, 0.5, "The capture is too short for one.", ha="center", va="center", transform=axes.transAxes)
+        return
+    image = _image(axes, linked.spectrogram, 0, "viridis")
+    axes.axvline(linked.moments.times[step], color=_NOW, linewidth=1.5)
+    figure.colorbar(image, ax=axes, label=linked.spectrogram.label)

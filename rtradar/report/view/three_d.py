@@ -1,0 +1,178 @@
+"""What the page's 3D views draw: a moving body, and clouds, packed small."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.body import Body, unit_sphere
+from rtradar.clouds.spatial import SpatialCloud
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.report.figures.field_units import field_unit
+
+FRAME_RATE_HZ = 20.0
+"""Poses a second of the moving figure."""
+
+MOST_FRAMES = 400
+"""20 s at the full rate, 0.5 MB; longer recordings have fewer poses a second."""
+
+MOST_POINTS = 20_000
+"""Points of one cloud that a browser still turns smoothly."""
+
+_SUBDIVISIONS = 2
+_DYNAMIC_RANGE_DB = 30.0
+_MARGIN_M = 0.4
+
+
+def figure_data(
+    body: Body, radar: Radar, part_power_m2: Mapping[str, float] | None = None, *, spreading: bool = True
+) -> dict[str, Any]:
+    """The recording as poses of ellipsoids, with the radar and the floor.
+
+    Parameters
+    ----------
+    body : Body
+        Placed before the radar.
+    radar : Radar
+    part_power_m2 : mapping of part name to float, optional
+        Mean echo power of each part [m^2], for its colour.
+    spreading : bool
+        Whether amplitudes hold the loss over distance.
+
+    Returns
+    -------
+    dict
+        Ready for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three semi-axes of each part [m], world;
+        ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m];
+        ``power_db`` of each part, at most 30 dB below the strongest, or None; its ``power_label`` and ``power_unit``.
+    """
+    intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
+    times = np.linspace(0.0, body.duration_s, intervals + 1)
+    figure = posed_figure(body.part_names, times, semi_axis_poses(body, times), radar)
+    power = np.array([(part_power_m2 or {}).get(part, 0.0) for part in body.part_names])
+    strongest = float(power.max())
+    unit = field_unit(radar, spreading=spreading, strongest_m2=strongest)
+    levels = unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10))).round(2).tolist()
+    label = unit.label("mean of the part")
+    return figure | {"power_db": levels if strongest > 0 else None, "power_label": label, "power_unit": unit.name}
+
+
+def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Centre and the three semi-axes of each part as vectors, (time, part, 4, 3) world [m], at times (time,) [s]."""
+    centres, frames, semi_axes = body.at(times)
+    # Columns of a frame are directions: after the swap, row k is semi-axis k.
+    axes = np.swapaxes(frames * semi_axes[:, None, :], 2, 3)
+    return np.concatenate([centres[:, :, None, :], axes], axis=2)
+
+
+def posed_figure(
+    part_names: Sequence[str],
+    times: NDArray[np.float64],
+    poses: NDArray[np.floating],
+    radar: Radar,
+) -> dict[str, Any]:
+    """What both pages draw of a moving body before a radar.
+
+    Parameters
+    ----------
+    part_names : sequence of str
+    times : (frame,) float64
+        [s].
+    poses : (frame, part, 4, 3)
+        As `semi_axis_poses` gives them.
+    radar : Radar
+
+    Returns
+    -------
+    dict
+        Ready for JSON: all of `figure_data` but ``power_db``.
+    """
+    centres, axes = poses[:, :, 0], poses[:, :, 1:]
+    vertices, faces = unit_sphere(_SUBDIVISIONS)
+    # An ellipsoid reaches sqrt(sum of squares of its semi-axes' components) along each world axis.
+    reach = np.sqrt((axes**2).sum(axis=2))
+    return {
+        "parts": list(part_names),
+        "times": np.round(times, 4).tolist(),
+        "poses": packed_floats(poses),
+        "vertices": packed_floats(vertices),
+        "faces": faces.ravel().tolist(),
+        "tx": np.round(radar.tx, 4).tolist(),
+        "rx": np.round(radar.rx, 4).tolist(),
+        "ranges": _ranges(
+            (centres - reach).reshape(-1, 3), (centres + reach).reshape(-1, 3), np.concatenate([radar.tx, radar.rx])
+        ),
+        "window_s": radar.frame_duration_s,
+    }
+
+
+def rdt_data(points: ArrayLike) -> dict[str, Any]:
+    """The range-Doppler-time cloud, thinned evenly to `MOST_POINTS`.
+
+    Parameters
+    ----------
+    points : (point, 3)
+        Time [s], range [m], velocity [m/s].
+
+    Returns
+    -------
+    dict
+        Ready for JSON: ``count``, ``shown``, and ``points`` as float32 (point, 3).
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit, or a value is not finite.
+    """
+    places = np.asarray(points, dtype=np.float64)
+    if places.ndim != 2 or places.shape[1] != 3:
+        raise InputError(f"report: rdt_points has shape {places.shape}; it must be (point, 3): time, range, velocity")
+    if not np.isfinite(places).all():
+        raise InputError("report: rdt_points holds NaN or infinity; every value must be finite")
+    return _thinned(points=places)
+
+
+def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
+    """The strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`.
+
+    Parameters
+    ----------
+    cloud : SpatialCloud
+
+    Returns
+    -------
+    dict
+        Ready for JSON: ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points`` (point, 3), ``velocity``
+        and ``time`` (point,).
+    """
+    cloud = cloud.strongest()
+    return {"measured": cloud.measured.tolist()} | _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
+
+
+def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
+    every = max(1, math.ceil(len(points) / MOST_POINTS))
+    packed = {name: packed_floats(array[::every]) for name, array in {"points": points, **values}.items()}
+    return {"count": len(points), "shown": len(points[::every]), **packed}
+
+
+def packed_floats(array: NDArray[np.floating]) -> str:
+    """Base64 of little-endian float32, last axis fastest."""
+    return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
+
+
+def _ranges(low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
+    """Box about all poses, the radar and the floor, in half metres."""
+    least = np.minimum(low.min(axis=0), antennas.min(axis=0))
+    most = np.maximum(high.max(axis=0), antennas.max(axis=0))
+    least[:2] -= _MARGIN_M
+    most[:2] += _MARGIN_M
+    # The floor is z = 0: a heel a little below it needs no more room.
+    least[2] = 0.0 if least[2] > -0.1 else least[2]
+    box = np.stack([np.floor(2 * least) / 2, np.ceil(2 * most) / 2], axis=1)
+    return [[float(a), float(b)] for a, b in box]

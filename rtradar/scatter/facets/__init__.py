@@ -1,0 +1,1 @@
+"""Physical optics over triangles: surfaces, the integral over them, and their shadows."""

@@ -1,0 +1,1 @@
+"""Fresnel zones on an ellipsoid, and which fraction of them is visible past occluders."""

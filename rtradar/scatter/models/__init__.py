@@ -1,0 +1,1 @@
+"""The echo models that `--fidelity` names, one module each."""

@@ -1,0 +1,286 @@
+"""The rung `auto`: each part at each time by the cheapest way that keeps the whole within a tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from functools import cached_property, partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scatter.common.keyframe_cache import FirstCome
+from rtradar.scatter.common.poses import ChirpPoses, Rung, chirp_poses
+from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
+from rtradar.scatter.models.analytic import far_field_echo
+from rtradar.scatter.models.auto_errors import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
+from rtradar.scatter.models.auto_plan import choose
+from rtradar.scatter.models.fresnel import sweep_nodes
+from rtradar.scatter.models.physical_optics import PhysicalOptics
+from rtradar.scatter.models.reference import Reference
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.start_points import MirrorStarts
+from rtradar.scatter.specular_point.visibility import MirrorVisibility
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.body_tracer import BodyTracer
+
+_INSTANTS_S = 25e-3
+"""Between the instants at which ways are chosen; a limb at 5 m/s goes 12 cm."""
+
+_INSTANTS_AT_ONCE = 32
+
+_MARGIN = 0.7
+"""Of a complex tolerance that forecasts may use: they do not know the array's far ends, nor the time between instants."""
+
+_LEAST_COMPLEX = 1e-3
+
+
+_KEPT_CHUNKS, _PASSING = 25, 4
+"""Of so many instants: the first 20 s of a recording, which is gone through twice, and of what comes later what a block needs."""
+
+
+class Planned(NamedTuple):
+    """Some instants: ``chosen (time, part)``; ``in_view (time, part)``, ``occluders (time, part, part)`` of a `Forecast`."""
+
+    chosen: NDArray[np.int64]
+    in_view: NDArray[np.bool_]
+    occluders: NDArray[np.bool_]
+
+
+class _Group(NamedTuple):
+    """Echoes of some parts, all modelled in one way, as in `Echoes`; amplitudes may be real."""
+
+    length: NDArray[np.float64]
+    amplitude: NDArray[np.inexact]
+    frequency: NDArray[np.float64]
+    part: NDArray[np.int64]
+    bounces: NDArray[np.int64]
+
+
+class Auto:
+    """`auto`: only what the tolerance requires of each part is modelled; where the way changes, echoes are faded over.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend; nothing is loaded as long as nothing has to be traced.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    tolerance_db : float
+        Largest error of the power of a frame [dB].
+    tolerance_complex : float, optional
+        Largest rms error of the received field over its rms, as a share; None: only the power matters.
+
+    Raises
+    ------
+    InputError
+        Where a tolerance is out of range.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        tolerance_db: float = 0.5,
+        tolerance_complex: float | None = None,
+    ) -> None:
+        if not (math.isfinite(tolerance_db) and tolerance_db > 0):
+            raise InputError(f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db)")
+        if tolerance_complex is not None and not (math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX):
+            raise InputError(
+                f"auto: tolerance_complex = {tolerance_complex}; it must be at least {_LEAST_COMPLEX}, a share of the rms field "
+                "(--tolerance-complex)"
+            )
+        self._radar, self._body, self._variant, self._spreading = radar, body, variant, spreading
+        # A decibel down is a smaller share than one up.
+        self._power_share = 1 - 10 ** (-tolerance_db / 10)
+        self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
+        self._starts = MirrorStarts(radar, body)
+        self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
+        self._planned: FirstCome[int, Planned] = FirstCome(_KEPT_CHUNKS, _PASSING)
+        # What `account` tells: parts and instants (way, part) and by reason, and as bits of a number the chunks that are in it.
+        self._ways = np.zeros((len(WAYS), len(body.part_names)), dtype=np.int64)
+        self._why: Counter[str] = Counter()
+        self._counted = 0
+        self.variant: str | None = None
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps: one for each part and way of modelling it that these chirps have."""
+        chirps = np.asarray(chirps, dtype=np.int64)
+        at = chirp_poses(self._radar, self._body, chirps)
+        weights, cut = self._weights(chirps)
+        found = []
+        for way in range(ANALYTIC, len(WAYS)):
+            parts = np.flatnonzero((weights[way] > 0).any(axis=0))
+            if len(parts):
+                found.append((self._by(way, at, chirps, parts, cut), weights[way][:, parts]))
+        if not found:
+            # Nobody is seen: one part stands for all, with nothing to return.
+            found.append((self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1))))
+        frequency = max((group.frequency for group, _ in found), key=len)
+        part = np.concatenate([group.part for group, _ in found])
+        # Filled in place: to make each group complex and join them afterwards would cost more than the closed forms.
+        length = np.empty((*found[0][0].length.shape[:2], len(part)))
+        amplitude = np.empty((len(frequency), *length.shape), dtype=np.complex128)
+        begin = 0
+        for group, weight in found:
+            own = slice(begin, begin + len(group.part))
+            length[..., own] = group.length
+            np.multiply(_at_nodes(group, frequency), weight[:, None], out=amplitude[..., own])
+            begin = own.stop
+        return Echoes(
+            length=length,
+            amplitude=amplitude,
+            frequency=frequency,
+            tx=at.tx_index,
+            part=part,
+            bounces=np.concatenate([group.bounces for group, _ in found]),
+        )
+
+    def account(self) -> dict[str, Any]:
+        """What was modelled how, and why, as shares of part and time so far: ``ways``, ``parts`` and ``why``, for JSON."""
+        names = self._body.part_names
+        whole = self._ways.sum()
+        return {
+            "ways": {name: float(count / whole) for name, count in zip(WAYS, self._ways.sum(axis=1), strict=True)},
+            "why": {reason: float(count / whole) for reason, count in self._why.items()},
+            "parts": {
+                part: {name: float(share) for name, share in zip(WAYS, counts / counts.sum(), strict=True)}
+                for part, counts in zip(names, self._ways.T, strict=True)
+            },
+        }
+
+    def _count(self, chosen: NDArray[np.int64], told: Forecast) -> None:
+        """Add some instants, chosen (time, part), to what `account` tells."""
+        # Of what the next cheaper way leaves wrong, is most due to curvature?
+        cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
+        wrong, optics = (np.take_along_axis(errors, cheaper, axis=1)[:, 0] for errors in (told.wrong, told.optics))
+        curved = optics > wrong
+        higher = chosen > ANALYTIC
+        for reason, where in {
+            "left out: hidden": chosen == LEFT_OUT,
+            "analytic: enough": chosen == ANALYTIC,
+            "higher: hidden": higher & told.hidden,
+            "higher: cut by an edge": higher & ~told.hidden & ~told.in_view,
+            "higher: in full view, curvature": higher & told.in_view & curved,
+            "higher: in full view, near field": higher & told.in_view & ~curved,
+        }.items():
+            self._why[reason] += int(where.sum())
+        self._ways += (chosen == np.arange(len(WAYS))[:, None, None]).sum(axis=1)
+
+    def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """Weights (way, chirp, part), which sum to 1 or, left out, to less; and parts that others cut there (part,)."""
+        parts = np.arange(len(self._body.part_names))
+        interval = chirps // self._step
+        share = (chirps - interval * self._step) / self._step
+        share = (share**2 * (3 - 2 * share))[:, None]
+        weights = np.zeros((len(WAYS), len(chirps), len(parts)))
+        cut = np.zeros(len(parts), dtype=bool)
+        for end, weight in ((interval, 1 - share), (interval + 1, share)):
+            for instant in np.unique(end):
+                planned, row = self._plan(int(instant))
+                here = np.flatnonzero(end == instant)
+                weights[planned.chosen[row], here[:, None], parts] += weight[here]
+                cut |= ~planned.in_view[row]
+        weights[LEFT_OUT] = 0
+        return weights, cut
+
+    def _occluders(self, time: float) -> NDArray[np.bool_]:
+        """What may stand before the parts that go by `fresnel` within an instant or two of a time [s], (part, part)."""
+        before = int(time / self._radar.chirp_interval_s) // self._step
+        instants = [self._plan(max(0, before + i)) for i in (-1, 0, 1, 2)]
+        edges = np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
+        occluders = np.any([planned.occluders[row] for planned, row in instants], axis=0)
+        return np.asarray(occluders & edges[:, None])
+
+    def _plan(self, instant: int) -> tuple[Planned, int]:
+        """The chunk of instants that holds this one, and its row."""
+        chunk, row = divmod(instant, _INSTANTS_AT_ONCE)
+        return self._planned.get(chunk, partial(self._look_ahead, chunk)), row
+
+    def _look_ahead(self, chunk: int) -> Planned:
+        # One more on either side, for what a part needs there it is given here, too.
+        instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
+        times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
+        poses = self._body.at(np.minimum(times, self._body.duration_s))
+        told = forecast(self._radar, poses, spreading=self._spreading)
+        chosen = choose(told, self._power_share, self._complex_share)[1:-1]
+        told = Forecast(**{name: array[1:-1] for name, array in told._asdict().items()})
+        # Later ones are looked at again in the next pass, and are not to count twice.
+        if not self._counted >> chunk & 1:
+            self._counted |= 1 << chunk
+            self._count(chosen, told)
+        # Copies, which do not hold what they are cut from.
+        return Planned(chosen.copy(), told.in_view.copy(), told.occluders.copy())
+
+    def _by(
+        self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]
+    ) -> _Group:
+        if way >= PHYSICAL_OPTICS:
+            echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(chirps)
+            return _Group(
+                echoes.length[..., parts],
+                echoes.amplitude[..., parts],
+                echoes.frequency,
+                echoes.part[parts],
+                echoes.bounces[parts],
+            )
+        poses = (at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
+        frequency = np.array([self._radar.centre_frequency_hz])
+        values: NDArray[np.inexact]
+        if way == ANALYTIC:
+            length, values = far_field_echo(*poses, spreading=self._spreading)
+        else:
+            start = self._starts.at(chirps, parts)
+            length, values, _ = mirror(*poses, start=start, polarization=self._radar.polarization, spreading=self._spreading)
+            if way == SPECULAR and cut[parts].any():
+                values *= self._specular_points.at(chirps, parts)[0]
+        values = values[None]
+        if way == FRESNEL and cut[parts].any():
+            frequency = sweep_nodes(self._radar)
+            values = values * self._zones.at(chirps, parts).conj()
+        return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
+
+    @cached_property
+    def _specular_points(self) -> MirrorVisibility:
+        backend = select(self._variant)
+        self.variant = backend.kind
+        return MirrorVisibility(self._radar, self._body, BodyTracer(use(backend), self._body.semi_axes))
+
+    @cached_property
+    def _zones(self) -> ZoneShares:
+        return ZoneShares(self._radar, self._body, sweep_nodes(self._radar), self._occluders)
+
+    @cached_property
+    def _physical_optics(self) -> Rung:
+        return self._traced(PhysicalOptics(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+
+    @cached_property
+    def _reference(self) -> Rung:
+        return self._traced(Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+
+    def _traced(self, rung: Rung) -> Rung:
+        self.variant = rung.variant
+        return rung
+
+
+def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:
+    """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through their own nodes."""
+    if len(echoes.frequency) == 1:
+        return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
+    if np.array_equal(echoes.frequency, frequency):
+        return echoes.amplitude
+    middle, half = frequency.mean(), np.ptp(frequency) / 2
+    own = np.vander((echoes.frequency - middle) / half, increasing=True)
+    asked = np.vander((frequency - middle) / half, len(echoes.frequency), increasing=True)
+    return np.asarray(np.tensordot(asked @ np.linalg.inv(own), echoes.amplitude, axes=1))

@@ -1,0 +1,163 @@
+"""What each way of modelling a part would leave wrong, told beforehand at little cost.
+
+The body is looked at from the middle of the array, in closed form alone: the specular point's return G, the far-field
+cross-section's A, the share V of the Fresnel zones that others leave in view, and the radii of curvature. What is true
+is taken to be G V; then
+
+    analytic         |A exp(jk dL) - G V|     dL between both paths
+    specular         |G (v - V)|              v whether the specular point itself is in view
+    fresnel          3 % of G where an edge cuts the zones (``validation/fresnel.py``)
+    all of optics    G V / (2 k rho)          the next term of its expansion, rho the mean radius of curvature
+    physical-optics  1.5 % of G V: about what its interpolation leaves (``validation/ladder.py``)
+
+and that of `reference` is 0, for it is what errors are held against. All of it through the patterns of the radar's antennas.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from rtradar.body.body import Poses
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.jit import compiled
+from rtradar.radar import Radar
+from rtradar.rcs import ellipsoid_radii
+from rtradar.scatter.antenna_gain import leg_gain
+from rtradar.scatter.common.array_interpolation import array_nodes
+from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.fresnel_zones.grid import RIM
+from rtradar.scatter.fresnel_zones.visible_fraction import zone_shares
+from rtradar.scatter.models.analytic import far_field_echo
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.trace.clearance import clearance
+
+WAYS = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
+"""Ways of modelling a part, cheapest first; the first is no echo, for parts that are hidden."""
+
+LEFT_OUT, ANALYTIC, SPECULAR, FRESNEL, PHYSICAL_OPTICS, REFERENCE = range(len(WAYS))
+
+_AT_AN_EDGE, _INTERPOLATED = 0.03, 0.015
+_IN_VIEW = 0.99
+"""Share of the power from which on a part counts as being in full view."""
+
+
+class Forecast(NamedTuple):
+    """Part by part at some instants, all float64.
+
+    ``true (time, part)`` power [m^2]; ``power (time, way, part)`` that each way would give; ``wrong (time, way, part)``
+    squared complex error of each way [m^2], without ``optics (time, way, part)``, what curvature adds to it; ``in_view``
+    and ``hidden (time, part)`` bool: wholly, or so that neither specular point nor zones are seen; ``occluders (time, part,
+    part)`` bool: what may stand before a part's zones, hidden first, as seen from any antenna.
+    """
+
+    true: NDArray[np.float64]
+    power: NDArray[np.float64]
+    wrong: NDArray[np.float64]
+    optics: NDArray[np.float64]
+    in_view: NDArray[np.bool_]
+    hidden: NDArray[np.bool_]
+    occluders: NDArray[np.bool_]
+
+
+def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
+    """Forecast for these poses.
+
+    Parameters
+    ----------
+    radar : Radar
+    poses : Poses
+        Of the body at the instants looked at.
+    spreading : bool
+        Whether powers hold 1 / (R1 R2)^2.
+
+    Returns
+    -------
+    Forecast
+    """
+    times, parts = poses.centres.shape[:2]
+    wavenumber = 2 * math.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
+    # Returns at the ends of the lines, for dL differs over the array.
+    nodes = array_nodes(radar, 2, 2)
+    pairs = len(nodes.pairs)
+    tx, rx = (np.tile(nodes.antennas[nodes.pairs[:, side]], (times, 1)) for side in (0, 1))
+    at = (tx, rx[:, None], np.repeat(poses.centres, pairs, axis=0), np.repeat(poses.frames, pairs, axis=0), poses.semi_axes)
+    far_length, far = far_field_echo(*at, spreading=spreading)
+    length, near, _ = mirror(*at, polarization=radar.polarization, spreading=spreading)
+    # What a tolerance is held against is what the antennas let through.
+    gain = leg_gain(radar, ChirpPoses(np.zeros(len(tx), dtype=np.int64), *at))
+    turned = (gain * far * np.exp(1j * wavenumber * (far_length - length))).reshape(times, pairs, parts)
+    near = (gain * near).reshape(times, pairs, parts)
+
+    share, seen, radius, occluders = _views(radar, poses, wavenumber)
+    free = (near**2).mean(axis=1)
+    true = free * np.abs(share) ** 2
+    power = np.zeros((times, len(WAYS), parts))
+    wrong, optics = np.zeros_like(power), np.zeros_like(power)
+    optics[:, ANALYTIC:PHYSICAL_OPTICS] = (true / (2 * wavenumber * radius) ** 2)[:, None]
+    wrong[:, LEFT_OUT] = true
+    power[:, ANALYTIC] = (np.abs(turned) ** 2).mean(axis=1)
+    wrong[:, ANALYTIC] = (np.abs(turned - near * share[:, None]) ** 2).mean(axis=1)
+    power[:, SPECULAR] = free * seen
+    wrong[:, SPECULAR] = free * np.abs(seen - share) ** 2
+    power[:, FRESNEL:] = true[:, None]
+    cut = np.abs(share - seen) > 1e-3
+    wrong[:, FRESNEL] = free * (_AT_AN_EDGE * cut) ** 2
+    wrong[:, PHYSICAL_OPTICS] = true * _INTERPOLATED**2
+    in_view = np.abs(share - 1) < 1 - _IN_VIEW
+    return Forecast(true, power, wrong, optics, in_view & seen, ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW), occluders)
+
+
+def _views(
+    radar: Radar, poses: Poses, wavenumber: float
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64], NDArray[np.bool_]]:
+    """From the middle of the array (time, part): share V, specular point seen, mean radius of curvature [m]; and who may hide."""
+    times, parts = poses.centres.shape[:2]
+    eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
+    eyes = np.tile(eye, (times, 1))
+    _, _, points = mirror(eyes, eyes[:, None], *poses, points=True)
+    points = points[:, 0]
+    sight = np.einsum("tpji,tpj->tpi", poses.frames, eye - points)
+    distance = np.linalg.norm(sight, axis=-1)
+    normal = sight / distance[..., None]
+    angles = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
+    a, b, c = poses.semi_axes.T
+    smaller, larger = ellipsoid_radii(a, b, c, *angles)
+    # The zones' reach on the surface, along its flattest direction, where k times the excess path is RIM squared.
+    reach = RIM / np.sqrt(wavenumber * (1 / distance + 1 / larger))
+    reach = np.minimum(reach, np.sqrt((np.sort(poses.semi_axes, axis=1)[:, 1:] ** 2).sum(axis=1)))
+    clearance = np.empty((times, parts, parts))
+    centres, frames, semi_axes = (np.ascontiguousarray(array) for array in poses)
+    _clearances(eye, points, centres, frames, semi_axes, clearance)
+    seen = np.asarray((clearance > 0).all(axis=2))
+    # A ray moved by so much comes nearer to another unit sphere by at most that over its shortest semi-axis: the reach, and
+    # as much of the way to the farthest antenna as is left where it passes the other part.
+    array = np.linalg.norm(np.concatenate([radar.tx, radar.rx]) - eye, axis=1).max()
+    apart = np.linalg.norm(points[:, :, None] - poses.centres[:, None], axis=-1) + poses.semi_axes.max(axis=1)
+    moved = reach[..., None] + array * np.minimum(apart / distance[..., None], 1.0)
+    occluders = np.asarray(clearance < moved / poses.semi_axes.min(axis=1))
+    share = np.ones((times, parts), dtype=np.complex128)
+    pose, part = np.nonzero(occluders.any(axis=2))
+    if len(pose):
+        here = np.tile(eye, (len(pose), 1))
+        k = np.full(len(pose), wavenumber)
+        one = np.zeros((1, 2), dtype=np.int64)
+        zone = (here, here, points[pose, part], part.astype(np.int64), pose.astype(np.int64))
+        found = zone_shares(*zone, (centres, frames, semi_axes), here[:, None], one, occluders[pose, part], k[:, None], k)
+        share[pose, part] = found[:, 0, 0]
+    return share, seen, np.asarray(np.sqrt(smaller * larger)), occluders
+
+
+@compiled(parallel=True)
+def _clearances(eye, points, centres, frames, semi_axes, out):  # type: ignore[no-untyped-def]
+    """How far outside each other part, stretched to a unit sphere, the ray from ``eye`` to each part's point passes."""
+    times, parts = points.shape[:2]
+    for time in prange(times):
+        for part in range(parts):
+            for other in range(parts):
+                pose = (centres[time, other], frames[time, other], semi_axes[other])
+                out[time, part, other] = math.inf if other == part else clearance(eye, points[time, part], *pose)

@@ -1,0 +1,192 @@
+"""The rung `rays`: shooting and bouncing rays by Mitsuba, on a moving body."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import barycentric_interpolate
+
+from rtradar.body import Body
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
+from rtradar.scatter.ray_tubes.shooting import Shooter, exits
+from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_dials
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.bounces import BodySurfaces
+
+ANCHOR_S = 10e-3
+_KEPT_SHOTS = 1024
+"""Shots remembered, of 12 Tx and 10 ms that is a second: one of 13 nodes, 8 Rx and 42 echoes takes 70 kB."""
+BOUNCES_OF_BODY = 1
+_NODES_PER_HZ = (1e-9, 2.5e-9)
+"""Frequency nodes, beyond three, for the paths over one part, and for those of several bounces that share an echo."""
+
+Array = NDArray[np.float64]
+
+
+class Rays:
+    """`rays`: tubes fixed in the material of the body, shot from each Tx.
+
+    The path over the specular point of each part is exact at every chirp; rays are shot at anchors, and what varies slowly, the
+    amplitude on that path, is interpolated between them by cubics over four anchors. Of several bounces the mean path is
+    interpolated too.
+
+    Parameters
+    ----------
+    radar : Radar
+    body : Body
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    rays_per_wavelength : float
+        The edge of a tube's facet is the wavelength at the sweep centre over this.
+    bounces : int
+        The most reflections on the way. Two bounces on a body of ellipsoids go mostly by the creases where two of them touch,
+        which no real body has, and reach half the field of one: one is the default.
+    anchor_s : float
+        Time between anchors [s]; 0 shoots at every chirp.
+
+    Raises
+    ------
+    InputError
+        Where a dial is out of range, or would take too many tubes.
+    BackendError
+        Where no backend of that kind works here.
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        rays_per_wavelength: float = RAYS_PER_WAVELENGTH,
+        bounces: int = BOUNCES_OF_BODY,
+        anchor_s: float = ANCHOR_S,
+    ) -> None:
+        check_dials(rays_per_wavelength, bounces)
+        if not 0 <= anchor_s < 1:
+            raise InputError(f"rays: anchor_s = {anchor_s}; allowed are 0 (every chirp) to 1 s")
+        self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces
+        self._step = max(1, round(anchor_s / radar.chirp_interval_s))
+        self._grid = EllipsoidGrid.cover(body.semi_axes, radar.wavelength_m / rays_per_wavelength)
+        backend = select(variant)
+        self.variant: str | None = backend.kind
+        self._surfaces = BodySurfaces(use(backend), body.semi_axes)
+        self._posed: tuple[int, PosedGrid] | None = None
+        self._shots: OrderedDict[tuple[int, int], _Shot] = OrderedDict()
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps: of each part one for each number of bounces, by the part of the last bounce."""
+        at = chirp_poses(self._radar, self._body, chirps)
+        parts, orders = len(at.semi_axes), self._bounces
+        frequency = self._nodes(orders > 1)
+        length = np.zeros((len(at.tx), at.rx.shape[1], orders * parts))
+        amplitude = np.zeros((len(frequency), *length.shape), dtype=np.complex128)
+        for index, (chirp, tx) in enumerate(zip(chirps, at.tx_index, strict=True)):
+            before, share = divmod(int(chirp), self._step)
+            for place, weight in enumerate(_cubic(share / self._step), start=before - 1):
+                if weight != 0:
+                    shot = self._shot(max(place, 0) * self._step, int(tx))
+                    length[index] += weight * shot.length
+                    amplitude[:, index] += weight * shot.amplitude
+        length[:, :, :parts] = mirror(*at[1:])[0]
+        return Echoes(
+            length=length,
+            amplitude=amplitude,
+            frequency=frequency,
+            tx=at.tx_index,
+            part=np.tile(np.arange(parts), orders),
+            bounces=np.repeat(np.arange(1, orders + 1), parts),
+        )
+
+    def _shot(self, chirp: int, tx: int) -> _Shot:
+        """What one Tx sends and every Rx hears in the pose of that chirp."""
+        key = (chirp, tx)
+        if key in self._shots:
+            self._shots.move_to_end(key)
+        else:
+            self._shots[key] = self._shoot(chirp, tx)
+            if len(self._shots) > _KEPT_SHOTS:
+                self._shots.popitem(last=False)
+        return self._shots[key]
+
+    def _shoot(self, chirp: int, tx: int) -> _Shot:
+        radar, axes = self._radar, self._body.semi_axes
+        if self._posed is None or self._posed[0] != chirp:
+            at = chirp_poses(radar, self._body, np.array([chirp]))
+            self._posed = chirp, PosedGrid(self._grid, at.centres[0], at.frames[0], axes)
+            self._surfaces.pose(at.centres[0], at.frames[0])
+        grid = self._posed[1]
+        shooter = Shooter(
+            surfaces=self._surfaces,
+            grid=grid,
+            bounces=self._bounces,
+            wavenumber=2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS,
+            polarization=radar.polarization,
+            spreading=self._spreading,
+        )
+        place, rx = radar.tx[tx], radar.rx[radar.rx_of_tx[tx]]
+        specular = mirror(place[None], rx[None], grid.centres[None], grid.frames[None], axes)[0][0]
+        frequency = self._nodes(self._bounces > 1)
+        lengths, amplitudes = [], []
+        for order, footprints in enumerate(shooter.shoot(place)):
+            lengths.append(_middle_length(footprints, rx, specular) if order else specular)
+            nodes = self._nodes(order > 0)
+            sums = radiate(
+                footprints,
+                exits(self._surfaces, footprints, rx),
+                footprints.surface,
+                rx,
+                2 * np.pi * nodes / SPEED_OF_LIGHT_MPS,
+                lengths[-1],
+                polarization=radar.polarization,
+                spreading=self._spreading,
+                tapered=order > 0,
+            )
+            amplitudes.append(sums if len(nodes) == len(frequency) else barycentric_interpolate(nodes, sums, frequency))
+        return _Shot(np.concatenate(lengths, axis=-1), np.concatenate(amplitudes, axis=-1).conj())
+
+    def _nodes(self, several_bounces: bool) -> Array:
+        """Frequencies (node,) at the zeros of a Chebyshev polynomial over the sweep [Hz]."""
+        bandwidth = self._radar.bandwidth_hz
+        count = 3 + min(17, math.ceil(_NODES_PER_HZ[several_bounces] * bandwidth))
+        return self._radar.start_frequency_hz + bandwidth * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
+
+
+class _Shot(NamedTuple):
+    """``length (rx, echo)`` [m] and ``amplitude (node, rx, echo)`` of one Tx in one pose."""
+
+    length: Array
+    amplitude: NDArray[np.complex128]
+
+
+def _cubic(share: float) -> tuple[float, float, float, float]:
+    """Weights of the anchors -1, 0, 1, 2 at ``share`` of the way from 0 to 1: Catmull and Rom's cubic, smooth at anchors."""
+    s, t = share, 1 - share
+    return -s * t * t / 2, t * (1 + t * (4 - 3 * t)) / 2, s * (1 + s * (4 - 3 * s)) / 2, -t * s * s / 2
+
+
+def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array:
+    """Path over each part (rx, part) [m], mean by the power of its tubes; ``otherwise (rx, part)`` where there are none."""
+    parts = otherwise.shape[1]
+    power = (footprints.field**2).sum(axis=1) * footprints.width()
+    total = np.bincount(footprints.surface, weights=power, minlength=parts)
+    lengths = otherwise.copy()
+    for receiver, antenna in enumerate(rx):
+        path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
+        mean = np.bincount(footprints.surface, weights=power * path, minlength=parts)
+        lengths[receiver] = np.where(total > 0, mean / np.where(total > 0, total, 1.0), otherwise[receiver])
+    return lengths

@@ -1,0 +1,98 @@
+"""Lengths and returns of echoes over walls, as if conductors stood alone before the images of the antennas."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.radar import Radar
+from rtradar.scatter.common.array_ends import ArrayEnds
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scatter.models.analytic import far_field_echo
+from rtradar.scatter.multipath.image_paths import WallPath, images
+from rtradar.scatter.specular_point.nearby import Nearby, nearby_echoes
+from rtradar.scatter.specular_point.solver import mirror
+
+Array = NDArray[np.float64]
+
+
+class WallEchoes:
+    """Geometric optics, or the far-field formula, of many echoes over walls.
+
+    Parameters
+    ----------
+    radar : Radar
+    paths : sequence of WallPath
+        Of which the echoes may be.
+    far_field : bool
+        Whether the formula of the rung `analytic` is taken.
+    """
+
+    def __init__(self, radar: Radar, paths: Sequence[WallPath], *, far_field: bool) -> None:
+        self._radar, self._far_field = radar, far_field
+        ends = ArrayEnds.of(radar)
+        legs = list(dict.fromkeys(leg for path in paths for leg in (path.out, path.back)))
+        self._out = np.array([legs.index(path.out) for path in paths])
+        self._back = np.array([legs.index(path.back) for path in paths])
+        # By leg: the antennas do not move, nor do their images.
+        self._tx = np.array([images(leg, radar.tx) for leg in legs])
+        self._rx = np.array([images(leg, radar.rx[radar.rx_of_tx]) for leg in legs])
+        self._rx_in_lanes = np.ascontiguousarray(np.swapaxes(self._rx, 2, 3))
+        self._rx_middle = np.array([images(leg, ends.rx_middle[ends.line_of_tx]) for leg in legs])
+
+    def at(self, path: NDArray[np.int64], part: NDArray[np.int64], poses: ChirpPoses, near: Nearby) -> tuple[Array, Array]:
+        """Lengths and returns.
+
+        Parameters
+        ----------
+        path, part : (echo,) int64
+            Path and body part of each echo.
+        poses : ChirpPoses
+        near : Nearby
+            Where specular points are expected. Those not wanted return nothing. The formula needs neither, and does all.
+
+        Returns
+        -------
+        length, amplitude : (chirp, rx, echo) float64
+            [m]; without regard to polarisation, which is a matter of the legs.
+        """
+        shape = (*poses.rx.shape[:2], len(path))
+        length, amplitude, known = np.empty(shape), np.empty(shape), np.empty((shape[0], shape[2]), dtype=bool)
+        if self._far_field:
+            for number in np.unique(path):
+                own = path == number
+                ellipsoids = (poses.centres[:, part[own]], poses.frames[:, part[own]], poses.semi_axes[part[own]])
+                length[..., own], amplitude[..., own] = far_field_echo(*self._antennas(number, poses.tx_index), *ellipsoids)
+            return length, amplitude
+        nearby_echoes(
+            self._tx,
+            self._rx_in_lanes,
+            self._rx_middle,
+            poses.tx_index,
+            self._out[path],
+            self._back[path],
+            part,
+            *poses[3:],
+            near,
+            length,
+            amplitude,
+            known,
+        )
+        for echo in np.flatnonzero(~known.all(axis=0)):
+            chirps, own = np.flatnonzero(~known[:, echo]), part[echo : echo + 1]
+            tx, rx = self._antennas(path[echo], poses.tx_index[chirps])
+            ellipsoids = (poses.centres[chirps][:, own], poses.frames[chirps][:, own], poses.semi_axes[own])
+            polarization = self._radar.polarization
+            exact, strength, points = mirror(tx, rx, *ellipsoids, polarization=polarization, points=True)
+            share = copolar(tx[:, None, None] - points, rx[:, :, None] - points, polarization)
+            length[chirps, :, echo] = exact[..., 0]
+            returned = strength / np.where(np.abs(share) > 1e-6, share, np.inf)
+            # Where the body comes between the images, the specular point ends with no number.
+            amplitude[chirps, :, echo] = np.where(np.isfinite(returned), returned, 0.0)[..., 0]
+        return length, amplitude
+
+    def _antennas(self, path: int, tx_index: NDArray[np.int64]) -> tuple[Array, Array]:
+        return self._tx[self._out[path], tx_index], self._rx[self._back[path], tx_index]

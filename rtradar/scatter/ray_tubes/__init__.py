@@ -1,0 +1,1 @@
+"""Shooting and bouncing rays: tubes of rays, their bounces and their footprints."""

@@ -1,0 +1,190 @@
+"""Shooting and bouncing: tubes of rays from one Tx, followed over the surfaces of a target.
+
+A tube is a facet seen from the Tx: three corner rays and a middle one, traced by Mitsuba. What the middle ray meets, the
+tube meets: the corner rays are intersected with that same surface in float64 - the smooth ellipsoid, or the plane of the
+face, which has no border - so that a tube meets a surface whole or not at all. Each ray reflects by the smooth normal
+where it is, and so tubes spread as curved mirrors spread them; the field follows from the power in the tube, which does not
+change. Where its rays meet different things, or its path bends too much across its footprint, a tube is split in four, at
+the Tx, up to `MOST_SPLITS` times; a corner ray that even then misses the surface goes on to the tangent plane of the middle's
+place, and a tube whose footprint that stretches out of all proportion, or that leaves beyond a horizon, is dropped.
+
+Ling, Chou, Lee, IEEE Trans. Antennas Propag. 37 (1989) 194: Shooting and bouncing rays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.scatter.ray_tubes.footprints import Footprints, across
+from rtradar.scatter.ray_tubes.tubes import Tubes
+from rtradar.trace.bounces import Surfaces
+
+MOST_SPLITS = 3
+"""A tube becomes 64 at most."""
+_BOW_RAD = 0.2
+"""Phase by which a footprint may leave the plane through its corners; of a bow three quarters are made good."""
+_INSET = 0.01
+"""Share of the way to the middle from which corner rays are traced: on a crease one would not know what it leaves."""
+_GRAZING = 0.02
+"""A tube that meets a surface at less than a degree, and still does when split, is dropped."""
+
+Array = NDArray[np.float64]
+
+
+class Grid(Protocol):
+    """Facets, fixed in the material, that can be split."""
+
+    @property
+    def tubes(self) -> Tubes:
+        """The facets in the world."""
+        ...
+
+    def split(self, which: NDArray[np.int64]) -> Grid:
+        """Those facets, each in four."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shooter:
+    """A target, and how rays are shot at it.
+
+    Parameters
+    ----------
+    surfaces : Surfaces
+        What rays meet.
+    grid : Grid
+        At what they are aimed.
+    bounces : int
+        The most reflections.
+    wavenumber : float
+        The largest that the footprints have to serve [1/m].
+    polarization : {"v", "h"}
+        Of the Tx.
+    spreading : bool
+        Whether the first leg's 1 / R1 is in the field.
+    two_sided : bool
+        Whether facets are lit from behind as well.
+    """
+
+    surfaces: Surfaces
+    grid: Grid
+    bounces: int
+    wavenumber: float
+    polarization: Literal["v", "h"]
+    spreading: bool = True
+    two_sided: bool = False
+
+    def shoot(self, tx: Array) -> list[Footprints]:
+        """Footprints of all tubes from ``tx (3,)`` [m], one set for each number of bounces from 1 on."""
+        grid = self.grid
+        first, lit = self._launch(grid, tx)
+        found: list[list[Footprints]] = [[] for _ in range(self.bounces - 1)]
+        start = first
+        for split in range(MOST_SPLITS + 1):
+            chain, rough = self._follow(start)
+            last = split == MOST_SPLITS
+            for hop, (footprints, origin) in enumerate(chain):
+                found[hop].append(footprints if last else footprints.take(~rough[origin]))
+            if last or not rough.any():
+                break
+            grid = grid.split(lit[rough])
+            start, lit = self._launch(grid, tx)
+        return [first, *(_joined(sets, first) for sets in found)]
+
+    def _launch(self, grid: Grid, tx: Array) -> tuple[Footprints, NDArray[np.int64]]:
+        """Tubes that the Tx sees, at their first footprint, and their numbers."""
+        tubes = grid.tubes
+        steepness = np.einsum("ti,ti->t", tx - tubes.places[:, 3], tubes.normals[:, 3])
+        lit = np.flatnonzero(steepness != 0 if self.two_sided else steepness > 0)
+        middles = tubes.places[lit, 3]
+        lit = lit[self.surfaces.sees(np.broadcast_to(tx, middles.shape), middles, tubes.surface[lit])]
+        places, normals = tubes.places[lit], tubes.normals[lit]
+        if self.two_sided:
+            normals = normals * np.sign(steepness[lit])[:, None, None]
+        directions = places - tx
+        path = np.linalg.norm(directions, axis=-1)
+        directions /= path[..., None]
+        field = across(-directions[:, 3], self.polarization)
+        if self.spreading:
+            field = field / path[:, 3:]
+        return Footprints(places, path, directions, normals, field, tubes.surface[lit]), lit
+
+    def _follow(self, start: Footprints) -> tuple[list[tuple[Footprints, NDArray[np.int64]]], NDArray[np.bool_]]:
+        """Footprints after 2, 3, ... bounces with the tube each comes from, and which tubes want to be split."""
+        rough = np.zeros(len(start), dtype=bool)
+        here, origin, chain = start, np.arange(len(start)), []
+        for _ in range(self.bounces - 1):
+            if len(here) == 0:
+                break
+            here, origin = _bounce(self.surfaces, here, origin, rough, self.wavenumber)
+            chain.append((here, origin))
+        return chain, rough
+
+
+def exits(surfaces: Surfaces, footprints: Footprints, rx: Array) -> NDArray[np.bool_]:
+    """Whether the last leg from each footprint to each of ``rx (rx, 3)`` is free, (rx, tube)."""
+    middles, normals = footprints.places[:, 3], footprints.normals[:, 3]
+    visible = rx @ normals.T > (middles * normals).sum(axis=1)
+    receiver, tube = np.nonzero(visible)
+    visible[receiver, tube] = surfaces.sees(rx[receiver], middles[tube], footprints.surface[tube])
+    return visible
+
+
+def _bounce(
+    surfaces: Surfaces, here: Footprints, origin: NDArray[np.int64], rough: NDArray[np.bool_], wavenumber: float
+) -> tuple[Footprints, NDArray[np.int64]]:
+    """Footprints one bounce on, and the tubes they come from; marks ``rough`` ones."""
+    against = np.einsum("tci,tci->tc", here.directions, here.normals)
+    onward = here.directions - 2 * against[..., None] * here.normals
+    normal = here.normals[:, 3]
+    field = 2 * np.einsum("ti,ti->t", normal, here.field)[:, None] * normal - here.field
+    met, traced = _trace(surfaces, here, onward)
+    # The middle goes past what a corner meets.
+    rough[origin[(met[:, 3] < 0) & (met[:, :3] >= 0).any(axis=1)]] = True
+    landing = np.repeat(met[:, 3:], 4, axis=1)
+    distance = surfaces.distance(landing, here.places, onward)
+    landed = np.flatnonzero((landing[:, 3] >= 0) & (distance[:, 3] > 0))
+    here, met, landing, traced = here.take(landed), met[landed], landing[landed], traced[landed]
+    origin, field, against = origin[landed], field[landed], against[landed]
+    distance, onward = distance[landed], onward[landed]
+    places = here.places + distance[..., None] * onward
+    normals = surfaces.normal(landing, places, onward)
+    # NaN, of a corner ray that misses, fails every comparison; a corner on the crease of two faces goes no way at all.
+    lands = (distance > -1e-9) & (np.einsum("tci,tci->tc", onward, normals) < 0)
+    # Such a corner goes to the tangent plane of the middle's place: what a tube carries lands whole or not at all.
+    normals = np.where(lands[..., None], normals, normals[:, 3:])
+    steepness = np.einsum("tci,tci->tc", onward, normals)
+    height = np.einsum("tci,tci->tc", places[:, 3:] - here.places, normals)
+    distance = np.where(lands, distance, height / np.where(steepness < -_GRAZING, steepness, np.nan))
+    places = here.places + distance[..., None] * onward
+    size = np.linalg.norm(here.places - here.places[:, 3:], axis=-1)
+    whole = ((np.abs(distance) < 3 * (distance[:, 3:] + size)) & (against < 0)).all(axis=1)
+    path = here.path + distance
+    bow = path[:, 3] - path[:, :3].mean(axis=1)
+    together = ((met == landing) | (wavenumber * np.abs(traced - distance) < _BOW_RAD)).all(axis=1)
+    rough[origin[~(whole & lands.all(axis=1) & together & (wavenumber * np.abs(bow) < _BOW_RAD))]] = True
+    there = Footprints(places, path, onward, normals, field, landing[:, 3]).take(whole)
+    before, after = here.width()[whole], there.width()
+    # A tube seen edge-on, or with its waist just here, has a footprint that sends nothing.
+    ratio = np.sqrt(before / np.where(after > 0, after, np.inf))
+    return replace(there, field=there.field * ratio[:, None]), origin[whole]
+
+
+def _trace(surfaces: Surfaces, here: Footprints, onward: Array) -> tuple[NDArray[np.int64], Array]:
+    """What the four rays of each tube meet, (tube, 4), and how far; -1 and infinity for nothing."""
+    inward = here.places + _INSET * (here.places[:, 3:] - here.places)
+    met, distance = surfaces.meets(
+        inward.reshape(-1, 3), here.normals.reshape(-1, 3), onward.reshape(-1, 3), np.repeat(here.surface, 4)
+    )
+    return met.reshape(-1, 4), distance.reshape(-1, 4)
+
+
+def _joined(parts: list[Footprints], like: Footprints) -> Footprints:
+    if not parts:
+        return like.take(np.zeros(len(like), dtype=bool))
+    arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in Footprints.__dataclass_fields__)
+    return Footprints(*arrays)

@@ -1,0 +1,137 @@
+"""Scattering length of any target by shooting and bouncing rays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Ellipsoids
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.scatter.ray_tubes.footprints import radiate
+from rtradar.scatter.ray_tubes.shooting import Grid, Shooter, exits
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid, PosedGrid
+from rtradar.scatter.target_mesh import target_mesh
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.bounces import BodySurfaces, MeshSurfaces, Surfaces
+
+if TYPE_CHECKING:
+    import trimesh
+
+RAYS_PER_WAVELENGTH = 3.0
+BOUNCES_OF_TARGET = 3
+
+Array = NDArray[np.float64]
+
+
+def rays_scattering(
+    target: Ellipsoids | trimesh.Trimesh,
+    tx: Array,
+    rx: Array,
+    frequency: Array,
+    *,
+    polarization: Literal["v", "h"] = "v",
+    variant: str = "auto",
+    rays_per_wavelength: float = RAYS_PER_WAVELENGTH,
+    bounces: int = BOUNCES_OF_TARGET,
+) -> NDArray[np.complex128]:
+    """Co-polar scattering length of a perfectly conducting target by shooting and bouncing rays.
+
+    Parameters
+    ----------
+    target : Ellipsoids or trimesh.Trimesh
+        A mesh that is not closed is a thin sheet, and reflects on both sides.
+    tx, rx : (n, 3) float64
+        Antennas, pair by pair [m].
+    frequency : (n,) float64
+        [Hz].
+    polarization : {"v", "h"}
+        v is world z projected across the line of sight, h is across both.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    rays_per_wavelength : float
+        The edge of a tube's facet is the shortest wavelength over this.
+    bounces : int
+        The most reflections on the way.
+
+    Returns
+    -------
+    (n,) complex128
+        [m], for exp(+j omega t): the scattered field times |tx - origin| |rx - origin|, its phase relative to the path
+        over the origin of the coordinates.
+
+    Raises
+    ------
+    InputError
+        Where a dial is out of range, or would take too many tubes, or a mesh cannot be used.
+    BackendError
+        Where no backend of that kind works here.
+    """
+    check_dials(rays_per_wavelength, bounces)
+    solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
+    field = np.zeros(len(tx), dtype=np.complex128)
+    if len(tx) == 0:
+        return field
+    mi = use(select(variant))
+    wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    edge = 2 * np.pi / wavenumber.max() / rays_per_wavelength
+    surfaces: Surfaces
+    grid: Grid
+    if isinstance(solid, Ellipsoids):
+        pose = (solid.centres, solid.frames)
+        surfaces = BodySurfaces(mi, solid.semi_axes)
+        surfaces.pose(*pose)
+        grid = PosedGrid(EllipsoidGrid.cover(solid.semi_axes, edge), *pose, solid.semi_axes)
+    else:
+        surfaces = MeshSurfaces(mi, solid.vertices, solid.faces)
+        grid = MeshGrid.cover(solid.vertices, solid.faces, edge)
+    shooter = Shooter(
+        surfaces=surfaces,
+        grid=grid,
+        bounces=bounces,
+        wavenumber=float(wavenumber.max()),
+        polarization=polarization,
+        two_sided=not (isinstance(solid, Ellipsoids) or solid.closed),
+    )
+    for transmitter, of_tx in _alike(tx):
+        shots = shooter.shoot(transmitter)
+        for receiver, of_rx in _alike(rx[of_tx]):
+            own = of_tx[of_rx]
+            length = np.full((1, 1), np.linalg.norm(transmitter) + np.linalg.norm(receiver))
+            for order, each in enumerate(shots):
+                visible = exits(surfaces, each, receiver[None])
+                sums = radiate(
+                    each,
+                    visible,
+                    np.zeros(len(each), dtype=np.int64),
+                    receiver[None],
+                    wavenumber[own],
+                    length,
+                    polarization=polarization,
+                    tapered=order > 0 and not surfaces.flat,
+                )
+                field[own] += sums[:, 0, 0]
+            field[own] *= np.linalg.norm(transmitter) * np.linalg.norm(receiver)
+    return field
+
+
+def check_dials(rays_per_wavelength: float, bounces: int) -> None:
+    """Refuse dials that mean nothing.
+
+    Raises
+    ------
+    InputError
+        Where one is out of range.
+    """
+    if not 0.1 <= rays_per_wavelength <= 100:
+        raise InputError(f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100")
+    if not (isinstance(bounces, int) and 1 <= bounces <= 10):
+        raise InputError(f"rays: bounces = {bounces}; allowed are 1 to 10")
+
+
+def _alike(points: Array) -> list[tuple[Array, NDArray[np.int64]]]:
+    """Each point that occurs, with the rows where it does."""
+    unique, inverse = np.unique(points, axis=0, return_inverse=True)
+    return [(point, np.flatnonzero(inverse.ravel() == index)) for index, point in enumerate(unique)]

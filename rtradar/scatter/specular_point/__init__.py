@@ -1,0 +1,1 @@
+"""Specular points of ellipsoids: where they are, and which of them are visible."""

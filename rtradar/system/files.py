@@ -1,0 +1,462 @@
+"""Files that are whole or not there, also where the process is told to end meanwhile, and files that may be anybody's, read."""
+
+from __future__ import annotations
+
+import errno
+import io
+import json
+import math
+import os
+import re
+import secrets
+import shutil
+import stat
+import sys
+import tempfile
+import threading
+import zipfile
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, BinaryIO, TextIO, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+
+_MOST_JSON_BYTES = 100_000_000
+_TOKEN_BYTES = 6
+_OTHER_KINDS = {
+    stat.S_IFDIR: "a directory",
+    stat.S_IFIFO: "a pipe (FIFO)",
+    stat.S_IFSOCK: "a socket",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+}
+"""What has the name of a file and is none."""
+
+_PATIENCE_S = 1.0
+"""Waited, at the end, for a file that is just taking its name."""
+
+DISK_ERRORS = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS") if hasattr(errno, name))
+"""Numbers of errors that say that a disk takes no more."""
+
+_T = TypeVar("_T")
+
+_lock = threading.RLock()
+_unfinished: list[Callable[[], object]] = []
+
+
+@contextmanager
+def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
+    """A binary file to write; it takes its name when all went well, and leaves nothing otherwise.
+
+    Parameters
+    ----------
+    path : path
+        Where the file shall be; one that is there already is replaced.
+
+    Yields
+    ------
+    binary file
+        Open for writing and reading, in the same folder under another name.
+
+    Raises
+    ------
+    InputError
+        Where the folder is missing or cannot be written, or something other than a file has the name.
+    """
+    target = Path(path)
+    with suppress(OSError):
+        if not stat.S_ISREG(target.stat().st_mode):
+            raise InputError(f"cannot write '{target}': what has that name is no file; give another path")
+    # Not by the process alone: on a shared disk another machine may write the same file.
+    beside = target.with_name(f".{target.name}.{secrets.token_hex(_TOKEN_BYTES)}.part")
+    with unfinished(lambda: beside.unlink(missing_ok=True)):
+        try:
+            file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
+        except OSError as error:
+            raise InputError(f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written") from None
+        try:
+            with file:
+                yield file
+            with uninterruptible():
+                os.replace(beside, target)
+        except OSError as error:
+            raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
+        finally:
+            beside.unlink(missing_ok=True)
+
+
+class LastingFile:
+    """A binary file for HDF5 to write, whose failures wait until `check` is called.
+
+    HDF5 cannot close a file that it cannot write: it would print a traceback for each object that it holds, and crash as the
+    process ends. So after the first failure what is written here is dropped, and whoever writes asks what went wrong.
+
+    Parameters
+    ----------
+    file : binary file
+        Open for writing and reading.
+    """
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise what went wrong first.
+
+        Raises
+        ------
+        OSError
+            Where something could not be written.
+        """
+        if self._error is not None:
+            raise self._error
+
+    def __enter__(self) -> LastingFile:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Close the file, and raise what went wrong first; may be called again.
+
+        Raises
+        ------
+        OSError
+            Where something could not be written.
+        """
+        self._try(self._file.close, None)
+        self.check()
+
+    def write(self, data: Any) -> int:
+        """Write all of it, or drop it."""
+        size = memoryview(data).nbytes
+        return self._try(lambda: self._file.write(data), size)
+
+    def read(self, size: int = -1) -> bytes:
+        """Read."""
+        return self._try(lambda: self._file.read(size), bytes(max(size, 0)))
+
+    def readinto(self, buffer: Any) -> int:
+        """Read into a buffer."""
+        return self._try(lambda: self._file.readinto(buffer), memoryview(buffer).nbytes)  # type: ignore[attr-defined]
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        """Move to a place."""
+        return self._try(lambda: self._file.seek(offset, whence), offset)
+
+    def tell(self) -> int:
+        """The place now."""
+        return self._try(self._file.tell, 0)
+
+    def truncate(self, size: int | None = None) -> int:
+        """Change the size of the file."""
+        return self._try(lambda: self._file.truncate(size), size or 0)
+
+    def flush(self) -> None:
+        """Write what is held in memory."""
+        self._try(self._file.flush, None)
+
+    def _try(self, action: Callable[[], _T], otherwise: _T) -> _T:
+        if self._error is None:
+            try:
+                return action()
+            except OSError as error:
+                self._error = error
+        return otherwise
+
+
+def remove_parts(folder: Path, names: str) -> int:
+    """Remove what `atomic_file` left of files as it was killed; how many.
+
+    Parameters
+    ----------
+    folder : path
+        One into which no other command writes.
+    names : str
+        Regular expression that the whole name of such a file matches.
+    """
+    part = re.compile(rf"\.({names})\.[0-9a-f]{{{2 * _TOKEN_BYTES}}}\.part")
+    count = 0
+    for path in folder.iterdir():
+        if part.fullmatch(path.name) and stat.S_ISREG(path.lstat().st_mode):
+            path.unlink(missing_ok=True)
+            count += 1
+    return count
+
+
+def check_place(path: Path | None, option: str = "--json") -> None:
+    """Find out before the work, not after it, that a file cannot be written there.
+
+    Raises
+    ------
+    InputError
+        Where it has no folder, is one, or no file can have its name; the message names the command line's ``option``.
+    """
+    if path is None:
+        return
+    folder = Path(os.path.realpath(path)).parent  # links that lead in a circle stay as they are, and are replaced
+    try:
+        if not folder.is_dir():
+            raise InputError(f"{option} {path}: there is no folder '{folder}'; make it first")
+        if path.is_dir():
+            raise InputError(f"{option} {path}: that is a folder; name a file")
+    except OSError as error:
+        raise InputError(f"{option} {path}: {error.strerror}; give another file") from None
+
+
+def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
+    """Write plain values as indented JSON, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        Where it cannot be written; the message names the command line's ``--json``.
+    """
+    text = json.dumps(content, indent=1, allow_nan=False) + "\n"
+    try:
+        if (stream := _standard_stream(path)) is not None:
+            stream.write(text)
+            stream.flush()
+            return
+        if Path(path).exists() and not Path(path).is_file():  # a pipe
+            Path(path).write_text(text, encoding="utf-8")
+            return
+        with atomic_file(path) as file:
+            file.write(text.encode())
+    except OSError as error:
+        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
+    except InputError as error:
+        raise InputError(f"{error} (--json)") from None
+
+
+def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
+    """The one that this is a name of, such as /dev/stdout; it may well be a file, which has to stay."""
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError, AttributeError):  # no such path; closed; none, or no file at all
+            if os.path.samestat(os.stat(path), os.fstat(stream.fileno())):
+                return stream
+    return None
+
+
+def read_json(path: Path) -> Any:
+    """Plain values of a JSON file that may be anybody's.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    ValueError
+        Where it is no JSON, is nested deeper than Python goes, or is larger than 100 MB.
+    """
+    try:
+        return json.loads(read_bytes(path, _MOST_JSON_BYTES).decode("utf-8-sig"))
+    except RecursionError:
+        raise ValueError("nested too deep") from None
+
+
+def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArray[Any]]:
+    """All arrays of a NumPy archive that may be anybody's, by their names; none of Python objects.
+
+    Raises
+    ------
+    OSError
+        Where it cannot be read.
+    ValueError
+        Where it is no such archive, is damaged, claims more than it holds, or is larger than ``most_bytes`` once unpacked.
+    """
+    found = {}
+    with open_regular(path) as file:
+        try:
+            with zipfile.ZipFile(file) as archive:
+                if sum(entry.file_size for entry in archive.infolist()) > most_bytes:
+                    raise ValueError(f"it claims more than {most_bytes / 1e6:g} MB")
+                for entry in archive.infolist():
+                    if entry.filename.endswith(".npy"):
+                        with archive.open(entry) as member:
+                            _check_claim(member, entry.file_size)
+                            member.seek(0)
+                            array = np.lib.format.read_array(member, allow_pickle=False)
+                            _check_text(array)
+                            found[entry.filename.removesuffix(".npy")] = array
+        except OSError:
+            raise
+        except Exception as error:  # what readers of archives and of headers raise at damaged ones is of any type
+            raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
+    return found
+
+
+def _check_claim(member: Any, size: int) -> None:
+    """Raise where an array would take more memory than its file has: NumPy takes it before it looks."""
+    version = np.lib.format.read_magic(member)
+    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, kind = read_header(member)
+    if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
+        raise ValueError("it claims more than it holds")
+
+
+def _check_text(array: NDArray[Any]) -> None:
+    """Raise where a text holds a number that is no character: Python cannot even show it."""
+    if array.dtype.kind == "U" and array.dtype.itemsize:
+        letters = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("="))).reshape(-1, 1).view(np.uint32)
+        if ((letters > sys.maxunicode) | ((letters >= 0xD800) & (letters < 0xE000))).any():
+            raise ValueError("a text holds what is no character")
+
+
+def stored(file: Any, name: str) -> Any:
+    """A dataset of an open HDF5 file that may be anybody's, if all that it claims is in that file.
+
+    Parameters
+    ----------
+    file : h5py.File
+        Of those that rtradar writes, whose arrays are not packed.
+    name : str
+
+    Returns
+    -------
+    h5py.Dataset
+
+    Raises
+    ------
+    KeyError
+        Where there is none.
+    ValueError
+        Where it is no dataset, lies in another file, or is larger than its file.
+    """
+    import h5py
+
+    data = file
+    for step in name.split("/"):
+        # Asked before it is followed: a link to another file would have that opened.
+        link = data.get(step, getlink=True) if isinstance(data, h5py.Group) else None
+        if link is None:
+            raise KeyError(f"there is no {name}")
+        if not isinstance(link, h5py.HardLink):
+            raise ValueError(f"{name} is not in this file")
+        data = data[step]
+    if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
+        raise ValueError(f"{name} is not in this file")
+    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > file.id.get_filesize():
+        raise ValueError(f"{name} claims more than there is")
+    return data
+
+
+@contextmanager
+def temporary_folder(prefix: str = "rtradar-", inside: Path | None = None) -> Iterator[Path]:
+    """A folder that is gone at the end, also where the process is told to end before."""
+    with (
+        tempfile.TemporaryDirectory(prefix=prefix, dir=inside) as name,
+        unfinished(lambda: shutil.rmtree(name, ignore_errors=True)),
+    ):
+        yield Path(name)
+
+
+@contextmanager
+def unfinished(remove: Callable[[], object]) -> Iterator[None]:
+    """While this lasts there is something that ``remove`` takes away, should the process have to end meanwhile."""
+    with _lock:
+        _unfinished.append(remove)
+    try:
+        yield
+    finally:
+        with _lock:
+            _unfinished.remove(remove)
+
+
+@contextmanager
+def uninterruptible() -> Iterator[None]:
+    """What is done here is short, and is done to its end or not begun, should the process have to end."""
+    with _lock:
+        yield
+
+
+def discard_unfinished() -> None:
+    """Take away all that is unfinished; from now on other threads of this process neither begin nor finish a file."""
+    _lock.acquire(timeout=_PATIENCE_S)  # and never given back
+    for remove in reversed(_unfinished):
+        with suppress(Exception):
+            remove()
+
+
+def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
+    """Open a file for reading that may be anybody's: a regular file, not a folder, pipe, socket or device.
+
+    Nothing waits here, as opening a pipe would until somebody writes to it. A device is not even opened, for that alone may
+    move it; and what counts is what was opened, should something else have taken the name since it was looked at.
+
+    Parameters
+    ----------
+    path : path
+        Links are followed.
+
+    Returns
+    -------
+    io.BufferedReader
+
+    Raises
+    ------
+    OSError
+        Where it cannot be opened or is no regular file; ``strerror`` says why.
+    """
+    try:
+        _check_regular(path, os.stat(path))
+        # O_NONBLOCK means nothing to regular files. Windows has neither flag.
+        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+    except ValueError as error:  # a null character, or half of one that UTF-16 writes as two
+        raise OSError(errno.EINVAL, f"no file can have this name ({' '.join(str(error).split())})") from None
+    try:
+        _check_regular(path, os.fstat(descriptor))
+        return open(descriptor, "rb")
+    except BaseException:
+        os.close(descriptor)
+        raise
+
+
+def special_kind(path: str | os.PathLike[str]) -> str:
+    """What a path names where that is a pipe, a socket or a device, at which a reader may wait; empty for anything else."""
+    try:
+        kind = stat.S_IFMT(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return ""
+    return "" if kind in (stat.S_IFREG, stat.S_IFDIR) else _OTHER_KINDS.get(kind, "of an unknown kind")
+
+
+def _check_regular(path: str | os.PathLike[str], status: os.stat_result) -> None:
+    """Raise OSError where the status is that of anything but a regular file."""
+    kind = stat.S_IFMT(status.st_mode)
+    if kind != stat.S_IFREG:
+        said = _OTHER_KINDS.get(kind, "of an unknown kind")
+        number = errno.EISDIR if kind == stat.S_IFDIR else errno.EINVAL
+        raise OSError(number, f"it is {said}, not a file", os.fspath(path))
+
+
+def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+    """All of a regular file that may be anybody's.
+
+    Parameters
+    ----------
+    path : path
+    most_bytes : int
+        How large it may be.
+
+    Returns
+    -------
+    bytes
+
+    Raises
+    ------
+    OSError
+        As in `open_regular`.
+    ValueError
+        Where it is larger.
+    """
+    with open_regular(path) as file:
+        # The size is asked first: what is read may take no more memory than what is allowed.
+        if os.fstat(file.fileno()).st_size > most_bytes or len(content := file.read(most_bytes + 1)) > most_bytes:
+            raise ValueError(f"more than {most_bytes / 1e6:g} MB")
+        return content

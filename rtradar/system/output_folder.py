@@ -1,0 +1,502 @@
+"""Output folders: all files of a command appear together or none does, and nothing else in the folder is ever touched.
+
+A command writes into a work folder of its own inside the output folder, and its files are moved when all of them are there. What
+an output folder already holds may be anybody's. So a file is replaced or removed only if it is a regular file, has a name that
+this command gives to its files, and stands in the list that an earlier command left in the folder (``files`` in
+``summary.json``). A folder that holds anything else of such a name is refused.
+
+A process that is killed while it moves its files leaves a list that says ``unfinished``: who reads the folder refuses it, and the
+next command that writes there replaces what the list names. A process that is killed earlier leaves its work folder, which the
+next command that writes there removes. Commands that only read change nothing.
+"""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import re
+import secrets
+import shutil
+import stat
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, Any
+
+from rtradar.errors import InputError
+from rtradar.system.files import DISK_ERRORS, unfinished, uninterruptible
+
+_WORK = re.compile(r"\.rtradar-[0-9a-f]{16}")
+_MARKER = ".made-by-rtradar"
+_UNFINISHED = ".unfinished"
+_MOST_LIST_BYTES = 100_000_000
+_STORE = re.compile(r"(.*\.zarr/)")
+
+_HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
+
+
+@dataclass(frozen=True)
+class OutputFiles:
+    """Which files a command may leave in its output folder.
+
+    Parameters
+    ----------
+    listing : str
+        Name of the JSON file whose entry ``files`` lists them, in plain names relative to the folder; an entry that ends with a
+        slash stands for all files of a store. It is one of the files.
+    files : str
+        Regular expression that the whole relative name of each file matches, with ``/`` between its parts.
+    folders : str
+        Regular expression that the whole relative name of each folder matches that may hold such files.
+    """
+
+    listing: str
+    files: str
+    folders: str = r"(?!)"
+
+    def is_file(self, name: str) -> bool:
+        """Whether a file of the command may have this relative name."""
+        return re.fullmatch(self.files, name) is not None
+
+    def is_folder(self, name: str) -> bool:
+        """Whether a folder of the command may have this relative name."""
+        return re.fullmatch(self.folders, name) is not None
+
+    def list_of(self, folder: Path) -> list[str]:
+        """The entry ``files`` of a folder in which all files lie but, perhaps, the listing itself."""
+        with _Directory.at(folder) as directory:
+            return _entries([self.listing, *_all_files(directory)])
+
+
+@contextmanager
+def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> Iterator[Path]:
+    """A folder to write into; at the end its files move to ``out``, all of them or none.
+
+    Parameters
+    ----------
+    out : path
+        Made if it is not there. Files of an earlier command of this kind are replaced, or removed where this one has none of the
+        name; everything else in it stays as it is.
+    kind : OutputFiles
+        What the command makes. The listing must be written into the folder, with `OutputFiles.list_of` as its entry ``files``.
+    overwrite : bool
+        Whether files that ``out`` holds under names of this command's files are replaced, too, though no list names them.
+
+    Yields
+    ------
+    path
+        A folder inside ``out``. After an error it is removed with all in it, and ``out`` too where it was made here.
+
+    Raises
+    ------
+    InputError
+        Where ``out`` cannot be made or written, holds files of others, is moved meanwhile, or the disk is full.
+    """
+    with ExitStack() as stack:
+        try:
+            made = [folder for folder in (out, *out.parents) if not folder.exists()]
+            out.mkdir(parents=True, exist_ok=True)
+            place = stack.enter_context(_Directory.at(out))
+            _refuse_foreign(place, kind, overwrite)
+            _remove_leftovers(place, but=_read_list(place, kind).get("unfinished"))
+            work = stack.enter_context(_new_work_folder(place))
+        except OSError as error:
+            raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+
+        moving = False
+
+        def give_up() -> None:
+            if moving:
+                return  # what is moved and what is not belong together
+            gone = f"{work.path.name}-gone"
+            with suppress(OSError):
+                place.move(work.path.name, place, gone)  # nobody who still writes finds the way into it
+            place.remove_tree(gone)
+            for folder in made if place.is_in_place() else ():
+                with suppress(OSError):
+                    folder.rmdir()  # an empty one only
+
+        with unfinished(give_up):
+            try:
+                yield work.path
+                with uninterruptible():
+                    _check_made(work, kind)
+                    with place.locked():
+                        _refuse_foreign(place, kind, overwrite)
+                        moving = True
+                        _move(work, place, kind)
+                    place.remove_tree(work.path.name)
+                    _remove_leftovers(place, but=None)  # what a killed command had still to move is replaced now
+            except BaseException as error:
+                if moving:
+                    raise _parted(out, work.path, error) from None
+                moved_away = not work.is_in_place()
+                give_up()
+                if moved_away and isinstance(error, Exception):
+                    raise InputError(
+                        f"'{out}' was renamed, moved or removed while the command wrote into it; give a folder that stays (--out)"
+                    ) from None
+                if why := _trouble_of_disk(error):
+                    raise InputError(f"cannot write to '{out}': {why}; make room, or give another folder (--out)") from None
+                raise
+
+
+@contextmanager
+def alone_in(folder: Path) -> Iterator[None]:
+    """While this lasts no other process of this machine does the same in the folder; after the end of a process it may.
+
+    Parameters
+    ----------
+    folder : path
+        One that is there.
+
+    Raises
+    ------
+    InputError
+        Where another is in it.
+    """
+    try:
+        place = _Directory.at(folder)
+    except OSError as error:
+        raise InputError(f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)") from None
+    with place:
+        if not place.lock():
+            raise InputError(f"another command writes into '{folder}'; wait for its end, or give another folder (--out)")
+        yield
+
+
+def check_whole(folder: Path, listing: str = "summary.json") -> None:
+    """Refuse to read a folder whose files are of two runs, for the second was killed as it moved its files there.
+
+    Parameters
+    ----------
+    folder : path
+        That of a run; nothing is refused where there is none, or no list in it.
+    listing : str
+        The list's name.
+
+    Raises
+    ------
+    InputError
+        Where the list says so.
+    """
+    try:
+        with _Directory.at(folder) as place:
+            told = _read_json(place, listing)
+    except OSError:
+        return
+    if isinstance(told, dict) and isinstance(rest := told.get("unfinished"), str):
+        raise InputError(
+            f"'{folder}' holds files of two runs, for the second was killed as it moved its files there; run it again into that "
+            f"folder, or move what is left in '{rest[:40]}' by hand"
+        )
+
+
+# -- what a folder holds -------------------------------------------------------------------------------------------------
+
+
+def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dict[str, int]:
+    """Entries under names of the command's files and folders, and the mode of each (`stat`); other entries are left out."""
+    found: dict[str, int] = {}
+    names = directory.names()
+    for name in sorted(names):
+        path, own = prefix + name, name.lower()
+        if kind.is_file(path) or kind.is_folder(path):
+            mode = directory.mode(name)
+            if kind.is_folder(path) and stat.S_ISDIR(mode):
+                with directory.open(name) as inner:
+                    found |= _existing(inner, kind, f"{path}/")
+            elif mode:
+                found[path] = mode
+        elif kind.is_file(prefix + own) and own not in names and directory.mode(own):
+            found[path] = directory.mode(name)  # the same file to a file system that takes no notice of capitals
+    return found
+
+
+def _all_files(directory: _Directory, prefix: str = "") -> Iterator[str]:
+    """Relative names of everything below a work folder that is not a folder, but of what keeps account of it."""
+    for name in sorted(directory.names()):
+        if stat.S_ISDIR(directory.mode(name)):
+            with directory.open(name) as inner:
+                yield from _all_files(inner, f"{prefix}{name}/")
+        elif prefix or name not in (_MARKER, _UNFINISHED):
+            yield prefix + name
+
+
+def _entries(names: Iterable[str]) -> list[str]:
+    """Names as a list has them: of a store, which may have thousands of files, its folder alone."""
+    return sorted({store[1] if (store := _STORE.match(name)) else name for name in names})
+
+
+def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
+    """What the list of a folder says, ``files`` and perhaps ``unfinished``; empty where it is none of ours."""
+    told = _read_json(directory, kind.listing)
+    if not isinstance(told, dict) or not isinstance(files := told.get("files"), list) or kind.listing not in files:
+        return {}
+    unfinished = told.get("unfinished")
+    found: dict[str, Any] = {"files": frozenset(name for name in files if isinstance(name, str))}
+    return found | ({"unfinished": unfinished} if isinstance(unfinished, str) and _WORK.fullmatch(unfinished) else {})
+
+
+def _read_json(directory: _Directory, name: str) -> Any:
+    """Content of a regular JSON file of bounded size; None where it is anything else."""
+    with suppress(OSError, ValueError, RecursionError), directory.open_file(name) as file:
+        return json.loads(file.read(_MOST_LIST_BYTES))
+    return None
+
+
+def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
+    """Which of the entries are the command's to replace: regular files that the list names."""
+    files = frozenset(listed)
+    stores = tuple(name for name in files if name.endswith("/"))
+    return {
+        name
+        for name, mode in found.items()
+        if stat.S_ISREG(mode) and (name in files or (stores and name.startswith(stores) and _STORE.match(name)))
+    }
+
+
+def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> None:
+    found = _existing(place, kind)
+    foreign = sorted(found.keys() - _owned(found, _read_list(place, kind).get("files", ())))
+    odd = [name for name in foreign if kind.is_folder(name) or not (stat.S_ISREG(found[name]) or stat.S_ISLNK(found[name]))]
+    if overwrite and odd:
+        is_not = "no folder" if kind.is_folder(odd[0]) else "no file"
+        raise InputError(f"'{place.path}' holds '{odd[0]}', which is {is_not}; move it away, or give another folder (--out)")
+    if foreign and not overwrite:
+        more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
+        raise InputError(
+            f"'{place.path}' holds '{foreign[0]}'{more}, which its {kind.listing} does not list as made by rtradar; give another "
+            "folder (--out), or replace what has the names of new files (--overwrite)"
+        )
+
+
+def _check_made(work: _Directory, kind: OutputFiles) -> None:
+    """A command whose files are not all foreseen would leave some that the next one takes for somebody else's."""
+    made = list(_all_files(work))
+    unforeseen = [name for name in made if not kind.is_file(name)]
+    if unforeseen or kind.listing not in made:
+        raise AssertionError(f"{[*unforeseen, kind.listing][0]}: not foreseen, or a listing that was not written")
+
+
+# -- moving --------------------------------------------------------------------------------------------------------------
+
+
+def _move(work: _Directory, place: _Directory, kind: OutputFiles) -> None:
+    """Everything in ``work`` to its place; the list comes last, and until then says that the folder is unfinished."""
+    made, there = list(_all_files(work)), _existing(place, kind)
+    owned = _owned(there, _read_list(place, kind).get("files", ()))
+    said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
+    with work.open_file(_UNFINISHED, write=True) as file:
+        file.write((json.dumps(said, indent=1) + "\n").encode())
+    work.move(_UNFINISHED, place, kind.listing)
+    for name in sorted(owned - {*made, kind.listing}):
+        with place.parent_of(name) as folder:
+            folder.remove(name.rpartition("/")[2])
+    for name in made:
+        if name != kind.listing:
+            with work.parent_of(name) as source, place.parent_of(name, make=True) as target:
+                own = name.rpartition("/")[2]
+                source.move(own, target, own)
+    for name in sorted({folder for file in owned for folder in _folders_of(file)}, reverse=True):
+        with suppress(OSError), place.parent_of(name) as folder:
+            folder.remove_folder(name.rpartition("/")[2])  # an empty one only
+    work.move(kind.listing, place, kind.listing)
+
+
+def _folders_of(name: str) -> Iterator[str]:
+    """Relative names of the folders that a relative name goes through."""
+    while name := name.rpartition("/")[0]:
+        yield name
+
+
+def _parted(out: Path, work: Path, error: BaseException) -> BaseException:
+    if not isinstance(error, OSError):
+        return error
+    return InputError(
+        f"cannot move the files of '{work}' into '{out}': {error.strerror}; mend that and run it again into that folder, or move "
+        "what is left by hand"
+    )
+
+
+def _new_work_folder(place: _Directory) -> _Directory:
+    """A new folder in the output folder, locked for as long as its command lives, with a marker that says whose it is."""
+    while True:
+        name = f".rtradar-{secrets.token_hex(8)}"
+        with suppress(FileExistsError):
+            place.make(name)
+            work = place.open(name)
+            work.lock()
+            with work.open_file(_MARKER, write=True) as file:
+                file.write(str(work.number).encode())
+            return work
+
+
+def _remove_leftovers(place: _Directory, but: str | None) -> None:
+    """Remove work folders of commands that were killed.
+
+    One that rtradar made says so: its marker holds the number (inode) that the file system gave to that very folder. A folder
+    that came from elsewhere, or that the user made, has no such marker, and stays.
+    """
+    if sys.platform == "win32":  # no locks, and no numbers that tell
+        return
+    for name in place.names():
+        if not _WORK.fullmatch(name) or name == but:
+            continue
+        with suppress(OSError), place.open(name) as folder:
+            if not folder.is_own():
+                continue
+            with folder.open_file(_MARKER) as file:
+                marked = file.read(100)
+            if marked == str(folder.number).encode() and folder.lock():
+                place.remove_tree(name)
+
+
+# -- one directory -------------------------------------------------------------------------------------------------------
+
+
+class _Directory:
+    """An open directory, whose entries are reached through it: no link that somebody puts in the way is ever followed.
+
+    Where the system cannot do that (Windows) entries are reached by their paths.
+    """
+
+    def __init__(self, path: Path, descriptor: int | None) -> None:
+        self.path, self._descriptor = path, descriptor
+
+    @classmethod
+    def at(cls, path: Path) -> _Directory:
+        """The directory of a path, which may be a link to one."""
+        if not _BY_DESCRIPTOR:
+            os.listdir(path)  # raises as opening it would
+            return cls(path, None)
+        return cls(path, os.open(path, os.O_RDONLY | os.O_DIRECTORY))
+
+    def __enter__(self) -> _Directory:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+
+    def names(self) -> list[str]:
+        """Names of the entries."""
+        return os.listdir(self.path if self._descriptor is None else self._descriptor)
+
+    def mode(self, name: str) -> int:
+        """Type and permissions of an entry, that of a link itself; 0 where there is none."""
+        try:
+            return os.stat(self._name(name), dir_fd=self._descriptor, follow_symlinks=False).st_mode
+        except FileNotFoundError:
+            return 0
+
+    def open(self, name: str) -> _Directory:
+        """A directory in this one; OSError where the entry is no directory, or a link."""
+        if self._descriptor is None:
+            if not stat.S_ISDIR(self.mode(name)):
+                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), name)
+            return _Directory(self.path / name, None)
+        flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
+        return _Directory(self.path / name, os.open(name, flags, dir_fd=self._descriptor))
+
+    @contextmanager
+    def parent_of(self, name: str, *, make: bool = False) -> Iterator[_Directory]:
+        """The directory that holds a file of a relative name, made where need be."""
+        with ExitStack() as stack:
+            here = self
+            for part in name.split("/")[:-1]:
+                if make and not here.mode(part):
+                    os.mkdir(here._name(part), dir_fd=here._descriptor)
+                here = stack.enter_context(here.open(part))
+            yield here
+
+    def open_file(self, name: str, *, write: bool = False) -> IO[bytes]:
+        """A regular file, to read, or a new one to write; OSError where the entry is anything else."""
+        flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(os, "O_BINARY", 0)
+        flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
+        descriptor = os.open(self._name(name), flags, 0o666, dir_fd=self._descriptor)
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.close(descriptor)
+            raise OSError(errno.EINVAL, "not a regular file", name)
+        return os.fdopen(descriptor, "wb" if write else "rb")
+
+    def make(self, name: str) -> None:
+        """Make a directory that nobody else may enter."""
+        os.mkdir(self._name(name), 0o700, dir_fd=self._descriptor)
+
+    def move(self, name: str, target: _Directory, new: str) -> None:
+        """Move an entry to another directory, under another name, in one step."""
+        places = self._name(name), target._name(new)
+        os.replace(*places, src_dir_fd=self._descriptor, dst_dir_fd=target._descriptor)
+
+    def remove(self, name: str) -> None:
+        """Remove a file."""
+        os.unlink(self._name(name), dir_fd=self._descriptor)
+
+    def remove_folder(self, name: str) -> None:
+        """Remove an empty directory."""
+        os.rmdir(self._name(name), dir_fd=self._descriptor)
+
+    def remove_tree(self, name: str) -> None:
+        """Remove a directory with all in it, as far as that goes; no link is followed."""
+        shutil.rmtree(self._name(name), ignore_errors=True, dir_fd=self._descriptor)
+
+    @property
+    def number(self) -> int:
+        """That the file system has given it."""
+        return os.stat(self.path).st_ino if self._descriptor is None else os.fstat(self._descriptor).st_ino
+
+    def is_own(self) -> bool:
+        """Whether it belongs to the user who asks."""
+        return self._descriptor is not None and os.fstat(self._descriptor).st_uid == os.geteuid()
+
+    def is_in_place(self) -> bool:
+        """Whether its path still leads to it."""
+        try:
+            return self._descriptor is None or os.path.samestat(os.stat(self.path), os.fstat(self._descriptor))
+        except OSError:
+            return False
+
+    def lock(self, *, wait: bool = False) -> bool:
+        """Lock it until it is closed, or the process ends; False where another has it. On Windows there are no such locks."""
+        if sys.platform == "win32" or self._descriptor is None:
+            return True
+        import fcntl
+
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        except BlockingIOError:
+            return False
+        return True
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """While this lasts no other command moves files there: of two that end at once, one waits."""
+        if self._descriptor is None:
+            yield
+            return
+        with _Directory(self.path, os.open(".", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._descriptor)) as again:
+            again.lock(wait=True)
+            yield
+
+    def _name(self, name: str) -> str:
+        return str(self.path / name) if self._descriptor is None else name
+
+
+_BY_DESCRIPTOR = {os.open, os.stat, os.mkdir, os.rename, os.unlink, os.rmdir} <= os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
+
+
+def _trouble_of_disk(error: BaseException) -> str:
+    """What the disk has against more files, in few words; empty where something else went wrong."""
+    number = error.errno if isinstance(error, OSError) else None
+    if number is None and isinstance(error, OSError | RuntimeError) and (told := _HDF5_ERRNO.search(str(error))):
+        number = int(told[1])
+    return os.strerror(number) if number is not None and number in DISK_ERRORS else ""
+
+
+def one_of(names: Sequence[str]) -> str:
+    """Regular expression that matches any of these names, and nothing else."""
+    return "|".join(re.escape(name) for name in names)

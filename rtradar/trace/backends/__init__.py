@@ -1,0 +1,1 @@
+"""Mitsuba's backends: which there are, whether they work, and their libLLVM."""

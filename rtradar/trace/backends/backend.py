@@ -1,0 +1,199 @@
+"""The choice of Mitsuba's variant, and of the libLLVM behind it: the only place that makes either.
+
+Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for the life of the process. Versions 15
+and 16 are taken and then abort the process, so a library is tried in another process before it is let into this one.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Literal
+
+from rtradar.errors import BackendError, InputError
+from rtradar.system.gpu import has_nvidia_gpu
+from rtradar.trace.backends.jit_threads import begin_with_one
+from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
+from rtradar.trace.backends.verdict import Verdict, judge, query_s
+
+Kind = Literal["llvm", "scalar", "cuda"]
+
+# The RGB variants: the only scalar one without spectra, and the same plugins then everywhere. Rays cost the same in all.
+VARIANTS: dict[Kind, str] = {"llvm": "llvm_ad_rgb", "scalar": "scalar_rgb", "cuda": "cuda_ad_rgb"}
+"""Mitsuba's variant of each kind of backend."""
+
+TROUBLE = "no libLLVM that works with Dr.Jit was found"
+
+
+class BackendWarning(UserWarning):
+    """A slower backend serves because the one that was wanted does not work."""
+
+
+@dataclass(frozen=True)
+class Backend:
+    """A Mitsuba variant that works on this machine.
+
+    Parameters
+    ----------
+    kind : {"llvm", "scalar", "cuda"}
+        As the user names it.
+    variant : str
+        As Mitsuba names it.
+    llvm_path : str or None
+        The libLLVM for Dr.Jit, for every kind: it is loaded once and must be good if the kind is changed later.
+    llvm_version : str or None
+        Its version.
+    warning : str or None
+        Why it is not what one would wish, and the cure; one line.
+    """
+
+    kind: Kind
+    variant: str
+    llvm_path: str | None
+    llvm_version: str | None
+    warning: str | None = None
+
+
+def select(variant: str = "auto") -> Backend:
+    """The backend to use.
+
+    Parameters
+    ----------
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        ``cpu`` takes llvm with the first libLLVM that works, and else scalar; ``auto`` cuda, where there is a GPU that
+        was found to be faster, and else the same.
+
+    Raises
+    ------
+    InputError
+        Where there is no such variant.
+    BackendError
+        Where the variant was asked for by name and does not work, or Mitsuba is missing; the message names the cure.
+
+    Warns
+    -----
+    BackendWarning
+        Where ``auto`` or ``cpu`` has to take scalar.
+    """
+    if variant not in ("auto", "cpu", *VARIANTS):
+        raise InputError(f"variant '{variant}' is unknown; allowed: auto, cpu, {', '.join(VARIANTS)}")
+    for package in ("mitsuba", "drjit"):
+        if find_spec(package) is None:
+            raise BackendError(f"the package {package} is not installed; install it: pip install mitsuba")
+    library, verdict, trouble = _first_good()
+    path, version = (library.path, verdict.version) if library and verdict else (None, None)
+    if variant == "cuda":
+        verdict = judge(VARIANTS["cuda"], library)
+        if not verdict.good:
+            raise BackendError(
+                f"no CUDA GPU that works was found ({verdict.finding}); it needs an NVIDIA driver with OptiX; "
+                "use --variant auto to run on the CPU"
+            )
+        return Backend("cuda", VARIANTS["cuda"], path, version)
+    if variant == "scalar":
+        return Backend("scalar", VARIANTS["scalar"], path, version)
+    if variant == "auto" and has_nvidia_gpu() and _gpu_is_faster(library):
+        return Backend("cuda", VARIANTS["cuda"], path, version)
+    if library is not None:
+        return Backend("llvm", VARIANTS["llvm"], path, version)
+    if variant == "llvm":
+        raise BackendError(trouble)
+    warning = f"{trouble}; until then {VARIANTS['scalar']} serves, and is many times slower"
+    warnings.warn(warning, BackendWarning, stacklevel=2)
+    return Backend("scalar", VARIANTS["scalar"], None, None, warning)
+
+
+def use(backend: Backend) -> ModuleType:
+    """Mitsuba with that variant set; may be called again, with the same backend or another one.
+
+    Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one thread until many rays come
+    (`rtradar.trace.backends.jit_threads`); where it was imported before, it keeps the threads it has.
+
+    Raises
+    ------
+    BackendError
+        Where Dr.Jit was imported with another libLLVM since the backend was selected, or the variant cannot be set.
+    """
+    loaded = loaded_llvm_version()
+    first = "drjit" not in sys.modules
+    if loaded is None and backend.llvm_path is not None:
+        os.environ[ENVIRONMENT_VARIABLE] = backend.llvm_path
+    elif backend.kind == "llvm" and loaded != backend.llvm_version:
+        raise BackendError(_loaded_before(loaded))
+    try:
+        import mitsuba as mi
+
+        if first:  # whoever imported Dr.Jit before us may have computed with it, and rules its threads
+            begin_with_one()
+        if mi.variant() != backend.variant:
+            mi.set_variant(backend.variant)
+    except ImportError as error:
+        reason = str(error).splitlines()[0]
+        raise BackendError(f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor") from error
+    return mi
+
+
+def available() -> tuple[Kind, ...]:
+    """The backends that work here, of llvm, scalar and cuda."""
+    return tuple(kind for kind in VARIANTS if _works(kind))
+
+
+def cure() -> str:
+    """What to install for a good libLLVM on this platform, in half a sentence."""
+    if sys.platform == "darwin":
+        return "install one: brew install llvm"
+    return f"install one: pip install {WHEEL} (x86-64 Linux), or the system's libllvm 19 or newer"
+
+
+def loaded_llvm_version() -> str | None:
+    """Version of the libLLVM that Dr.Jit has in this process, ``none`` where it found none; None before its import."""
+    if "drjit" not in sys.modules:
+        return None
+    import drjit as dr
+
+    version = dr.detail.llvm_version()
+    return ".".join(map(str, version)) if version[0] > 0 else "none"
+
+
+def _first_good() -> tuple[Library | None, Verdict | None, str]:
+    """The first library that works and its verdict, or None twice and in words what is wrong, with the cure."""
+    loaded = loaded_llvm_version()
+    refused = []
+    for library in candidates():
+        verdict = judge(VARIANTS["llvm"], library)
+        if verdict.good and loaded in (None, verdict.version):
+            return library, verdict, ""
+        if verdict.good:
+            return None, None, _loaded_before(loaded)
+        named = f", named by {ENVIRONMENT_VARIABLE}" if library.origin == "environment" else ""
+        refused.append(f"{library.path}{named}, {verdict.finding}")
+    return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {cure()}"
+
+
+@lru_cache(maxsize=1)
+def _gpu_is_faster(library: Library | None) -> bool:
+    """Whether the GPU works, and tells of rays sooner than what would trace them instead; asked once in a process."""
+    on_gpu_s = query_s(VARIANTS["cuda"], library)
+    if on_gpu_s is None:
+        return False
+    on_cpu_s = query_s(VARIANTS["llvm" if library else "scalar"], library)
+    # What was measured may be of long ago.
+    return (on_cpu_s is None or on_gpu_s < on_cpu_s) and judge(VARIANTS["cuda"], library).good
+
+
+def _loaded_before(loaded: str | None) -> str:
+    what = "without a libLLVM" if loaded == "none" else f"with libLLVM {loaded}"
+    return f"Dr.Jit was imported {what} before; let rtradar import it first, or set {ENVIRONMENT_VARIABLE} before Python starts"
+
+
+def _works(kind: Kind) -> bool:
+    try:
+        select(kind)
+    except BackendError:
+        return False
+    return True
