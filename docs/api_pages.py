@@ -14,7 +14,7 @@ PACKAGES = {
     "rtradar.body": "Bodies",
     "rtradar.rcs": "Closed forms",
     "rtradar.scene": "Scenes",
-    "rtradar.scatter": "The fidelity ladder",
+    "rtradar.scatter": "Echo models",
     "rtradar.signal": "Signals",
     "rtradar.process": "Processing",
     "rtradar.clouds": "Point clouds",

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from rtradar.pipeline import Comparison, Result, compare, run
     from rtradar.process import register_detector
     from rtradar.radar import Radar, register_radar
-    from rtradar.scatter import register_rung, scattering_length
+    from rtradar.scatter import register_model, scattering_length
     from rtradar.scene import Scene
 
 __version__ = "0.2.0"
@@ -47,7 +47,7 @@ _HOME = {
     "register_detector": "process",
     "register_radar": "radar",
     "register_reader": "motion",
-    "register_rung": "scatter",
+    "register_model": "scatter",
     "run": "pipeline",
     "scattering_length": "scatter",
     "synthetic_motion": "motion",
@@ -75,9 +75,9 @@ __all__ = [
     "process",
     "rcs",
     "register_detector",
+    "register_model",
     "register_radar",
     "register_reader",
-    "register_rung",
     "run",
     "scattering_length",
     "signal",

@@ -1,4 +1,4 @@
-"""`Echoes`: what every rung of the fidelity ladder returns, and all that the signal stage knows of the scene."""
+"""`Echoes`: what every echo model returns, and all that the signal stage knows of the scene."""
 
 from __future__ import annotations
 

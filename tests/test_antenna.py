@@ -14,7 +14,7 @@ from scipy.integrate import quad
 
 import rtradar as rt
 from rtradar.antenna import Antenna
-from rtradar.scatter import build_rung, chirp_poses
+from rtradar.scatter import build_model, chirp_poses
 from rtradar.scatter.antenna_gain import leg_gain, specular_points
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.models.analytic import far_field_echo
@@ -130,7 +130,7 @@ def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> Non
         plain, tx_antenna=Antenna(pattern="cosine", exponent=6.0), rx_antenna=Antenna(pattern="dipole", gain_dbi=0.0)
     )
     chirps = np.arange(6)
-    before, after = (build_rung(fidelity, radar, BODY).echoes(chirps) for radar in (plain, shaped))
+    before, after = (build_model(fidelity, radar, BODY).echoes(chirps) for radar in (plain, shaped))
     np.testing.assert_array_equal(after.length, before.length)
     at = chirp_poses(plain, BODY, chirps)
     found = []

@@ -19,11 +19,11 @@ from rtradar.cli import main
 from rtradar.motion.load import READERS
 from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
-from rtradar.scatter import RUNGS, build_rung
+from rtradar.scatter import MODELS, build_model
 from rtradar.system.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
-REGISTRIES: tuple[Registry, ...] = (RUNGS, READERS, PRESETS, DETECTORS)
+REGISTRIES: tuple[Registry, ...] = (MODELS, READERS, PRESETS, DETECTORS)
 USED = ("--fidelity", "points", "--radar", "lane-60ghz", "--detector", "threshold")
 
 
@@ -128,8 +128,8 @@ def test_an_unknown_name_is_answered_with_all_that_there_are(
 @pytest.mark.parametrize(
     ("broken", "text", "said"),
     [
-        ("outside_rung.py", "import nowhere_to_be_found", "fidelity 'points' of package 'outside' failed: ModuleNotFoundError"),
-        ("outside_rung.py", "Points = 3", "is a int, not a function or class"),
+        ("outside_model.py", "import nowhere_to_be_found", "fidelity 'points' of package 'outside' failed: ModuleNotFoundError"),
+        ("outside_model.py", "Points = 3", "is a int, not a function or class"),
         ("outside_detector.py", "def threshold(power, *, pfa, looks):\n    return power", "gave float32"),
         ("outside_detector.py", "def threshold(power):\n    return power > 1", "failed: TypeError"),
         ("outside_radar.py", "def lane():\n    raise SystemExit('no')", "radar 'lane-60ghz' of package 'outside' failed"),
@@ -149,7 +149,7 @@ def test_a_broken_package_is_one_line(
 
 PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     # The name, the function, and the words that ask for it.
-    "rung": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
+    "model": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
     "reader": ("npz", "read(path)", ()),
     "radar": ("lane-60ghz", "lane()", USED[2:4]),
     "detector": ("threshold", "threshold(power, *, pfa, looks)", ("--radar", "lane-60ghz", *USED[4:])),
@@ -208,11 +208,11 @@ def test_an_account_that_no_file_can_hold(registered: None) -> None:
         def account(self) -> dict[str, object]:
             return {"power": object()}
 
-    rt.register_rung("wrong", Accounted)
+    rt.register_model("wrong", Accounted)
     body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
-    rung = build_rung("wrong", rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0), body, spoil="nothing")
+    model = build_model("wrong", rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0), body, spoil="nothing")
     with pytest.raises(rt.ExtensionError, match="'wrong' failed: TypeError"):
-        rung.account()  # type: ignore[attr-defined]
+        model.account()  # type: ignore[attr-defined]
 
 
 @pytest.fixture
@@ -242,13 +242,13 @@ def test_a_running_program_adds_its_own() -> None:
 
 
 class Wrong:
-    """A rung that spoils what `analytic` gives."""
+    """A model that spoils what `analytic` gives."""
 
     def __init__(self, radar: rt.Radar, body: rt.Body, *, spreading: bool, spoil: str) -> None:
-        self._rung, self._spoil = build_rung("analytic", radar, body, spreading=spreading), spoil
+        self._model, self._spoil = build_model("analytic", radar, body, spreading=spreading), spoil
 
     def echoes(self, chirps: np.ndarray) -> object:
-        good = self._rung.echoes(chirps)
+        good = self._model.echoes(chirps)
         fields = {name: getattr(good, name) for name in ("length", "amplitude", "frequency", "tx", "part", "bounces")}
         match self._spoil:
             case "type":
@@ -269,16 +269,16 @@ class Wrong:
     ("spoil", "said"),
     [("type", "gave a dict"), ("rx", "of shape"), ("tx", "other Tx"), ("part", "parts outside 0 to 20"), ("value", "not finite")],
 )
-def test_a_rung_must_give_what_the_rest_relies_on(spoil: str, said: str) -> None:
-    rt.register_rung("wrong", Wrong)
+def test_a_model_must_give_what_the_rest_relies_on(spoil: str, said: str) -> None:
+    rt.register_model("wrong", Wrong)
     body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
     radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0)
-    good = build_rung("wrong", radar, body, spoil="nothing").echoes(np.arange(4))
+    good = build_model("wrong", radar, body, spoil="nothing").echoes(np.arange(4))
     assert good.length.shape == (4, 2, 21)
     with pytest.raises(rt.ExtensionError, match=said):
-        build_rung("wrong", radar, body, spoil=spoil).echoes(np.arange(4))
-    with pytest.raises(rt.InputError, match=r"no dial 'depth'; it has: spoil"):
-        build_rung("wrong", radar, body, depth=3)
+        build_model("wrong", radar, body, spoil=spoil).echoes(np.arange(4))
+    with pytest.raises(rt.InputError, match=r"no option 'depth'; it has: spoil"):
+        build_model("wrong", radar, body, depth=3)
 
 
 def test_every_built_in_name_is_there() -> None:
@@ -294,8 +294,8 @@ def test_two_of_one_name_are_refused_by_that_name(tmp_path: Path, here: Install)
     sys.path.insert(0, str(tmp_path / "other"))
     try:
         with pytest.raises(rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"):
-            RUNGS.find("specular")
-        assert RUNGS.find("analytic") is not None
+            MODELS.find("specular")
+        assert MODELS.find("analytic") is not None
         with pytest.raises(rt.ExtensionError, match="'threshold' is claimed by 'other' and by 'outside'"):
             DETECTORS.find("threshold")
     finally:

@@ -1,4 +1,4 @@
-"""The paper's method in plain NumPy does the same work as the rung `analytic-paper`, and as our CFAR with its multiplier."""
+"""The paper's method in plain NumPy does the same work as the model `analytic-paper`, and as our CFAR with its multiplier."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.process import os_cfar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.validate import validation_folder
 
 
@@ -32,7 +32,7 @@ def test_if_samples_are_those_of_analytic_paper(paper: ModuleType, name: str) ->
     chirps = np.arange(first, first + 2 * radar.n_tx)
     body = Body.from_motion(rt.synthetic_motion("kick", seed=1, duration_s=0.5))
     times = radar.chirp_times(len(chirps), first)
-    ours = rt.signal.synthesize(build_rung("analytic-paper", radar, body).echoes(chirps), radar, times)
+    ours = rt.signal.synthesize(build_model("analytic-paper", radar, body).echoes(chirps), radar, times)
     theirs = paper.if_samples(radar, paper.Poses(*body.at(times)), first)
     # 3000 rad of phase at 77 GHz in float64.
     assert np.abs(ours - theirs).max() < 1e-10 * np.abs(ours).max()

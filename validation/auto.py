@@ -31,7 +31,7 @@ import rtradar as rt
 from rtradar.bench.times import to_cloud_s
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 
 DURATION_S = 3.0
 REPEATS = 5
@@ -59,13 +59,13 @@ def measure(quick: bool) -> list[Row]:
             spread = (np.arange(CYCLES) + 0.5) / CYCLES * radar.cycles_per_frame
             cycles = np.arange(n_frames)[:, None] * (duration_s / n_frames / radar.cycle_duration_s) + spread
             chirps = (cycles.astype(np.int64)[..., None] * radar.n_tx + np.array([0, radar.tx_y - 1])).ravel()
-            truth = spectrum(build_rung("reference", radar, body), radar, chirps)
+            truth = spectrum(build_model("reference", radar, body), radar, chirps)
 
             rungs: list[tuple[str, str, dict[str, Any]]] = [(fixed, fixed, {}) for fixed in FIXED]
             tolerances = TOLERANCES[name][::2] if quick else TOLERANCES[name]
             rungs += [(f"auto {key} {value:g}", "auto", {key: value}) for dials in tolerances for key, value in dials.items()]
             for label, fidelity, dials in rungs:
-                found = spectrum(build_rung(fidelity, radar, body, **dials), radar, chirps)
+                found = spectrum(build_model(fidelity, radar, body, **dials), radar, chirps)
                 powers = [(np.abs(field) ** 2).reshape(3, n_frames, -1).mean(axis=(0, 2)) for field in (found, truth)]
                 worst = float(np.abs(10 * np.log10(powers[0] / powers[1])).max())
                 wrong = float(np.sqrt((np.abs(found - truth) ** 2).mean() / (np.abs(truth) ** 2).mean()))
@@ -98,8 +98,8 @@ def measure(quick: bool) -> list[Row]:
 
 def _cost(fidelity: str, dials: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int) -> float:
     """Seconds of every third frame [s], by a new rung, for rungs keep what they traced."""
-    seconds(build_rung(fidelity, radar, body, **dials), radar, 0)
-    rung = build_rung(fidelity, radar, body, **dials)
+    seconds(build_model(fidelity, radar, body, **dials), radar, 0)
+    rung = build_model(fidelity, radar, body, **dials)
     return sum(seconds(rung, radar, frame * radar.chirps_per_frame) for frame in range(0, n_frames, 3))
 
 

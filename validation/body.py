@@ -28,7 +28,7 @@ from rows import Row, judged, main, reported
 import rtradar as rt
 from rtradar.motion import place
 from rtradar.pipeline.survey import survey
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import anchor_step
 
 Array = NDArray[np.float64]
@@ -161,7 +161,7 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
-        found = {rung: survey(build_rung(rung, radar, body), radar, body, n_chirps) for rung in ("analytic", "specular")}
+        found = {rung: survey(build_model(rung, radar, body), radar, body, n_chirps) for rung in ("analytic", "specular")}
     near, far = near_and_far(radar, body, n_chirps)
     analytic, specular = (found[rung].power_at for rung in ("analytic", "specular"))
     hidden = found["specular"].hidden_at

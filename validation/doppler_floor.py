@@ -31,12 +31,12 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
-from rtradar.scatter import RUNGS, build_rung
+from rtradar.scatter import MODELS, build_model
 
 Array = NDArray[np.float64]
 ATTENUATION_DB = 160.0
-FACETED = tuple(rung for rung in ("reference", "physical-optics", "rays") if rung in RUNGS)
-OPTICAL = tuple(rung for rung in ("analytic", "specular", "fresnel") if rung in RUNGS)
+FACETED = tuple(rung for rung in ("reference", "physical-optics", "rays") if rung in MODELS)
+OPTICAL = tuple(rung for rung in ("analytic", "specular", "fresnel") if rung in MODELS)
 OVER_REFERENCE_DB = 3.0
 
 
@@ -153,7 +153,7 @@ def floor_of(radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, in
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
     # The rung asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_rung(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
     x = rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps)))
     spectrum = rt.process.range_doppler(x, radar, range_window=fast, doppler_window=slow)
     found = []

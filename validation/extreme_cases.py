@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 import rtradar as rt
 import rtradar.body
 from rtradar.body.body import Poses
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 
 Array = NDArray[np.float64]
 C = 299_792_458.0
-RUNGS = ("analytic", "specular")
+MODELS = ("analytic", "specular")
 TRACED = ("specular", "fresnel", "physical-optics", "rays")
 BESIDE = np.array([0.0, 0.1, 0.0])
 
@@ -148,5 +148,5 @@ def spectrum(radar: rt.Radar, body: Ball, rung: str = "analytic") -> Any:
     """Range-Doppler of one window of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
     # The rung asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_rung(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
     return rt.process.range_doppler(rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar)

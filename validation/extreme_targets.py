@@ -8,7 +8,7 @@ import warnings
 import numpy as np
 from extreme_cases import (
     BESIDE,
-    RUNGS,
+    MODELS,
     TRACED,
     Ball,
     C,
@@ -31,7 +31,7 @@ import rtradar.body
 from rtradar.echoes import Echoes
 from rtradar.motion import place
 from rtradar.pipeline.survey import survey
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 
 CASES, case = collector()
 
@@ -107,7 +107,7 @@ def _() -> str:
 @case("specular and analytic below ka = 5", "a warning, and the optical answer")
 def _() -> str:
     said = ""
-    for rung in RUNGS:
+    for rung in MODELS:
         field, said = warned(
             lambda rung=rung: rt.scattering_length(alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, rung),  # type: ignore[misc]
             "radius of curvature",
@@ -123,7 +123,7 @@ def _() -> str:
     sight = rng.normal(size=(50, 3))
     sight *= 4 / np.linalg.norm(sight, axis=1, keepdims=True)
     for axes in ((1e-3, 1e-3, 1.0), (0.5, 0.5, 5e-4), (1e-3, 0.03, 1.0)):
-        for rung in RUNGS:
+        for rung in MODELS:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", rt.ValidityWarning)
                 assert np.isfinite(rt.scattering_length(alone(*axes), sight, sight + BESIDE, 77e9, rung)).all()
@@ -285,7 +285,7 @@ def _() -> str:
         variant = None
 
         def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-            seen = build_rung("analytic", radar, Ball()).echoes(chirps)  # type: ignore[arg-type]
+            seen = build_model("analytic", radar, Ball()).echoes(chirps)  # type: ignore[arg-type]
             return dataclasses.replace(seen, amplitude=seen.amplitude * 0)
 
     found, said = warned(lambda: survey(Silence(), radar, Ball(), 400), "nobody is visible")  # type: ignore[arg-type]
@@ -304,8 +304,8 @@ def _() -> str:
     there = dataclasses.replace(radar, position_m=tuple((np.asarray(radar.position_m) + far).tolist()))
     chirps = np.arange(0, 4000, 401)
     worst_length = worst_amplitude = 0.0
-    for rung in (*RUNGS, "fresnel"):
-        here, away = (build_rung(rung, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved)))
+    for rung in (*MODELS, "fresnel"):
+        here, away = (build_model(rung, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved)))
         worst_length = max(worst_length, float(np.abs(here.length - away.length).max()))
         largest = float(np.abs(here.amplitude).max())
         worst_amplitude = max(worst_amplitude, float(np.abs(here.amplitude - away.amplitude).max()) / largest)

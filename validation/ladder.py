@@ -27,7 +27,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion import place
-from rtradar.scatter import RUNGS, Rung, build_rung
+from rtradar.scatter import MODELS, EchoModel, build_model
 
 judged, reported = (partial(kind, key="body") for kind in (rows.judged, rows.reported))
 PRESETS = ("paper-12ghz", "paper-77ghz")
@@ -77,7 +77,7 @@ class Scene:
     def spectrum(self, fidelity: str, **dials: Any) -> NDArray[np.complex128]:
         """What a rung receives (frequency, chirp, rx)."""
         radar = self.corner_radar if fidelity in BY_RECEIVER else self.radar
-        return spectrum(build_rung(fidelity, radar, self.body, **dials), radar, self.chirps)
+        return spectrum(build_model(fidelity, radar, self.body, **dials), radar, self.chirps)
 
     @cached_property
     def reference(self) -> NDArray[np.complex128]:
@@ -90,7 +90,7 @@ class Scene:
         return error, float(10 * np.log10((np.abs(found) ** 2).mean() / power))
 
 
-def spectrum(rung: Rung, radar: rt.Radar, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
+def spectrum(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
     """Received spectrum (frequency, chirp, rx) at the first and last receiver of each line."""
     echoes = rung.echoes(chirps)
     frequencies = radar.start_frequency_hz + radar.bandwidth_hz * np.array([0.0, 0.5, 1.0])
@@ -108,9 +108,9 @@ def spectrum(rung: Rung, radar: rt.Radar, chirps: NDArray[np.int64]) -> NDArray[
 
 def scene_rows(scene: Scene) -> Iterator[Row]:
     case = f"{scene.preset}, {scene.activity}"
-    hidden = build_rung("specular", scene.radar, scene.body).echoes(scene.chirps).amplitude == 0
+    hidden = build_model("specular", scene.radar, scene.body).echoes(scene.chirps).amplitude == 0
     yield reported(case, "share of part, time and channel whose mirror point is hidden", "", float(hidden.mean()))
-    for fidelity in RUNGS:
+    for fidelity in MODELS:
         if fidelity == "reference":
             continue
         found = scene.spectrum(fidelity)

@@ -28,7 +28,7 @@ from rows import Row, judged, main, reported
 import rtradar as rt
 from rtradar.motion import place
 from rtradar.process import power_map, range_spectrum
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.signal import Noise, receive, separate, synthesize
 
 KINDS = ("tdm", "fdm", "ddm")
@@ -134,7 +134,7 @@ def window(activity: str, kind: str, middle_s: float) -> rt.Echoes:
     """Echoes of one window with its middle there."""
     made = radar(kind)
     cycle = round((middle_s - made.cycles_per_frame * made.cycle_duration_s / 2) / made.cycle_duration_s)
-    return build_rung("analytic", made, body_of(activity)).echoes(cycle * TX + np.arange(made.chirps_per_frame))
+    return build_model("analytic", made, body_of(activity)).echoes(cycle * TX + np.arange(made.chirps_per_frame))
 
 
 def mean_velocity(power: NDArray[np.floating], made: rt.Radar) -> float:

@@ -29,7 +29,7 @@ from scipy.signal.windows import hann
 import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.kernels.jit import compiled
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="edge") for kind in (rows.judged, rows.reported))
@@ -271,7 +271,7 @@ def fade_rows(quick: bool) -> Iterator[Row]:
             for shift in late:
                 moved = Passing(speed, passing.instant + shift * band.cycle_s)
                 # The rung asks a body for its poses, its parts and its duration: this one has them.
-                rung = build_rung("specular", band.radar, moved)  # type: ignore[arg-type]
+                rung = build_model("specular", band.radar, moved)  # type: ignore[arg-type]
                 amplitude = rung.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
                 floors.append(beside_db(amplitude, band))
                 first = late.max() - shift

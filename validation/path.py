@@ -28,13 +28,13 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.specular_point.solver import mirror
 
 Array = NDArray[np.float64]
 Vector = list[Decimal]
 # All but `analytic-paper`, whose length is that of the centre.
-RUNGS = ("analytic", "specular", "fresnel", "physical-optics", "rays", "reference")
+MODELS = ("analytic", "specular", "fresnel", "physical-optics", "rays", "reference")
 TOLERANCE_M = 1e-6
 STEP = Decimal("1e-15")
 getcontext().prec = 60
@@ -210,11 +210,11 @@ def rung_rows(quick: bool) -> Iterator[Row]:
                 there = Shifted(body, shift)
                 place = shift + away * np.array([-0.96, 0.28, 0.01])
                 radar = dataclasses.replace(whole, position_m=tuple(place.tolist()))
-                for rung in RUNGS:
+                for rung in MODELS:
                     if rung == "rays" and (quick or away > 1e3):
                         continue  # a minute
                     # The rung asks a body for its poses, its parts and its duration: this one has them.
-                    echoes = build_rung(rung, radar, there).echoes(chirps)  # type: ignore[arg-type]
+                    echoes = build_model(rung, radar, there).echoes(chirps)  # type: ignore[arg-type]
                     poses = there.at((chirps + 0.5) * radar.chirp_duration_s)
                     worst = 0.0
                     for index, chirp in enumerate(chirps):

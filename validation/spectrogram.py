@@ -38,7 +38,7 @@ from rtradar.motion import place
 from rtradar.pipeline.survey import survey
 from rtradar.process import range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.signal import Noise, synthesize
 
 Array = NDArray[np.float64]
@@ -147,7 +147,7 @@ def walk(folder: Path) -> Body:
 
 def walk_spectrogram(radar: rt.Radar, body: Body, fidelity: str, snr_db: float = 20.0) -> Spectrogram:
     """Channel 0, through the pieces of the chain."""
-    rung = build_rung(fidelity, radar, body)
+    rung = build_model(fidelity, radar, body)
     n_chirps = int(body.duration_s / radar.cycle_duration_s) * radar.n_tx
     noise = Noise.for_snr(survey(rung, radar, body, n_chirps).power, snr_db, seed=0)
     block = 34 * radar.n_tx

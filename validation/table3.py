@@ -48,7 +48,7 @@ from rtradar.pipeline.survey import survey
 from rtradar.process import ca_cfar, ca_scale, os_cfar, power_map, range_doppler, range_spectrum
 from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
 from rtradar.process.window_functions import hann
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.signal import Noise, synthesize
 
 Map = NDArray[np.floating]
@@ -70,7 +70,7 @@ GUARD, REACH = 2, 6
 class Capture(NamedTuple):
     """One activity before the radar."""
 
-    rung: rt.scatter.Rung
+    rung: rt.scatter.EchoModel
     starts: NDArray[np.int64]
     echo_power: float
 
@@ -78,7 +78,7 @@ class Capture(NamedTuple):
     def of(cls, activity: str, fidelity: str, every: int, *, spreading: bool = True) -> Capture:
         body = Body.from_motion(place(rt.synthetic_motion(activity, seed=0)))
         n_chirps = math.floor(body.duration_s / RADAR.cycle_duration_s) * RADAR.n_tx
-        rung = build_rung(fidelity, RADAR, body, spreading=spreading)
+        rung = build_model(fidelity, RADAR, body, spreading=spreading)
         power = survey(rung, RADAR, body, n_chirps, spreading=spreading).power
         return cls(rung, RADAR.window_starts(n_chirps)[::every], power)
 

@@ -6,7 +6,7 @@ same run; each is first run a little, so that nothing is compiled, and is the be
 minutes a frame, are timed on a part of it: `rays` on one Tx over the time between two anchors, `reference` on two TDM cycles.
 
 What is measured goes to ``--json FILE`` at once, and what is there is not measured again: to go on after a stop, or to add a
-line to `RUNGS` or `DIALS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
+line to `MODELS` or `DIALS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
 
     python validation/trade.py --json FILE [--figure validation/trade.png] [--costs] [--quick]
 """
@@ -30,12 +30,12 @@ from ladder import FRAMES, PRESETS, Scene
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.scatter import Rung, build_rung
+from rtradar.scatter import EchoModel, build_model
 from rtradar.scatter.models.rays import ANCHOR_S
 
 CHEAPEST = "analytic"  # all costs are over its
 # In the order of the table; `reference` has a cost and no error.
-RUNGS = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto", "rays", "reference")
+MODELS = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto", "rays", "reference")
 SLOW = ("rays", "reference")  # minutes a frame: after all others
 
 
@@ -122,7 +122,7 @@ def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
 
 def settings(preset: str, quick: bool) -> list[Setting]:
     """Each once, `analytic` first."""
-    found = [Setting(CHEAPEST), *(Setting(fidelity) for fidelity in RUNGS)]
+    found = [Setting(CHEAPEST), *(Setting(fidelity) for fidelity in MODELS)]
     found += [] if quick else [setting for dial in DIALS for _, setting in settings_of(dial, preset)]
     return list(dict.fromkeys(found))
 
@@ -130,13 +130,13 @@ def settings(preset: str, quick: bool) -> list[Setting]:
 # -- cost -----------------------------------------------------------------------------------------------------------
 
 
-def seconds(rung: Rung, radar: rt.Radar, first: int) -> float:
+def seconds(rung: EchoModel, radar: rt.Radar, first: int) -> float:
     """Of echoes and IF samples of the frame that begins at this chirp."""
     step, end = 33 * radar.n_tx, first + radar.chirps_per_frame
     return sum(timed(rung, radar, np.arange(begin, min(begin + step, end))) for begin in range(first, end, step))
 
 
-def timed(rung: Rung, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
+def timed(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
     began = time.perf_counter()
     at = (chirps + 0.5) * radar.chirp_duration_s
     rt.signal.synthesize(rung.echoes(chirps), radar, at, dtype=np.complex64)
@@ -146,7 +146,7 @@ def timed(rung: Rung, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
 def seconds_of(scene: Scene, setting: Setting) -> float:
     """The same for a setting, by a rung that has traced nothing of it yet; of those that take minutes, from a part of it."""
     radar, first = scene.radar, scene.first_chirp
-    rung = build_rung(setting.fidelity, radar, scene.body, **setting.dials)
+    rung = build_model(setting.fidelity, radar, scene.body, **setting.dials)
     if setting.fidelity == "reference":
         chirps = np.arange(first, first + 2 * radar.n_tx)
         timed(rung, radar, chirps)
@@ -175,7 +175,7 @@ def warm_up(scene: Scene, fidelity: str) -> None:
     if fidelity in SLOW:
         return  # begun anyway
     chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
-    rung = build_rung(fidelity, scene.radar, scene.body)
+    rung = build_model(fidelity, scene.radar, scene.body)
     rt.signal.synthesize(rung.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64)
 
 
@@ -247,7 +247,7 @@ def table(points: dict[tuple[str, str, str], Point]) -> str:
         if any(own):
             lines.append(f"| {name} | " + " | ".join(figures(each) for each in own) + " |")
 
-    for fidelity in RUNGS:
+    for fidelity in MODELS:
         line(f"`{fidelity}`", dict.fromkeys(PRESETS, fidelity))
     for dial in DIALS:
         at = {(value, each): setting for each in PRESETS for value, setting in settings_of(dial, each)}

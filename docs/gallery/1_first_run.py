@@ -16,7 +16,7 @@ OUT = Path(os.environ.get("RTRADAR_GALLERY_OUT", "out/gallery"))
 SECONDS = float(os.environ.get("RTRADAR_GALLERY_S", 3.0))
 
 # %%
-# A motion, a radar, a rung of the fidelity ladder: that is all a run needs. ``report.html`` in its folder opens offline.
+# A motion, a radar, an echo model: that is all a run needs. ``report.html`` in its folder opens offline.
 motion = rt.synthetic_motion("walk", seed=0, duration_s=SECONDS)
 radar = rt.Radar.preset("paper-12ghz")
 result = rt.run(motion, radar, fidelity="specular", snr_db=20, seed=0, out=OUT / "first_run")

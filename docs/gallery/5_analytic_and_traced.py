@@ -3,7 +3,7 @@ Analytic against traced
 =======================
 
 The closed form adds up all parts of a body; ray tracing knows which of them another one hides. `rt.compare` runs several
-rungs on one recording with the same noise and says what differs.
+models on one recording with the same noise and says what differs.
 """
 
 import os
@@ -25,16 +25,16 @@ found = rt.compare(kick, radar, fidelities=["analytic", "specular"], heading_deg
 print(found.table())
 
 # %%
-# Each rung's run lies in a folder of its name. Power is summed over range and velocity, of all channels.
+# Each model's run lies in a folder of its name. Power is summed over range and velocity, of all channels.
 figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained")
 power = {}
-for rung in ("analytic", "specular"):
-    with h5py.File(found.out / rung / "maps.h5") as maps:
-        power[rung] = maps["range_doppler"][:].sum(axis=(1, 2))
+for model in ("analytic", "specular"):
+    with h5py.File(found.out / model / "maps.h5") as maps:
+        power[model] = maps["range_doppler"][:].sum(axis=(1, 2))
         times = maps["time"][:]
 strongest = max(one.max() for one in power.values())
-for rung, one in power.items():
-    above.plot(times, 10 * np.log10(one / strongest), label=rung)
+for model, one in power.items():
+    above.plot(times, 10 * np.log10(one / strongest), label=model)
 above.set(xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps")
 above.legend()
 hidden = found.summary["fidelities"]["specular"]["part_hidden_share"]

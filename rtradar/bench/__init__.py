@@ -1,4 +1,4 @@
-"""``rtradar bench``: what every stage takes and the whole, beside other rungs, the paper's method and floors measured here."""
+"""``rtradar bench``: what every stage takes and the whole, beside other models, the paper's method and floors measured here."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 from rtradar.bench.figure import draw
 from rtradar.bench.growth import with_channels, with_duration, with_echoes
 from rtradar.bench.paper import Baseline, measure_baseline
-from rtradar.bench.plan import CHEAPEST, Plan, plan_of, rung_cases
+from rtradar.bench.plan import CHEAPEST, Plan, model_cases, plan_of
 from rtradar.bench.rates import measure_rates
-from rtradar.bench.rows import chirp_rows, rung_row
+from rtradar.bench.rows import chirp_rows, model_row
 from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
 from rtradar.bench.tables import tables
 from rtradar.radar import Radar
@@ -64,7 +64,7 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
 
 
 def measure(plan: Plan) -> dict[str, Any]:
-    """All that the plan asks for, as plain values: ``settings``, ``machine``, ``rates``, ``rungs``, ``paper``, ``growth``.
+    """All that the plan asks for, as plain values: ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth``.
 
     Raises
     ------
@@ -79,14 +79,14 @@ def measure(plan: Plan) -> dict[str, Any]:
             "versions": {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS},
         },
         "rates": {},
-        "rungs": [],
+        "models": [],
         "paper": {"trouble": "", "radars": {}},
         "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": [], "channels": [], "echoes": []},
     }
     with temporary_folder("rtradar-bench-") as folder:
         runner = Runner(folder)
-        if "rungs" in plan.parts:
-            _measure_rungs(plan, runner, found)
+        if "models" in plan.parts:
+            _measure_models(plan, runner, found)
         if "growth" in plan.parts:
             found["growth"]["duration"] = with_duration(plan, runner)
             found["growth"]["channels"] = with_channels(plan, runner, folder)
@@ -94,15 +94,15 @@ def measure(plan: Plan) -> dict[str, Any]:
     return found
 
 
-def _measure_rungs(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
+def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     rates = {radar: measure_rates(Radar.load(radar)) for radar in plan.radars}
     baselines: dict[str, Baseline | None] = {
         radar: measure_baseline(radar, plan.repeats, quick=plan.quick) for radar in plan.radars
     }
-    runs = runner.measure(rung_cases(plan, one_core=can_pin()), plan.repeats, "rungs")
+    runs = runner.measure(model_cases(plan, one_core=can_pin()), plan.repeats, "models")
     cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST and not case.one_core}
-    found["rungs"] = [
-        rung_row(
+    found["models"] = [
+        model_row(
             case,
             own,
             first=runner.first[case.fidelity] if case.radar == plan.radars[0] and not case.one_core else None,
@@ -116,4 +116,4 @@ def _measure_rungs(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     known = {Radar.load(radar).name: asdict(own) for radar, own in baselines.items() if own is not None}
     trouble = "" if known else "there is no paper_numpy.py among the validation scripts; use a checkout, or install rtradar again"
     found["paper"] = {"trouble": trouble, "radars": known}
-    found["growth"]["chirps"] = chirp_rows(found["rungs"])
+    found["growth"]["chirps"] = chirp_rows(found["models"])

@@ -1,4 +1,4 @@
-"""What was measured as a picture: where the time of each rung goes beside its floors, and how it grows."""
+"""What was measured as a picture: where the time of each model goes beside its floors, and how it grows."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ def draw(found: dict[str, Any], file: BinaryIO) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    rungs = [row for row in found["rungs"] if row["cores"] == "all"]
+    models = [row for row in found["models"] if row["cores"] == "all"]
     growth = found["growth"]
-    radars = list(dict.fromkeys(row["radar"] for row in rungs))
+    radars = list(dict.fromkeys(row["radar"] for row in models))
     grown = [name for name in ("duration", "channels", "echoes") if growth[name]]
     rows = len(radars) + bool(grown)
     figure = plt.figure(figsize=(11, 3.4 * rows), layout="constrained")
     places = figure.add_gridspec(rows, max(1, len(grown)))
     for number, radar in enumerate(radars):
-        _bars(figure.add_subplot(places[number, :]), [row for row in rungs if row["radar"] == radar], radar)
+        _bars(figure.add_subplot(places[number, :]), [row for row in models if row["radar"] == radar], radar)
     for column, name in enumerate(grown):
         axes = figure.add_subplot(places[-1, column])
         if name == "echoes":
@@ -40,14 +40,14 @@ def draw(found: dict[str, Any], file: BinaryIO) -> None:
     plt.close(figure)
 
 
-def _bars(axes: Any, rungs: Sequence[Row], radar: str) -> None:
+def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
     """Stages beside each other, those that do not lead to the cloud hatched; the floor of each as a black bar in it."""
     import matplotlib as mpl
 
     colours = mpl.colormaps["tab20"]
-    names = list(dict.fromkeys(name for row in rungs for name in row["stages"]))
+    names = list(dict.fromkeys(name for row in models for name in row["stages"]))
     names.sort(key=lambda name: name in (*OTHER_PRODUCTS, *FILES))  # stays in order otherwise
-    for number, row in enumerate(rungs):
+    for number, row in enumerate(models):
         left = 0.0
         for name in names:
             stage = row["stages"].get(name)
@@ -61,9 +61,9 @@ def _bars(axes: Any, rungs: Sequence[Row], radar: str) -> None:
                 axes.barh(number, stage["floor"], left=left, color="black", height=0.15)
             left += stage["median"]
     axes.barh([0], [0], color="black", label="floor")
-    axes.set_yticks(range(len(rungs)), [row["fidelity"] for row in rungs])
+    axes.set_yticks(range(len(models)), [row["fidelity"] for row in models])
     axes.invert_yaxis()
-    axes.set(ylabel="rung", xlabel=f"time of a run of {rungs[0]['capture_s']:.2f} s of radar, median [s]")
+    axes.set(ylabel="model", xlabel=f"time of a run of {models[0]['capture_s']:.2f} s of radar, median [s]")
     axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9)
     axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 

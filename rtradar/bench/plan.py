@@ -6,20 +6,20 @@ from dataclasses import dataclass, replace
 
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS, Radar
-from rtradar.scatter import RUNGS
+from rtradar.scatter import MODELS
 
-PARTS = ("rungs", "growth")
-"""What may be measured alone: rungs with baseline and floors, or growth with the size of the problem."""
+PARTS = ("models", "growth")
+"""What may be measured alone: models with baseline and floors, or growth with the size of the problem."""
 
 RADARS = tuple(PRESETS.built_in)
 FIDELITIES = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics")
-"""Radars and rungs by default: those that take less than minutes for seconds of radar."""
+"""Radars and models by default: those that take less than minutes for seconds of radar."""
 
 CHEAPEST = "analytic"
-"""The rung that all others are compared with."""
+"""The model that all others are compared with."""
 
 SAME_AS_PAPER = "analytic-paper"
-"""The rung whose IF is that of the paper's method."""
+"""The model whose IF is that of the paper's method."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Plan:
     radars : tuple of str
         Presets or TOML files, the first for what is measured with one only: first use, one core, growth.
     fidelities : tuple of str
-        Rungs.
+        Models.
     repeats : int
         Of everything but first use.
     duration_s : float
@@ -44,7 +44,7 @@ class Plan:
     Raises
     ------
     InputError
-        Where a radar or rung is unknown or named twice, a number has no meaning, or the capture holds no frame.
+        Where a radar or model is unknown or named twice, a number has no meaning, or the capture holds no frame.
     """
 
     radars: tuple[str, ...] = RADARS
@@ -59,8 +59,8 @@ class Plan:
             if not all(names) or len(set(names)) < len(names):
                 raise InputError(f"{option} {','.join(names)}: name each once, with commas between")
         for fidelity in self.fidelities:
-            if fidelity not in RUNGS:
-                raise InputError(f"--fidelity {fidelity}: there is no such rung; allowed: {', '.join(RUNGS)}")
+            if fidelity not in MODELS:
+                raise InputError(f"--fidelity {fidelity}: there is no such model; allowed: {', '.join(MODELS)}")
         if self.repeats < 1:
             raise InputError(f"--repeats {self.repeats}: it must be a whole number, at least 1")
         for radar in map(Radar.load, self.radars):
@@ -72,7 +72,7 @@ class Plan:
 
     @property
     def growing_fidelity(self) -> str:
-        """The rung that growth is measured by: `specular`, or the last named."""
+        """The model that growth is measured by: `specular`, or the last named."""
         return "specular" if "specular" in self.fidelities else self.fidelities[-1]
 
     @property
@@ -100,8 +100,8 @@ class Case:
     one_core: bool = False
 
 
-def rung_cases(plan: Plan, *, one_core: bool) -> list[Case]:
-    """Every rung with every radar; with ``one_core`` also the rung of the paper's method on one core, with the first radar."""
+def model_cases(plan: Plan, *, one_core: bool) -> list[Case]:
+    """Every model with every radar; with ``one_core`` also the model of the paper's method on one core, with the first radar."""
     cases = [Case(radar, fidelity, plan.duration_s) for radar in plan.radars for fidelity in plan.fidelities]
     if one_core and SAME_AS_PAPER in plan.fidelities:
         cases.append(replace(cases[0], fidelity=SAME_AS_PAPER, one_core=True))

@@ -16,10 +16,10 @@ from rtradar.radar import Radar
 Row = dict[str, Any]
 
 
-def rung_row(
+def model_row(
     case: Case, runs: list[Run], *, first: Run | None, cheapest: list[Run] | None, rates: Rates, baseline: Baseline | None
 ) -> Row:
-    """What was measured of one rung with one radar.
+    """What was measured of one model with one radar.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ def rung_row(
 
 
 def first_use(first: Run, runs: list[Run]) -> dict[str, float]:
-    """What the first process of a rung takes, with nothing compiled and no cache filled.
+    """What the first process of a model takes, with nothing compiled and no cache filled.
 
     Returns
     -------
@@ -100,18 +100,18 @@ def paper_over(baseline: Baseline, radar: Radar, chirps: int, row: Row) -> dict[
     }
 
 
-def chirp_rows(rungs: list[Row]) -> list[Row]:
-    """Radars with more chirps than the first, each rung over its own with the first: chirps, time and peak memory as ratios."""
-    base = {row["fidelity"]: row for row in rungs if row["radar"] == rungs[0]["radar"] and row["cores"] == "all"}
+def chirp_rows(models: list[Row]) -> list[Row]:
+    """Radars with more chirps than the first, each model over its own with the first: chirps, time and peak memory as ratios."""
+    base = {row["fidelity"]: row for row in models if row["radar"] == models[0]["radar"] and row["cores"] == "all"}
     return [
         {
             "radar": row["radar"],
-            "of_radar": rungs[0]["radar"],
+            "of_radar": models[0]["radar"],
             "fidelity": row["fidelity"],
             "chirps": row["work"]["chirps"] / base[row["fidelity"]]["work"]["chirps"],
             "to_cloud": row["to_cloud_s"]["median"] / base[row["fidelity"]]["to_cloud_s"]["median"],
             "peak_memory": row["peak_memory_mb"] / base[row["fidelity"]]["peak_memory_mb"],
         }
-        for row in rungs
-        if row["radar"] != rungs[0]["radar"] and row["cores"] == "all"
+        for row in models
+        if row["radar"] != models[0]["radar"] and row["cores"] == "all"
     ]

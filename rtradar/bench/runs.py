@@ -74,9 +74,9 @@ def can_pin() -> bool:
 
 
 class Runner:
-    """Runs cases in fresh processes, whose compiled code it keeps in a folder of its own, rung by rung.
+    """Runs cases in fresh processes, whose compiled code it keeps in a folder of its own, model by model.
 
-    So the first run of a rung finds nothing compiled, all later ones everything, and the user's caches are left alone.
+    So the first run of a model finds nothing compiled, all later ones everything, and the user's caches are left alone.
 
     Parameters
     ----------
@@ -87,10 +87,10 @@ class Runner:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         self.first: dict[str, Run] = {}
-        """First use of each rung."""
+        """First use of each model."""
 
     def measure(self, cases: Sequence[Case], repeats: int, what: str) -> dict[Case, list[Run]]:
-        """Run every case so often, all cases in turn; rungs that were not used yet are first used, apart.
+        """Run every case so often, all cases in turn; models that were not used yet are first used, apart.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class Runner:
             return Run(process_s, json.loads(written.read_text(encoding="utf-8")))
 
     def _environment(self, fidelity: str) -> dict[str, str]:
-        """With caches of compiled code, of Numba and of Dr.Jit, and of fonts in a folder of the rung."""
+        """With caches of compiled code, of Numba and of Dr.Jit, and of fonts in a folder of the model."""
         home = self._folder / fidelity
         home.mkdir(exist_ok=True)
         # Packages that the user installed for himself are found through HOME, unless told otherwise.

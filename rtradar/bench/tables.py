@@ -17,29 +17,29 @@ def tables(found: dict[str, Any]) -> str:
 
 
 def _blocks(found: dict[str, Any]) -> Iterator[str]:
-    rungs = found["rungs"]
+    models = found["models"]
     left_out = ", ".join((*OTHER_PRODUCTS, *FILES))
     yield (
         f"{found['settings']['motion']}, {found['machine']['cores']} cores, each run a process of its own, medians of "
         f"{found['settings']['repeats']} after warm-up. To the cloud: all stages but {left_out}. The paper's method goes to "
         "detections; IF: its echoes and IF over ours."
     )
-    if rungs:
+    if models:
         yield _rates(found["rates"])
-        yield _rungs(rungs)
+        yield _models(models)
         if found["paper"]["trouble"]:
             yield f"the paper's method was not timed: {found['paper']['trouble']}"
         else:
             yield _paper(found["paper"]["radars"])
-        for radar in dict.fromkeys(row["radar"] for row in rungs):
-            yield _stages(radar, [row for row in rungs if row["radar"] == radar and row["cores"] == "all"])
+        for radar in dict.fromkeys(row["radar"] for row in models):
+            yield _stages(radar, [row for row in models if row["radar"] == radar and row["cores"] == "all"])
     growth = found["growth"]
     if growth["chirps"]:
         lines = [
             [f"{row['radar']} / {row['of_radar']}", f"`{row['fidelity']}`", *map(_plain, _values(row))]
             for row in growth["chirps"]
         ]
-        yield table(["radars", "rung", "chirps", "to the cloud", "peak memory"], lines)
+        yield table(["radars", "model", "chirps", "to the cloud", "peak memory"], lines)
     if growth["duration"]:
         first = growth["duration"][0]
         lines = [
@@ -79,8 +79,8 @@ def _rates(rates: dict[str, Any]) -> str:
     )
 
 
-def _rungs(rungs: Sequence[Row]) -> str:
-    head = ["radar", "rung", "to the cloud: best", "median", "whole run", "first use adds", "peak memory"]
+def _models(models: Sequence[Row]) -> str:
+    head = ["radar", "model", "to the cloud: best", "median", "whole run", "first use adds", "peak memory"]
     head += [f"over `{CHEAPEST}`", "paper's method over it"]
     lines = [
         [
@@ -94,7 +94,7 @@ def _rungs(rungs: Sequence[Row]) -> str:
             _or_dash(row[f"over_{CHEAPEST}"], "{:.2f}"),
             "-" if row["paper_over"] is None else f"{row['paper_over']['to_cloud']:.3g} (IF {row['paper_over']['if']:.3g})",
         ]
-        for row in rungs
+        for row in models
     ]
     return table(head, lines)
 
@@ -108,13 +108,13 @@ def _paper(radars: dict[str, Any]) -> str:
     return table(["the paper's method in NumPy, one thread, a frame", *names, "all"], lines)
 
 
-def _stages(radar: str, rungs: Sequence[Row]) -> str:
+def _stages(radar: str, models: Sequence[Row]) -> str:
     """Medians of every stage, the floor, and how many times it they are in brackets."""
-    names = dict.fromkeys(name for row in rungs for name in row["stages"])
+    names = dict.fromkeys(name for row in models for name in row["stages"])
     lines = []
     for name in names:
         group = " (not to the cloud)" if name in (*OTHER_PRODUCTS, *FILES) else ""
-        own = [row["stages"].get(name) for row in rungs]
+        own = [row["stages"].get(name) for row in models]
         known = [stage for stage in own if stage is not None]
         rule = known[0]["rule"]
         floor = _or_dash(known[0]["floor"], "{:.3f} s")
@@ -122,14 +122,14 @@ def _stages(radar: str, rungs: Sequence[Row]) -> str:
     # The floors of all stages to the cloud, as if nothing else took time.
     sums = [
         sum(stage["floor"] or 0.0 for name, stage in row["stages"].items() if name not in (*OTHER_PRODUCTS, *FILES))
-        for row in rungs
+        for row in models
     ]
     whole = [
         f"{row['to_cloud_s']['median']:.3f} s ({_times(row['to_cloud_s']['median'], least)})"
-        for row, least in zip(rungs, sums, strict=True)
+        for row, least in zip(models, sums, strict=True)
     ]
     lines.append(["all to the cloud", *whole, f"{sums[0]:.3f} s", "sum of the floors"])
-    return table([f"{radar}: stage", *(f"`{row['fidelity']}`" for row in rungs), "floor", "floor's work"], lines)
+    return table([f"{radar}: stage", *(f"`{row['fidelity']}`" for row in models), "floor", "floor's work"], lines)
 
 
 def _stage(stage: Row | None) -> str:

@@ -17,7 +17,7 @@ from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS
 from rtradar.radar import Radar
-from rtradar.scatter import RUNGS
+from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.system.checks import check_number, check_text, check_vector, inside, shown
 from rtradar.system.seeds import check_seed
@@ -117,10 +117,10 @@ def _folder(table: Table, beside: Path) -> Path:
 def _settings(each: Mapping[str, list[Any]], folder: Path) -> tuple[Setting, ...]:
     radars = [_loaded("radar", value, folder, Radar.load) for value in each["radar"]]
     scenes = [_loaded("scene", value, folder, Scene.load) for value in each["scene"]]
-    rungs = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
-    for rung in rungs:
-        if rung not in RUNGS:
-            raise InputError(f"[each] fidelity = {shown(rung)} is unknown; allowed: {', '.join(RUNGS)}")
+    models = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
+    for model in models:
+        if model not in MODELS:
+            raise InputError(f"[each] fidelity = {shown(model)} is unknown; allowed: {', '.join(MODELS)}")
     numbers: dict[str, list[float | None]] = {}
     for key in ("heading_deg", "snr_db"):
         _, least, most = DRAWN[key]
@@ -137,7 +137,7 @@ def _settings(each: Mapping[str, list[Any]], folder: Path) -> tuple[Setting, ...
         )
         for scene, person, place in itertools.product(scenes, people, radar_places)
     ]
-    combinations = itertools.product(radars, placed, rungs, numbers["heading_deg"], numbers["snr_db"])
+    combinations = itertools.product(radars, placed, models, numbers["heading_deg"], numbers["snr_db"])
     return tuple(Setting(*combination) for combination in combinations)
 
 

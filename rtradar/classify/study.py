@@ -234,7 +234,7 @@ def fingerprint(clouds: Clouds) -> str:
 
 
 def made(clouds: Clouds) -> str:
-    """Changes when the radar, the rung or anything else changes that clouds of the same intervals are made by."""
+    """Changes when the radar, the model or anything else changes that clouds of the same intervals are made by."""
     columns = []
     for name in _MADE:
         with suppress(KeyError, InputError):

@@ -1,11 +1,11 @@
-"""``rtradar run`` and ``rtradar compare``: one recording, by one rung or by several."""
+"""``rtradar run`` and ``rtradar compare``: one recording, by one model or by several."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import decibels, number, path, seconds, whole
+from rtradar.cli.values import decibels, number, path, seconds, setting, whole
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS
 from rtradar.system.files import check_place, write_json
@@ -32,6 +32,14 @@ def add(commands: Subcommands) -> None:
         "--tolerance-complex", type=number, metavar="X", help="of auto: rms error of the field that will do, over its rms"
     )
     run.add_argument(
+        "--model-option",
+        type=setting,
+        action="append",
+        default=[],
+        metavar="NAME=VALUE",
+        help="setting of the fidelity level, such as shadow_rays=256 of fresnel; may be given again",
+    )
+    run.add_argument(
         "--clutter-removal",
         choices=("none", "mean", "exponential", "mti"),
         default="none",
@@ -47,7 +55,7 @@ def add(commands: Subcommands) -> None:
     _add_capture(run)
     run.set_defaults(command=_run)
 
-    compare = commands.add_parser("compare", help="one recording by several rungs, with the same noise, and what differs")
+    compare = commands.add_parser("compare", help="one recording by several models, with the same noise, and what differs")
     compare.add_argument(
         "--fidelities",
         default="analytic-paper,analytic,specular",
@@ -103,13 +111,15 @@ def _run(options: argparse.Namespace) -> int:
     capture = _capture(options)
     from rtradar.pipeline import run
 
-    dials = {name: getattr(options, name) for name in ("tolerance_db", "tolerance_complex")}
-    dials = {name: value for name, value in dials.items() if value is not None}
+    model_options = dict(options.model_option)
+    for name in ("tolerance_db", "tolerance_complex"):
+        if getattr(options, name) is not None:
+            model_options[name] = getattr(options, name)
     result = run(
         **capture,
         fidelity=options.fidelity,
         save_if=options.save_if,
-        dials=dials,
+        model_options=model_options,
         clutter_removal=options.clutter_removal,
         body_material=options.body_material,
         order=options.order,

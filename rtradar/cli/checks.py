@@ -26,16 +26,16 @@ def add(commands: Subcommands) -> None:
     validate.add_argument("--readme", type=path, metavar="FILE", help="replace the table of figures in this markdown file")
     validate.set_defaults(command=_validate)
 
-    bench = commands.add_parser("bench", help="how long every stage takes, beside other rungs, the paper's method and floors")
+    bench = commands.add_parser("bench", help="how long every stage takes, beside other models, the paper's method and floors")
     bench.add_argument("--radar", metavar="A,B,...", help="presets or TOML files (default: both presets; with --quick the first)")
     bench.add_argument(
         "--fidelity",
         metavar="A,B,...",
-        help="rungs (default: analytic-paper,analytic,specular,fresnel,physical-optics; with --quick without the last two)",
+        help="models (default: analytic-paper,analytic,specular,fresnel,physical-optics; with --quick without the last two)",
     )
     bench.add_argument("--repeats", type=whole, metavar="N", help="of each measurement (default: 3; with --quick 1)")
     bench.add_argument("--duration", type=seconds, metavar="S", help="of the capture [s] (default: 3; with --quick 0.5)")
-    bench.add_argument("--only", metavar="PART", help="rungs (with the paper's method and floors), or growth")
+    bench.add_argument("--only", metavar="PART", help="models (with the paper's method and floors), or growth")
     bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
     bench.add_argument("--json", type=path, metavar="FILE", help="write all that is measured there as JSON")
     bench.add_argument("--figure", type=path, metavar="FILE", help="draw it there, as PNG")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
@@ -32,6 +33,19 @@ def number(text: str) -> float:
     if not math.isfinite(value):
         raise ValueError
     return value
+
+
+def setting(text: str) -> tuple[str, bool | int | float | str]:
+    """A name and its value: a number, true, false, or a word."""
+    name, equals, value = text.partition("=")
+    if not (name.isidentifier() and equals and value):
+        raise argparse.ArgumentTypeError(f"{text!r} must be NAME=VALUE, such as shadow_rays=256")
+    if value in ("true", "false"):
+        return name, value == "true"
+    for kind in (int, number):
+        with suppress(ValueError):
+            return name, kind(value)
+    return name, value
 
 
 def seconds(text: str) -> float:

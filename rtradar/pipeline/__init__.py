@@ -1,4 +1,4 @@
-"""The whole chain: a recording in, maps and clouds out, streamed; and several rungs of the ladder side by side."""
+"""The whole chain: a recording in, maps and clouds out, streamed; and several echo models side by side."""
 
 from rtradar.pipeline.chain import Result, run
 from rtradar.pipeline.clouds_alone import clouds_of

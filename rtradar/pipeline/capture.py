@@ -19,7 +19,7 @@ from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
 from rtradar.process import FftDevices, range_spectrum, with_cpu_fallback
 from rtradar.radar import Radar
-from rtradar.scatter import Rung
+from rtradar.scatter import EchoModel
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.system.files import uninterruptible
 
@@ -43,7 +43,7 @@ class Capture:
         Where it stands in the scene.
     body : Body
         Where it moves in the scene.
-    rung : Rung
+    model : EchoModel
     inside : Indoors, optional
         The room, where the scene has one.
     survey : Survey
@@ -66,7 +66,7 @@ class Capture:
 
     radar: Radar
     body: Body
-    rung: Rung
+    model: EchoModel
     inside: Indoors | None
     survey: Survey
     warned: tuple[str, ...]
@@ -124,7 +124,7 @@ class Capture:
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):
-                echoes = self.rung.echoes(chirps)
+                echoes = self.model.echoes(chirps)
             for begin in range(0, len(chirps), piece):
                 taker.take(spectra(chirps_of(echoes, begin, begin + piece), int(chirps[begin])), int(chirps[begin]))
 

@@ -1,4 +1,4 @@
-"""`run`: one recording, one radar, one scene, one rung, streamed from motion to point cloud."""
+"""`run`: one recording, one radar, one scene, one model, streamed from motion to point cloud."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def run(
     spreading: bool = True,
     save_if: bool = False,
     noise_power_m2: float | None = None,
-    dials: Mapping[str, Any] | None = None,
+    model_options: Mapping[str, Any] | None = None,
     clutter_removal: str = "none",
     body_material: str = "perfect-conductor",
     order: int = 1,
@@ -98,7 +98,7 @@ def run(
         Folder, which is made if it is not there. The files of an earlier run that its ``summary.json`` lists are replaced or
         removed; all others stay as they are.
     fidelity : str
-        The rung; `rtradar.scatter.RUNGS` has their names.
+        The model; `rtradar.scatter.MODELS` has their names.
     start_s, duration_s : float
         Interval of the recording [s]; to its end if no duration is given.
     heading_deg : float
@@ -111,7 +111,7 @@ def run(
     seed : int
         Of noise and of the cloud's sampling.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend, for rungs that trace; ``cpu`` is llvm, or scalar where that does not work. ``auto`` takes a GPU, for
+        Mitsuba's backend, for models that trace; ``cpu`` is llvm, or scalar where that does not work. ``auto`` takes a GPU, for
         rays and for FFTs, where it was just measured to be faster, ``cuda`` takes it for rays in any case.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2); off as in the paper.
@@ -119,8 +119,8 @@ def run(
         Whether IF samples are kept, in ``if.zarr``.
     noise_power_m2 : float, optional
         Noise power per sample [m^2], in place of ``snr_db``: for runs that shall share it.
-    dials : mapping, optional
-        Of the rung, such as ``{"shadow_rays": 256}`` of ``fresnel``; its class documents them.
+    model_options : mapping, optional
+        Of the model, such as ``{"shadow_rays": 256}`` of ``fresnel``; its class documents them.
     clutter_removal : {"none", "mean", "exponential", "mti"}
         What takes static clutter out before Doppler; `rtradar.process.clutter` tells of each.
     body_material : {"perfect-conductor", "skin"}
@@ -143,7 +143,7 @@ def run(
     InputError
         Where something given has no meaning; nothing is written then.
     BackendError
-        Where the rung traces and no backend of the kind asked for works.
+        Where the model traces and no backend of the kind asked for works.
     ExtensionError
         Where something of another package fails.
     """
@@ -169,7 +169,7 @@ def run(
         variant=variant,
         spreading=spreading,
         noise_power_m2=noise_power_m2,
-        dials=dials,
+        model_options=model_options,
         body_material=body_material,
         order=order,
         keep_all=keep_all,
@@ -224,7 +224,7 @@ def run(
             "pfa": pfa,
             "variant": variant,
             "spreading": spreading,
-            "dials": dict(dials or {}),
+            "dials": dict(model_options or {}),
             "clutter_removal": clutter_removal,
             "body_material": body_material,
             "order": order,
@@ -234,9 +234,9 @@ def run(
             "radar": dataclasses.asdict(radar),
         }
         summary = summary_of(capture, clouds, parameters, seed, spent())
-        # After the rung has given its account, for looking at it once more is no part of the capture.
+        # After the model has given its account, for looking at it once more is no part of the capture.
         with stages.time("view"):
-            save_moments(folder / "view.npz", moments(capture.rung, radar, body, scene, windows, n_chirps))
+            save_moments(folder / "view.npz", moments(capture.model, radar, body, scene, windows, n_chirps))
         with stages.time("report"):
             write_report(
                 folder / "report.html",

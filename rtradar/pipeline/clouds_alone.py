@@ -63,7 +63,7 @@ def clouds_of(
         variant="cpu",  # workers share the cores, and a sample is the same to the byte whatever else its machine has
         spreading=True,
         noise_power_m2=None,
-        dials=None,
+        model_options=None,
         body_material="perfect-conductor",
         order=1,
         keep_all=False,

@@ -1,4 +1,4 @@
-"""`compare`: one recording by several rungs of the ladder, with the same noise, and how far apart they end."""
+"""`compare`: one recording by several echo models, with the same noise, and how far apart they end."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rtradar.radar import Radar
 from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.figures.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
 from rtradar.report.pages.comparison import write_comparison
-from rtradar.scatter import RUNGS
+from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.system.output_folder import atomic_folder
 
@@ -44,7 +44,7 @@ _MEASURES = (
     ("real_time_factor", "Seconds a second of radar", 2),
     ("peak_memory_mb", "Peak memory [MB]", 0),
 )
-"""What is told of each rung, in the order of the chain; differences are to the last rung named."""
+"""What is told of each model, in the order of the chain; differences are to the last model named."""
 
 
 @dataclass(frozen=True)
@@ -56,14 +56,14 @@ class Comparison:
     summary : dict
         All that stands in ``compare.json``.
     out : path
-        Folder of the files; the run of each rung is in a folder of its name.
+        Folder of the files; the run of each model is in a folder of its name.
     """
 
     summary: dict[str, Any]
     out: Path
 
     def table(self) -> str:
-        """The figures of each rung, aligned, a column a rung."""
+        """The figures of each model, aligned, a column a model."""
         rows = comparison_rows(self.summary)
         widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
         return "\n".join(
@@ -82,10 +82,10 @@ def compare(
     overwrite: bool = False,
     **options: Any,
 ) -> Comparison:
-    """Run several rungs on the same recording and say what differs.
+    """Run several models on the same recording and say what differs.
 
-    All runs have the same noise, sample by sample: that of the first rung, whose echo ``snr_db`` is relative to. The last
-    rung named is the reference.
+    All runs have the same noise, sample by sample: that of the first model, whose echo ``snr_db`` is relative to. The last
+    model named is the reference.
 
     Parameters
     ----------
@@ -94,9 +94,9 @@ def compare(
     scene : Scene, optional
         Free space if left out.
     out : path
-        Folder; a run of each rung in a folder of its name, and ``compare.json``, ``compare.html`` and pictures.
+        Folder; a run of each model in a folder of its name, and ``compare.json``, ``compare.html`` and pictures.
     fidelities : sequence of str
-        Two rungs or more, each once; `rtradar.scatter.RUNGS` has their names.
+        Two models or more, each once; `rtradar.scatter.MODELS` has their names.
     overwrite : bool
         Whether files that ``out`` holds under names of the new ones are replaced even where no ``compare.json`` lists them.
     **options
@@ -109,17 +109,17 @@ def compare(
     Raises
     ------
     InputError
-        Where fewer than two rungs are named, one twice, or one that does not exist; and as in `run`.
+        Where fewer than two models are named, one twice, or one that does not exist; and as in `run`.
     BackendError
         As in `run`.
     """
     names = list(fidelities)
     for name in names:
-        if name not in RUNGS:
-            raise InputError(f"fidelity '{name}' is unknown; allowed: {', '.join(RUNGS)} (--fidelities)")
+        if name not in MODELS:
+            raise InputError(f"fidelity '{name}' is unknown; allowed: {', '.join(MODELS)} (--fidelities)")
     if len(names) < 2 or len(set(names)) < len(names):
         raise InputError(f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)")
-    kind = comparison_files(list(RUNGS))
+    kind = comparison_files(list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         for name in names:
@@ -136,7 +136,7 @@ def compare(
 
 
 def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
-    """The table of a comparison as text: a heading row, then a row a measure, with a column a rung."""
+    """The table of a comparison as text: a heading row, then a row a measure, with a column a model."""
     fidelities = summary["fidelities"]
     rows = [["", *(f"{name} (reference)" if name == summary["reference"] else name for name in fidelities)]]
     for key, heading, digits in _MEASURES:
@@ -158,7 +158,7 @@ def _summary(results: Mapping[str, Result], folder: Path, radar: Radar, referenc
 
 
 def _of_one(result: Result, reference: Result, folder: Path, radar: Radar) -> dict[str, Any]:
-    """Every figure of one rung; differences from itself are zero, which tells that the comparison works."""
+    """Every figure of one model; differences from itself are zero, which tells that the comparison works."""
     said, cost = result.summary, result.summary["stages"]
     power = _level_db(result.survey.power_at.sum(axis=1)) - _level_db(reference.survey.power_at.sum(axis=1))
     maps, shared, spectrogram = _map_agreement(folder / said["fidelity"], folder / reference.summary["fidelity"])

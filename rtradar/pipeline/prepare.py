@@ -20,7 +20,7 @@ from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.process import FftDevices, fastest_fft_devices
 from rtradar.radar import Radar
-from rtradar.scatter import Rung, build_rung, takes_backend
+from rtradar.scatter import EchoModel, build_model, takes_backend
 from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scatter.specular_point.solver import mirror
@@ -49,12 +49,12 @@ def prepare(
     variant: str,
     spreading: bool,
     noise_power_m2: float | None,
-    dials: Mapping[str, Any] | None,
+    model_options: Mapping[str, Any] | None,
     body_material: str,
     order: int,
     keep_all: bool,
 ) -> Capture:
-    """Place a person before a radar, build the rung, survey its echoes, and trace the room.
+    """Place a person before a radar, build the model, survey its echoes, and trace the room.
 
     Parameters are those of `rtradar.run`, and so are the errors.
     """
@@ -82,24 +82,26 @@ def prepare(
             )
         warm = time.perf_counter()
         paths: Multipath | None = None
-        rung: Rung
+        model: EchoModel
         if walled:
             if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
                 raise InputError(
                     f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths over walls, whose "
                     "directions at the antennas are not followed; take free-space, or antennas with pattern = 'isotropic'"
                 )
-            if dials:
-                raise InputError(f"fidelity '{fidelity}' has no dial '{next(iter(dials))}' in scene '{scene.name}'; leave it out")
+            if model_options:
+                raise InputError(
+                    f"fidelity '{fidelity}' has no option '{next(iter(model_options))}' in scene '{scene.name}'; leave it out"
+                )
             paths = Multipath(
                 radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
             )
-            rung = paths.person
+            model = paths.person
         else:
             of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
-            rung = build_rung(fidelity, radar, body, variant=variant, spreading=spreading, **(dials or {}), **of_skin)
-        echoes = (paths or rung).echoes(np.arange(2 * radar.n_tx))
-        # Not every rung has specular points; the report shows them of all.
+            model = build_model(fidelity, radar, body, variant=variant, spreading=spreading, **(model_options or {}), **of_skin)
+        echoes = (paths or model).echoes(np.arange(2 * radar.n_tx))
+        # Not every model has specular points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
     warm_up_processing(echoes, radar)
     # Who names a backend of the CPU wants the work done there.
@@ -108,7 +110,7 @@ def prepare(
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
-        surveyed = survey(rung, radar, body, n_chirps, spreading=spreading, scene=scene)
+        surveyed = survey(model, radar, body, n_chirps, spreading=spreading, scene=scene)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     if noise_power_m2 is not None:
@@ -133,11 +135,11 @@ def prepare(
                 noise_power_m2=noise.power,
                 keep_all=keep_all,
             )
-        rung = inside.rung
+        model = inside.model
     return Capture(
         radar=radar,
         body=body,
-        rung=rung,
+        model=model,
         inside=inside,
         survey=surveyed,
         warned=tuple(str(warning.message) for warning in caught),

@@ -15,7 +15,7 @@ from rtradar.pipeline.rooms.inside_walls import Inside
 from rtradar.process.angles.spectra import folded_angle_deg
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
-from rtradar.scatter import Rung
+from rtradar.scatter import EchoModel
 from rtradar.scatter.common.poses import anchor_step
 from rtradar.scene import Scene
 from rtradar.signal import in_band
@@ -79,19 +79,21 @@ class Survey:
     limits: tuple[Limit, ...]
 
 
-def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bool = True, scene: Scene | None = None) -> Survey:
+def survey(
+    model: EchoModel, radar: Radar, body: Body, n_chirps: int, *, spreading: bool = True, scene: Scene | None = None
+) -> Survey:
     """Look at one chirp every 10 ms.
 
     Parameters
     ----------
-    rung : Rung
+    model : EchoModel
         Of this body and radar.
     radar : Radar
     body : Body
     n_chirps : int
         In the capture.
     spreading : bool
-        As of the rung; only for the reference where nobody is visible.
+        As of the model; only for the reference where nobody is visible.
     scene : Scene, optional
         What the person must not stand in; nothing if left out.
 
@@ -121,7 +123,7 @@ def survey(rung: Rung, radar: Radar, body: Body, n_chirps: int, *, spreading: bo
         chosen = chirps[first : first + _CHIRPS_AT_ONCE]
         times = np.minimum(radar.centres_of(chosen), body.duration_s)
         _refuse_too_near(radar, body, times)
-        echoes = rung.echoes(chosen)
+        echoes = model.echoes(chosen)
         power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
         inside = in_band(echoes, radar)
         seen_in_band |= bool(inside.any())

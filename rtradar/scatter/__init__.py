@@ -1,17 +1,17 @@
-"""The fidelity ladder: from a posed body to `Echoes`, one module a rung."""
+"""Echo models: from a posed body to `Echoes`."""
 
-from rtradar.scatter.common.poses import Accountable, Rung, chirp_poses, one_echo_a_part
-from rtradar.scatter.echo_models import RUNGS, build_rung, register_rung, takes_backend
+from rtradar.scatter.common.poses import Accountable, EchoModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.echo_models import MODELS, build_model, register_model, takes_backend
 from rtradar.scatter.scattering_length import scattering_length
 
 __all__ = [
-    "RUNGS",
+    "MODELS",
     "Accountable",
-    "Rung",
-    "build_rung",
+    "EchoModel",
+    "build_model",
     "chirp_poses",
     "one_echo_a_part",
-    "register_rung",
+    "register_model",
     "scattering_length",
     "takes_backend",
 ]

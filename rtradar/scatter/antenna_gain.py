@@ -1,4 +1,4 @@
-"""Echoes through antennas that do not look everywhere alike: any rung, weighted by the directions of its legs."""
+"""Echoes through antennas that do not look everywhere alike: any model, weighted by the directions of its legs."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import Accountable, ChirpPoses, Rung, chirp_poses
+from rtradar.scatter.common.poses import Accountable, ChirpPoses, EchoModel, chirp_poses
 
 
 def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
@@ -41,10 +41,10 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
     return gain
 
 
-def through_antennas(rung: Rung, radar: Radar, body: Body) -> Rung:
-    """The rung as the radar's antennas let it through; itself where they look everywhere alike."""
+def through_antennas(model: EchoModel, radar: Radar, body: Body) -> EchoModel:
+    """The model as the radar's antennas let it through; itself where they look everywhere alike."""
     shaped = is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna)
-    return _ThroughAntennas(rung, radar, body) if shaped else rung
+    return _ThroughAntennas(model, radar, body) if shaped else model
 
 
 def is_shaped(antenna: Antenna | None) -> bool:
@@ -57,15 +57,15 @@ class _ThroughAntennas:
 
     account: Callable[[], dict[str, Any]]
 
-    def __init__(self, rung: Rung, radar: Radar, body: Body) -> None:
-        self._rung, self._radar, self._body = rung, radar, body
-        self.variant = rung.variant
-        if isinstance(rung, Accountable):
-            self.account = rung.account
+    def __init__(self, model: EchoModel, radar: Radar, body: Body) -> None:
+        self._model, self._radar, self._body = model, radar, body
+        self.variant = model.variant
+        if isinstance(model, Accountable):
+            self.account = model.account
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
-        echoes = self._rung.echoes(chirps)
+        echoes = self._model.echoes(chirps)
         gain = leg_gain(self._radar, chirp_poses(self._radar, self._body, chirps))
         return dataclasses.replace(echoes, amplitude=echoes.amplitude * gain[..., echoes.part])
 

@@ -1,4 +1,4 @@
-"""The fidelity ladder: rungs by their names."""
+"""The echo models by their names."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.antenna_gain import through_antennas
-from rtradar.scatter.common.poses import Accountable, Rung
+from rtradar.scatter.common.poses import Accountable, EchoModel
 from rtradar.system.registry import Registry
 
-RUNGS = Registry(
-    "rtradar.rungs",
+MODELS = Registry(
+    "rtradar.models",
     "fidelity",
     {
         "analytic-paper": "rtradar.scatter.models.analytic:analytic_paper",
@@ -32,105 +32,107 @@ RUNGS = Registry(
         "auto": "rtradar.scatter.models.auto:Auto",
     },
 )
-"""Every rung, cheapest first, the one that chooses among them, and those of other packages."""
+"""Every model, cheapest first, the one that chooses among them, and those of other packages."""
 
-register_rung = RUNGS.register
+register_model = MODELS.register
 
 _COMMON = ("radar", "body", "variant", "spreading")
 
 
-def build_rung(fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **dials: Any) -> Rung:
-    """The rung of that name, for this body and radar, through the radar's antennas.
+def build_model(
+    fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **model_options: Any
+) -> EchoModel:
+    """The model of that name, for this body and radar, through the radar's antennas.
 
     Parameters
     ----------
     fidelity : str
-        One of `RUNGS`.
+        One of `MODELS`.
     radar : Radar
     body : Body
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend, for rungs that trace.
+        Mitsuba's backend, for models that trace.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
-    **dials
-        Of the rung, such as ``shadow_rays`` of ``fresnel``; its class documents them.
+    **model_options
+        Of the model, such as ``shadow_rays`` of ``fresnel``; its class documents them.
 
     Returns
     -------
-    Rung
+    EchoModel
 
     Raises
     ------
     InputError
-        Where there is no such rung, or it has no such dial.
+        Where there is no such model, or it has no such option.
     BackendError
         Where it traces and no backend of that kind works here.
     ExtensionError
         Where it is of another package, and fails.
     """
-    kind = RUNGS.find(fidelity)
-    with RUNGS.guarded(fidelity):
+    kind = MODELS.find(fidelity)
+    with MODELS.guarded(fidelity):
         taken = inspect.signature(kind).parameters
         known = [name for name in taken if name not in _COMMON]
-        for dial in dials:
-            if dial not in known:
-                raise InputError(f"fidelity '{fidelity}' has no dial '{dial}'; it has: {', '.join(known) or 'none'}")
+        for option in model_options:
+            if option not in known:
+                raise InputError(f"fidelity '{fidelity}' has no option '{option}'; it has: {', '.join(known) or 'none'}")
         # What traces nothing takes no backend.
         backend = {"variant": variant} if takes_backend(fidelity) else {}
-        rung: Rung = kind(radar, body, spreading=spreading, **backend, **dials)
-    return through_antennas(rung if fidelity in RUNGS.built_in else _Checked(fidelity, rung, radar, body), radar, body)
+        model: EchoModel = kind(radar, body, spreading=spreading, **backend, **model_options)
+    return through_antennas(model if fidelity in MODELS.built_in else _Checked(fidelity, model, radar, body), radar, body)
 
 
 def takes_backend(fidelity: str) -> bool:
-    """Whether the rung of that name asks Mitsuba.
+    """Whether the model of that name asks Mitsuba.
 
     Parameters
     ----------
     fidelity : str
-        One of `RUNGS`.
+        One of `MODELS`.
 
     Returns
     -------
     bool
     """
-    kind = RUNGS.find(fidelity)
-    with RUNGS.guarded(fidelity):
+    kind = MODELS.find(fidelity)
+    with MODELS.guarded(fidelity):
         return "variant" in inspect.signature(kind).parameters
 
 
 class _Checked:
-    """A rung of another package, which must give what the rest relies on."""
+    """A model of another package, which must give what the rest relies on."""
 
     account: Callable[[], dict[str, Any]]
 
-    def __init__(self, name: str, rung: Rung, radar: Radar, body: Body) -> None:
-        self._name, self._rung, self._radar, self._parts = name, rung, radar, len(body.part_names)
-        with RUNGS.guarded(name):
-            self.variant: str | None = getattr(rung, "variant", None)
-            if isinstance(rung, Accountable):
+    def __init__(self, name: str, model: EchoModel, radar: Radar, body: Body) -> None:
+        self._name, self._model, self._radar, self._parts = name, model, radar, len(body.part_names)
+        with MODELS.guarded(name):
+            self.variant: str | None = getattr(model, "variant", None)
+            if isinstance(model, Accountable):
                 self.account = self._account
         if not isinstance(self.variant, str | None):
-            raise RUNGS.refuse(name, f"has a variant that is a {type(self.variant).__name__}, not a string or None")
+            raise MODELS.refuse(name, f"has a variant that is a {type(self.variant).__name__}, not a string or None")
 
     def _account(self) -> dict[str, Any]:
-        with RUNGS.guarded(self._name):
-            told: dict[str, Any] = self._rung.account()  # type: ignore[attr-defined]
+        with MODELS.guarded(self._name):
+            told: dict[str, Any] = self._model.account()  # type: ignore[attr-defined]
             json.dumps(told, allow_nan=False)  # as it will be written
         return told
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
-        with RUNGS.guarded(self._name):
-            found = self._rung.echoes(chirps)
+        with MODELS.guarded(self._name):
+            found = self._model.echoes(chirps)
         if not isinstance(found, Echoes):
-            raise RUNGS.refuse(self._name, f"gave a {type(found).__name__}, not Echoes")
+            raise MODELS.refuse(self._name, f"gave a {type(found).__name__}, not Echoes")
         expected = len(chirps), self._radar.n_rx
         if found.length.shape[:2] != expected:
-            raise RUNGS.refuse(self._name, f"gave lengths of shape {found.length.shape}, not {expected} and echoes")
+            raise MODELS.refuse(self._name, f"gave lengths of shape {found.length.shape}, not {expected} and echoes")
         if not np.array_equal(found.tx, self._radar.tx_of_chirp(chirps)):
-            raise RUNGS.refuse(self._name, "named other Tx than those of its chirps (radar.tx_of_chirp)")
+            raise MODELS.refuse(self._name, "named other Tx than those of its chirps (radar.tx_of_chirp)")
         if len(found.part) and not 0 <= found.part.min() <= found.part.max() < self._parts:
-            raise RUNGS.refuse(self._name, f"named parts outside 0 to {self._parts - 1}")
+            raise MODELS.refuse(self._name, f"named parts outside 0 to {self._parts - 1}")
         if not (np.isfinite(found.length).all() and np.isfinite(found.amplitude).all()):
-            raise RUNGS.refuse(self._name, "gave lengths or amplitudes that are not finite")
+            raise MODELS.refuse(self._name, "gave lengths or amplitudes that are not finite")
         return found

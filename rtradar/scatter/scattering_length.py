@@ -24,7 +24,7 @@ Field = Callable[..., NDArray[np.complex128]]
 
 
 class _Home(NamedTuple):
-    """Where the field of a rung is computed: module and function within this package; whether it takes meshes, and traces."""
+    """Where the field of a model is computed: module and function within this package; whether it takes meshes, and traces."""
 
     module: str
     function: str
@@ -50,14 +50,14 @@ def scattering_length(
     frequency: ArrayLike,
     fidelity: str = "specular",
     polarization: Literal["v", "h"] = "v",
-    **dials: Any,
+    **model_options: Any,
 ) -> NDArray[np.complex128]:
     """Co-polar scattering length of a target between each Tx and Rx.
 
     Parameters
     ----------
     target : Ellipsoids or trimesh.Trimesh
-        Its parts hide each other where the rung traces, and of parts that fill the same place one counts. Meshes, of perfect
+        Its parts hide each other where the model traces, and of parts that fill the same place one counts. Meshes, of perfect
         conductors, are for ``physical-optics``, ``reference`` (the same here, where nothing is interpolated) and ``rays``; an
         open mesh is a thin sheet.
     tx, rx : (n, 3) array_like
@@ -65,11 +65,11 @@ def scattering_length(
     frequency : float or (n,) array_like
         [Hz].
     fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}
-        The rung.
+        The model.
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
-    **dials
-        Of the rung: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
+    **model_options
+        Of the model: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
         ``facets`` of ``physical-optics`` and ``reference``, ``rays_per_wavelength`` and ``bounces`` of ``rays``.
 
     Returns
@@ -82,7 +82,7 @@ def scattering_length(
     ------
     InputError
         Where shapes do not fit, an antenna is inside the target, a mesh cannot be used (`rtradar.scatter.target_mesh`), or the
-        rung or a dial is unknown.
+        model or an option is unknown.
 
     Notes
     -----
@@ -104,17 +104,17 @@ def scattering_length(
     # On use: what traces brings Mitsuba.
     field: Field = getattr(import_module(f"rtradar.scatter.{home.module}"), home.function)
     known = [name for name in inspect.signature(field).parameters if name not in _COMMON]
-    for dial in dials:
-        if dial not in known:
+    for option in model_options:
+        if option not in known:
             allowed = ", ".join(known) or "none"
-            raise InputError(f"scattering_length: '{fidelity}' has no dial '{dial}'; it has: {allowed}")
+            raise InputError(f"scattering_length: '{fidelity}' has no option '{option}'; it has: {allowed}")
     if isinstance(target, Ellipsoids) and home.hides:
         target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
         _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
         wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
         warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
-    return field(target, tx_array, rx_array, frequencies, polarization=polarization, **dials)
+    return field(target, tx_array, rx_array, frequencies, polarization=polarization, **model_options)
 
 
 def _analytic_field(

@@ -1,4 +1,4 @@
-"""The one check of meshes whose scattering length is asked for, whatever the rung."""
+"""The one check of meshes whose scattering length is asked for, whatever the model."""
 
 from __future__ import annotations
 

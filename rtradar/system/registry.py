@@ -1,4 +1,4 @@
-"""What has a name on the command line and may come from other packages: rungs, motion readers, radars and detectors.
+"""What has a name on the command line and may come from other packages: models, motion readers, radars and detectors.
 
 Each kind has one `Registry`. What comes with rtradar stands in it by the place of its code, loaded on use; other packages add
 theirs by an entry point of the registry's group, found when a name is asked for; a running program adds its own by `register`.
@@ -23,7 +23,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
     Parameters
     ----------
     group : str
-        Of the entry points that add to it, such as ``rtradar.rungs``.
+        Of the entry points that add to it, such as ``rtradar.models``.
     noun : str
         What one is called in messages.
     built_in : mapping

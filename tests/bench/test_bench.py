@@ -60,13 +60,13 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
 
 
 def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2", "--only", "rungs"]
+    words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2", "--only", "models"]
     assert main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
     found = json.loads((tmp_path / "b.json").read_text())
-    assert list(found) == ["settings", "machine", "rates", "rungs", "paper", "growth"]
+    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
     assert found["settings"]["repeats"] == 2
     assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
-    rows = found["rungs"]
+    rows = found["models"]
     assert [(row["radar"], row["fidelity"], row["cores"]) for row in rows] == [
         *((radar, fidelity, "all") for radar in ("paper-12ghz", "paper-77ghz") for fidelity in found["settings"]["fidelities"]),
         ("paper-12ghz", "analytic-paper", "one"),
@@ -96,8 +96,8 @@ def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path
     assert said.err == ""  # no progress bar where there is no terminal
 
 
-def test_rungs_take_turns_after_their_first_use(machine: list[Case], capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--radar", "paper-12ghz", "--fidelity", "analytic,specular", "--repeats", "2", "--only", "rungs"]
+def test_models_take_turns_after_their_first_use(machine: list[Case], capsys: pytest.CaptureFixture[str]) -> None:
+    words = ["--radar", "paper-12ghz", "--fidelity", "analytic,specular", "--repeats", "2", "--only", "models"]
     assert main(["bench", *words]) == 0
     assert [case.fidelity for case in machine] == ["analytic", "specular"] * 3
 
@@ -124,9 +124,9 @@ def test_without_the_validation_scripts_the_table_says_so(
 ) -> None:
     monkeypatch.setattr(rtradar.bench, "measure_baseline", paper.measure_baseline)
     monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
-    assert main(["bench", "--quick", "--only", "rungs", "--json", str(tmp_path / "b.json")]) == 0
+    assert main(["bench", "--quick", "--only", "models", "--json", str(tmp_path / "b.json")]) == 0
     assert "the paper's method was not timed: there is no paper_numpy.py" in capsys.readouterr().out
-    assert json.loads((tmp_path / "b.json").read_text())["rungs"][0]["paper_over"] is None
+    assert json.loads((tmp_path / "b.json").read_text())["models"][0]["paper_over"] is None
 
 
 def test_the_baseline_is_timed_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench.plan import Case, Plan, plan_of, rung_cases
+from rtradar.bench.plan import Case, Plan, model_cases, plan_of
 from rtradar.cli import main
 
 
@@ -15,14 +15,14 @@ def test_quick_is_less_of_everything_unless_asked_for() -> None:
     assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0, 60.0)
 
 
-def test_growth_is_of_specular_or_of_the_last_rung() -> None:
+def test_growth_is_of_specular_or_of_the_last_model() -> None:
     assert Plan().growing_fidelity == "specular"
     assert Plan(fidelities=("analytic", "fresnel")).growing_fidelity == "fresnel"
 
 
-def test_every_rung_with_every_radar_and_the_papers_on_one_core() -> None:
+def test_every_model_with_every_radar_and_the_papers_on_one_core() -> None:
     plan = Plan(("paper-12ghz", "paper-77ghz"), ("analytic-paper", "specular"), duration_s=1.0)
-    cases = rung_cases(plan, one_core=True)
+    cases = model_cases(plan, one_core=True)
     assert [(case.radar[6:8], case.fidelity) for case in cases[:4]] == [
         ("12", "analytic-paper"),
         ("12", "specular"),
@@ -30,8 +30,8 @@ def test_every_rung_with_every_radar_and_the_papers_on_one_core() -> None:
         ("77", "specular"),
     ]
     assert cases[4:] == [Case("paper-12ghz", "analytic-paper", 1.0, one_core=True)]
-    assert rung_cases(plan, one_core=False) == cases[:4]
-    assert not any(case.one_core for case in rung_cases(Plan(fidelities=("specular",)), one_core=True))
+    assert model_cases(plan, one_core=False) == cases[:4]
+    assert not any(case.one_core for case in model_cases(Plan(fidelities=("specular",)), one_core=True))
 
 
 @pytest.mark.parametrize(
@@ -40,11 +40,11 @@ def test_every_rung_with_every_radar_and_the_papers_on_one_core() -> None:
         (["--radar", "paper-60ghz"], "radar 'paper-60ghz' is unknown; allowed"),
         (["--radar", "paper-12ghz,"], "--radar paper-12ghz,: name each once"),
         (["--fidelity", "specular,specular"], "--fidelity specular,specular: name each once"),
-        (["--fidelity", "exact"], "--fidelity exact: there is no such rung; allowed: analytic-paper"),
+        (["--fidelity", "exact"], "--fidelity exact: there is no such model; allowed: analytic-paper"),
         (["--repeats", "0"], "--repeats 0: it must be a whole number, at least 1"),
         (["--repeats", "some"], "invalid whole number"),
         (["--duration", "0.05"], "--duration 0.05: it holds no whole frame of radar 'paper-12ghz'; give at least 0.1 s"),
-        (["--only", "floors"], "--only floors: there is no such part; allowed: rungs, growth"),
+        (["--only", "floors"], "--only floors: there is no such part; allowed: models, growth"),
         (["--json", "nowhere/b.json"], "--json nowhere/b.json: there is no folder"),
         (["--figure", "nowhere/b.png"], "--figure nowhere/b.png: there is no folder"),
     ],

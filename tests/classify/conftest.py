@@ -14,7 +14,7 @@ LABELS = ("kick", "punch", "walk")
 
 
 class MadeUpClouds:
-    """Each motion is seen ``views`` times, by one rung after the other; a recording shows one motion."""
+    """Each motion is seen ``views`` times, by one model after the other; a recording shows one motion."""
 
     def __init__(self, *, per_class: int = 6, views: int = 1, n_points: int = 48, subjects: int = 3, seed: int = 0) -> None:
         self._n_points, self._seed = n_points, seed

@@ -46,7 +46,7 @@ def test_other_clouds_are_refused(made_up: Callable[..., Any]) -> None:
         judge_baselines(made_up(per_class=4), study_of(made_up(per_class=5)))
 
 
-def test_clouds_of_the_same_intervals_by_another_rung_are_refused(made_up: Callable[..., Any]) -> None:
+def test_clouds_of_the_same_intervals_by_another_model_are_refused(made_up: Callable[..., Any]) -> None:
     clouds, others = made_up(), made_up()
     for row in others.rows:
         row["fidelity"] = "specular"

@@ -70,7 +70,7 @@ def test_a_trained_network_can_be_asked_about_other_clouds(trained: Path, made_u
         load_network(trained, 3)
 
 
-def test_every_rung_is_asked_by_every_other(collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_model_is_asked_by_every_other(collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert rtradar("train", collection, "--out", tmp_path, *TINY, "--split", "across:fidelity") == 0
     assert rtradar("evaluate", tmp_path) == 0
     assert "trained on" in capsys.readouterr().out

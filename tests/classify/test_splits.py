@@ -38,7 +38,7 @@ class Table:
 
 @st.composite
 def tables(draw: st.DrawFn) -> Table:
-    """Recordings of one subject, label and source each, with intervals that may be the same or overlap, seen by several rungs."""
+    """Recordings of one subject, label and source each; intervals may be the same or overlap, and several models see them."""
     rows = []
     for number in range(draw(st.integers(4, 14))):
         recording = {

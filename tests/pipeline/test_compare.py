@@ -1,4 +1,4 @@
-"""Several rungs side by side: the same noise, and differences that are there or are not."""
+"""Several models side by side: the same noise, and differences that are there or are not."""
 
 from __future__ import annotations
 
@@ -18,13 +18,13 @@ RADAR = rt.Radar(
     name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
 )
 MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
-RUNGS = ("analytic-paper", "analytic", "specular")
+MODELS = ("analytic-paper", "analytic", "specular")
 
 
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> rt.Comparison:
     return rt.compare(
-        MOTION, RADAR, out=tmp_path_factory.mktemp("compare") / "out", fidelities=RUNGS, duration_s=0.3, start_s=0.4
+        MOTION, RADAR, out=tmp_path_factory.mktemp("compare") / "out", fidelities=MODELS, duration_s=0.3, start_s=0.4
     )
 
 
@@ -56,11 +56,11 @@ def test_the_papers_ranges_are_farther_apart_than_the_occlusion_is(compared: rt.
 
 
 def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
-    power = [json.loads((compared.out / name / "summary.json").read_text())["noise_power_m2"] for name in RUNGS]
+    power = [json.loads((compared.out / name / "summary.json").read_text())["noise_power_m2"] for name in MODELS]
     assert power == [compared.summary["noise_power_m2"]] * 3
     # Where no echo is the maps are the same but for side lobes of the echoes, some 60 dB below them.
     maps = []
-    for name in RUNGS:
+    for name in MODELS:
         with h5py.File(compared.out / name / "maps.h5") as file:
             maps.append(file["range_doppler"][0, 5:40, :])
     difference = np.abs(maps[0] / maps[2] - 1)
@@ -70,7 +70,7 @@ def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
 
 def test_files_and_table(compared: rt.Comparison) -> None:
     pictures = {f"compare_{name}.png" for name in ("power", "parts", "range_doppler", "spectrogram", "cloud")}
-    assert {file.name for file in compared.out.iterdir()} == {*RUNGS, "compare.json", "compare.html", *pictures}
+    assert {file.name for file in compared.out.iterdir()} == {*MODELS, "compare.json", "compare.html", *pictures}
     assert json.loads((compared.out / "compare.json").read_text()) == compared.summary
     page = (compared.out / "compare.html").read_text()
     assert page.count("data:image/png;base64,") == 5
@@ -89,7 +89,7 @@ def test_files_and_table(compared: rt.Comparison) -> None:
         (("analytic", "best"), "best"),
     ],
 )
-def test_rungs_that_cannot_be_compared(fidelities: tuple[str, ...], says: str, tmp_path: Path) -> None:
+def test_models_that_cannot_be_compared(fidelities: tuple[str, ...], says: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=says):
         rt.compare(MOTION, RADAR, out=tmp_path / "out", fidelities=fidelities)
     assert not (tmp_path / "out").exists()

@@ -78,8 +78,8 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tm
 def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
     radar = room.place(RADAR)
     body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0, duration_s=0.2)))
-    rung = Multipath(radar, body, room, fidelity="analytic")
-    found = {ghost.path: ghost for ghost in ghosts(rung, radar, 0.1)}
+    model = Multipath(radar, body, room, fidelity="analytic")
+    found = {ghost.path: ghost for ghost in ghosts(model, radar, 0.1)}
     assert set(found) == {"side > body", "body > side"}
     # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few centimetres.
     place_of_radar, person = np.array([-4, 1, 1.0]), body.at([0.1]).centres[0].mean(axis=0)
@@ -99,7 +99,7 @@ def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(tmp
     for given, word in (
         ({"fidelity": "fresnel"}, "knows no walls"),
         ({"fidelity": "analytic", "spreading": False}, "free space only"),
-        ({"fidelity": "analytic", "dials": {"tolerance_db": 1.0}}, "tolerance_db"),
+        ({"fidelity": "analytic", "model_options": {"tolerance_db": 1.0}}, "tolerance_db"),
         ({"fidelity": "analytic", "clutter_removal": "magic"}, "magic"),
     ):
         with pytest.raises(InputError, match=word) as caught:

@@ -14,7 +14,7 @@ from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.pipeline.rooms.inside_walls import Inside
 from rtradar.pipeline.survey import survey
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.scene.scene import scenes_folder
 
@@ -63,12 +63,12 @@ def test_at_any_time_of_the_interval() -> None:
     body = Body.from_motion(place(walk))
     centres = body.at([0.0, 3.0]).centres[:, :, 0]
     ahead = wall(float(centres[1].mean()), 0.3)
-    rung = build_rung("analytic", RADAR, body)
+    model = build_model("analytic", RADAR, body)
     n_chirps = int(3.0 / RADAR.chirp_interval_s)
     with pytest.raises(InputError, match=r"at [12].\d\d s the .* is inside wall 'across'"):
-        survey(rung, RADAR, body, n_chirps, scene=Scene(walls=(ahead,)))
+        survey(model, RADAR, body, n_chirps, scene=Scene(walls=(ahead,)))
     behind = wall(float(centres[0].max()) + 0.5, 0.3)
-    told = survey(rung, RADAR, body, n_chirps, scene=Scene(walls=(behind,)))
+    told = survey(model, RADAR, body, n_chirps, scene=Scene(walls=(behind,)))
     assert not [limit for limit in told.limits if limit.name.startswith("inside")]
 
 

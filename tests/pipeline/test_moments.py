@@ -13,7 +13,7 @@ from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.pipeline.pictures import snapshots as module
 from rtradar.pipeline.pictures.snapshots import moments
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Scene, Wall, material
 
@@ -37,13 +37,13 @@ def spheres() -> Body:
     return Body(walk.motion, np.full((21, 3), RADIUS_M))
 
 
-def look(body: Body, rung: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None) -> Any:
+def look(body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None) -> Any:
     chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
-    return moments(rung, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
+    return moments(model, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
 
 
 def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres: Body) -> None:
-    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True))
+    found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True))
     assert found.path_names.tolist() == ["body"]
     assert found.corners.shape == (len(found.times), 21, 1, 3)
     centres = spheres.at(found.times).centres
@@ -54,7 +54,7 @@ def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres:
 
 
 def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
-    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True))
+    found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True))
 
     def distance(times: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.linalg.norm(spheres.at(times).centres - np.array(RADAR.position_m), axis=-1) - RADIUS_M
@@ -71,8 +71,8 @@ def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
 
 def test_a_ghost_is_mirrored_by_wall_and_sphere(spheres: Body) -> None:
     scene = Scene(name="one wall", walls=(WALL,))
-    rung = Multipath(RADAR, spheres, scene, fidelity="analytic")
-    found = look(spheres, rung, scene)
+    model = Multipath(RADAR, spheres, scene, fidelity="analytic")
+    found = look(spheres, model, scene)
     assert found.path_names.tolist() == ["body", "body > left", "left > body"]
     antenna = np.array(RADAR.position_m)
     behind = antenna * [1, -1, 1] + [0, 2 * 2.5, 0]  # its image in the plane y = 2.5
@@ -93,7 +93,7 @@ def test_a_ghost_is_mirrored_by_wall_and_sphere(spheres: Body) -> None:
 
 
 class Told:
-    """A rung that says what it is told: for each chirp, lengths and amplitudes (rx, echo)."""
+    """A model that says what it is told: for each chirp, lengths and amplitudes (rx, echo)."""
 
     variant = None
 
@@ -112,8 +112,8 @@ class Told:
 
 
 def test_echoes_of_one_part_are_one_by_their_power(spheres: Body) -> None:
-    rung = Told(lambda t: [[8 + 2 * t, 10 - 4 * t, 6]], lambda t: [[1j, 2, 3]], [4, 4, 7])
-    found = look(spheres, rung, windows=np.array([100]))
+    model = Told(lambda t: [[8 + 2 * t, 10 - 4 * t, 6]], lambda t: [[1j, 2, 3]], [4, 4, 7])
+    found = look(spheres, model, windows=np.array([100]))
     assert found.echo_part.tolist() == [4, 7]
     time = float(found.times[0]) + RADAR.chirp_duration_s / 2
     np.testing.assert_allclose(found.power_m2, [[5, 9]])
@@ -126,8 +126,8 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
     middle = float(RADAR.window_times(window)[0]) + RADAR.chirp_duration_s / 2
     there = [[8.0], [8.1]]
     # Two receivers; the second sees the echo before the moment only, and its length then means nothing.
-    rung = Told(lambda t: there if t < middle else [[8.0], [100.0]], lambda t: [[1.0], [float(t < middle)]], [0])
-    found = look(spheres, rung, windows=window)
+    model = Told(lambda t: there if t < middle else [[8.0], [100.0]], lambda t: [[1.0], [float(t < middle)]], [0])
+    found = look(spheres, model, windows=window)
     np.testing.assert_allclose([found.range_m, found.velocity_mps, found.power_m2], [[[4.0]], [[0.0]], [[0.5]]], atol=1e-12)
     gone = look(spheres, Told(lambda t: there, lambda t: [[float(t < middle)]] * 2, [0]), windows=window)
     assert gone.power_m2.tolist() == [[0.0]]
@@ -146,7 +146,7 @@ def test_long_captures_and_rich_rooms_keep_no_more(spheres: Body, monkeypatch: p
 
 
 def test_moments_come_at_most_40_times_a_second(spheres: Body) -> None:
-    found = look(spheres, build_rung("analytic", RADAR, spheres, spreading=True), windows=np.arange(0, 600))
+    found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True), windows=np.arange(0, 600))
     # Cycles of 0.5 ms
     assert np.diff(found.window).tolist() == [50] * (len(found.window) - 1)
 
@@ -155,11 +155,11 @@ def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(spheres: Body, monk
     chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, 1.0, 0.0), yaw_deg=30)
     lamp = Furniture(name="lamp", mesh="lamp", material=material("metal"), position_m=(1.0, -1.0, 0.0))
     scene = Scene(name="furnished", furniture=(chair, lamp))
-    rung = build_rung("analytic", RADAR, spheres, spreading=True)
+    model = build_model("analytic", RADAR, spheres, spreading=True)
     limit = len(chair.triangles().faces)
     assert limit < len(lamp.triangles().faces)
     monkeypatch.setattr(module, "MOST_FACES", limit)
-    found = look(spheres, rung, scene, windows=np.array([0]))
+    found = look(spheres, model, scene, windows=np.array([0]))
     vertices = found.furniture_vertices.astype(float)
     own = found.furniture_faces[: len(chair.triangles().faces)]
     np.testing.assert_allclose(vertices[own], chair.triangles().corners, atol=1e-6)

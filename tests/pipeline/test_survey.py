@@ -16,7 +16,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline.survey import Survey, survey
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 
 Array = NDArray[np.float64]
 
@@ -44,7 +44,7 @@ class Balls:
 
 @dataclass(frozen=True)
 class Silence:
-    """A rung of a body that nobody sees."""
+    """A model of a body that nobody sees."""
 
     variant: str | None = None
 
@@ -61,8 +61,8 @@ class Silence:
 
 
 def look(body: Balls, radar: Radar = RADAR, *, spreading: bool = True) -> Survey:
-    rung = build_rung("analytic", radar, body, spreading=spreading)  # type: ignore[arg-type]
-    return survey(rung, radar, body, N_CHIRPS, spreading=spreading)  # type: ignore[arg-type]
+    model = build_model("analytic", radar, body, spreading=spreading)  # type: ignore[arg-type]
+    return survey(model, radar, body, N_CHIRPS, spreading=spreading)  # type: ignore[arg-type]
 
 
 def test_power_is_that_of_the_spheres_by_hand() -> None:
@@ -164,8 +164,8 @@ def test_what_another_part_hides_is_counted() -> None:
             return poses
 
     body = dataclasses.replace(Behind(), semi_axes=np.array([[0.3, 0.3, 0.3], [0.1, 0.1, 0.1]]))
-    rung = build_rung("specular", RADAR, body)  # type: ignore[arg-type]
-    found = survey(rung, RADAR, body, N_CHIRPS)  # type: ignore[arg-type]
+    model = build_model("specular", RADAR, body)  # type: ignore[arg-type]
+    found = survey(model, RADAR, body, N_CHIRPS)  # type: ignore[arg-type]
     assert not found.hidden_at[:, 0].any()
     assert (found.hidden_at[:, 1] == 1).all()
     assert found.part_power["needle"] == 0

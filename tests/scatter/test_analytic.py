@@ -1,4 +1,4 @@
-"""The rung `analytic`: specular range and closed-form cross-section, and the paper's plane waves."""
+"""The echo model `analytic`: specular range and closed-form cross-section, and the paper's plane waves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ AHEAD = (4.0, 0.0, 1.0)
 
 @dataclass
 class Toy:
-    """As much of a body as a rung asks for: parts that move without turning."""
+    """As much of a body as a model asks for: parts that move without turning."""
 
     centres: Array
     frames: Array
@@ -293,7 +293,7 @@ def test_the_papers_amplitude_is_that_of_the_line_of_sight(spreading: bool) -> N
     np.testing.assert_allclose(amplitude, expected, rtol=1e-12)  # every channel alike, and real
 
 
-# -- as a rung -------------------------------------------------------------------------------------------------------
+# -- as a model -------------------------------------------------------------------------------------------------------
 
 
 @both_models
@@ -327,17 +327,17 @@ def test_each_chirp_has_its_own_transmitter_receivers_and_pose() -> None:
 
 @both_models
 def test_which_chirps_are_asked_together_does_not_matter(paper: bool) -> None:
-    rung = Analytic(LOW, toy(velocity=np.array([1.0, -2.0, 0.5])), paper=paper)
-    whole, part = rung.echoes(np.arange(40)), rung.echoes(np.arange(13, 31))
+    model = Analytic(LOW, toy(velocity=np.array([1.0, -2.0, 0.5])), paper=paper)
+    whole, part = model.echoes(np.arange(40)), model.echoes(np.arange(13, 31))
     np.testing.assert_array_equal(part.length, whole.length[13:31])
     np.testing.assert_array_equal(part.amplitude, whole.amplitude[:, 13:31])
 
 
 def test_past_the_end_the_body_rests() -> None:
-    rung = Analytic(LOW, toy(velocity=np.array([1.0, 0, 0]), duration_s=0.01))
-    late = rung.echoes(np.array([12 * 100, 12 * 200]))
+    model = Analytic(LOW, toy(velocity=np.array([1.0, 0, 0]), duration_s=0.01))
+    late = model.echoes(np.array([12 * 100, 12 * 200]))
     np.testing.assert_array_equal(late.length[0], late.length[1])
-    before = rung.echoes(np.array([0]))
+    before = model.echoes(np.array([0]))
     assert (late.length[0] > before.length[0]).all()
 
 

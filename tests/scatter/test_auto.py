@@ -1,4 +1,4 @@
-"""The rung that chooses: what it tells beforehand, what it chooses, and what it hands on."""
+"""The model that chooses: what it tells beforehand, what it chooses, and what it hands on."""
 
 import dataclasses
 import gc
@@ -19,7 +19,7 @@ from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.models.auto import Auto
 from rtradar.scatter.models.auto_errors import (
     ANALYTIC,
@@ -179,20 +179,20 @@ def passing_radar() -> Radar:
 
 def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic_and_nothing_is_traced() -> None:
     body = Body.from_motion(place(rt.synthetic_motion("jumping_jack", seed=0, duration_s=0.5)))
-    rung = build_rung("auto", RADAR, body, tolerance_db=10.0)
+    model = build_model("auto", RADAR, body, tolerance_db=10.0)
     chirps = np.arange(0, 48)
-    ours, theirs = rung.echoes(chirps), build_rung("analytic", RADAR, body).echoes(chirps)
+    ours, theirs = model.echoes(chirps), build_model("analytic", RADAR, body).echoes(chirps)
     np.testing.assert_array_equal(ours.part, theirs.part)
     np.testing.assert_array_equal(ours.length, theirs.length)
     np.testing.assert_allclose(ours.amplitude, theirs.amplitude, rtol=1e-12)
-    assert rung.variant is None
+    assert model.variant is None
 
 
 def test_a_hidden_part_has_no_echo_and_fades_in_smoothly(backend: Backend) -> None:
-    rung = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
-    assert rung.echoes(np.array([100])).part.tolist() == [1]
-    strength = [np.abs(rung.echoes(np.array([chirp])).amplitude[0, 0, 0]) for chirp in range(100, 400)]
-    parts = [rung.echoes(np.array([chirp])).part for chirp in range(100, 400)]
+    model = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
+    assert model.echoes(np.array([100])).part.tolist() == [1]
+    strength = [np.abs(model.echoes(np.array([chirp])).amplitude[0, 0, 0]) for chirp in range(100, 400)]
+    parts = [model.echoes(np.array([chirp])).part for chirp in range(100, 400)]
     target = np.array([power[part == 0].sum() for power, part in zip(strength, parts, strict=True)])
     assert target[0] == 0
     assert target[-1] == pytest.approx(np.sqrt(np.pi) * 0.1 / 3.9**2, rel=0.05)
@@ -201,9 +201,9 @@ def test_a_hidden_part_has_no_echo_and_fades_in_smoothly(backend: Backend) -> No
 
 
 def test_the_account_says_all_and_adds_up(backend: Backend) -> None:
-    rung = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
-    rung.echoes(np.arange(0, 400, 10))
-    account = rung.account()
+    model = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
+    model.echoes(np.arange(0, 400, 10))
+    account = model.account()
     assert sum(account["ways"].values()) == pytest.approx(1)
     assert sum(account["why"].values()) == pytest.approx(1)
     assert account["ways"]["left-out"] == account["why"]["left out: hidden"] > 0
@@ -224,23 +224,23 @@ class Swinging(Passing):
 
 
 def test_what_is_kept_does_not_grow_with_the_capture() -> None:
-    rung = Auto(passing_radar(), Swinging(), tolerance_db=10.0)  # type: ignore[arg-type]
+    model = Auto(passing_radar(), Swinging(), tolerance_db=10.0)  # type: ignore[arg-type]
     held, first_pass = [], {}
     tracemalloc.start()
     try:
         for _ in range(2):  # power, then the signal
             for begin in range(0, 100_000, 800):  # 1 ms each
-                rung.echoes(np.array([begin]))
+                model.echoes(np.array([begin]))
                 if begin in (30_400, 99_200):
                     gc.collect()
                     held.append(tracemalloc.get_traced_memory()[0])
-            first_pass = first_pass or rung.account()
+            first_pass = first_pass or model.account()
     finally:
         tracemalloc.stop()
     # 69 s more, and all of it again: nothing but Python's own tables. To keep what was forecast took 1.2 MB.
     assert max(held[1:]) - held[0] < 60e3
     # Nothing counts twice.
-    assert rung.account() == first_pass
+    assert model.account() == first_pass
     assert 0 < first_pass["ways"]["left-out"] < 1
 
 
@@ -250,15 +250,15 @@ def test_a_complex_tolerance_is_met_by_a_kick(share: float) -> None:
     body = Body.from_motion(place(rt.synthetic_motion("kick", seed=0, duration_s=0.8)))
     chirps = (np.linspace(3600, 8000, 12).astype(np.int64)[:, None] // 12 * 12 + np.array([0, 5])).ravel()
     found, truth = (
-        _field(rung, chirps)
-        for rung in (build_rung("auto", RADAR, body, tolerance_complex=share), build_rung("reference", RADAR, body))
+        _field(model, chirps)
+        for model in (build_model("auto", RADAR, body, tolerance_complex=share), build_model("reference", RADAR, body))
     )
     assert np.sqrt((np.abs(found - truth) ** 2).mean() / (np.abs(truth) ** 2).mean()) < share
 
 
-def _field(rung: object, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
+def _field(model: object, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
     """Received field (chirp, rx) at the middle of the sweep."""
-    echoes = rung.echoes(chirps)  # type: ignore[attr-defined]
+    echoes = model.echoes(chirps)  # type: ignore[attr-defined]
     at, value = RADAR.centre_frequency_hz, 0j
     for node, frequency in enumerate(echoes.frequency):
         others = np.delete(echoes.frequency, node)
@@ -267,10 +267,10 @@ def _field(rung: object, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
 
 
 def test_bad_tolerances_are_refused_in_one_line() -> None:
-    for dials, word in itertools.chain(
+    for model_options, word in itertools.chain(
         (({"tolerance_db": value}, "tolerance_db") for value in (0.0, -1.0, float("nan"), float("inf"))),
         (({"tolerance_complex": value}, "tolerance_complex") for value in (0.0, -0.1, float("nan"))),
     ):
         with pytest.raises(InputError, match=word) as caught:
-            Auto(passing_radar(), Passing(), **dials)  # type: ignore[arg-type]
+            Auto(passing_radar(), Passing(), **model_options)  # type: ignore[arg-type]
         assert "\n" not in str(caught.value)

@@ -11,7 +11,7 @@ import rtradar as rt
 from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.common.body_material import antenna_field, body_material, body_reflection, material_factor
 from rtradar.scene import material
 
@@ -118,13 +118,13 @@ def test_unknown_materials_and_frequencies_are_refused() -> None:
 
 
 @pytest.mark.parametrize("fidelity", ["analytic", "specular"])
-def test_a_rung_of_skin_is_the_conductor_times_its_factor(fidelity: str) -> None:
+def test_a_model_of_skin_is_the_conductor_times_its_factor(fidelity: str) -> None:
     body = rt.Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.1))
     radar, chirps = Radar.preset("paper-12ghz"), np.arange(36)
     traced = {"variant": "scalar"} if fidelity == "specular" else {}
     metal, named, skin = (
-        build_rung(fidelity, radar, body, **traced, **dial).echoes(chirps)  # type: ignore[arg-type]
-        for dial in ({}, {"material": "perfect-conductor"}, {"material": "skin"})
+        build_model(fidelity, radar, body, **traced, **option).echoes(chirps)  # type: ignore[arg-type]
+        for option in ({}, {"material": "perfect-conductor"}, {"material": "skin"})
     )
     np.testing.assert_array_equal(named.amplitude, metal.amplitude)
     np.testing.assert_array_equal(skin.length, metal.length)

@@ -1,4 +1,4 @@
-"""Nothing is compiled again once a rung has done its first frame."""
+"""Nothing is compiled again once a model has done its first frame."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE
 from rtradar.trace.backends.backend import Backend
 
@@ -24,12 +24,12 @@ def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str, monk
     import drjit as dr
 
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0, duration_s=0.7), heading_deg=70.0))
-    rung = build_rung(fidelity, RADAR, body, variant=backend.kind)
+    model = build_model(fidelity, RADAR, body, variant=backend.kind)
     frame = 3 * RADAR.chirps_per_frame
-    rung.echoes(np.arange(frame))
+    model.echoes(np.arange(frame))
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         dr.kernel_history_clear()
-        rung.echoes(np.arange(frame, 2 * frame))
+        model.echoes(np.arange(frame, 2 * frame))
         kernels = [entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT]
     assert len(kernels) > 0
     assert [entry["hash"] for entry in kernels if not entry["cache_hit"]] == []

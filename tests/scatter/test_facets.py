@@ -38,9 +38,9 @@ def both(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.util.concatenate(meshes)
 
 
-def field(target: object, tx: Array, rx: Array, frequency: float, **dials: object) -> NDArray[np.complex128]:
+def field(target: object, tx: Array, rx: Array, frequency: float, **model_options: object) -> NDArray[np.complex128]:
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
-    return facet_scattering(target, tx, rx, np.full(len(tx), frequency), **dials)  # type: ignore[arg-type]
+    return facet_scattering(target, tx, rx, np.full(len(tx), frequency), **model_options)  # type: ignore[arg-type]
 
 
 def directions(rng: np.random.Generator, n: int) -> Array:

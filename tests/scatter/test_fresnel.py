@@ -1,4 +1,4 @@
-"""The share of Fresnel zones in view: against the closed form of a straight edge, and in the rung."""
+"""The share of Fresnel zones in view: against the closed form of a straight edge, and in the model."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -119,9 +119,9 @@ def test_rays_go_to_lit_points_of_the_surface_over_the_fresnel_zones(seed: int) 
 def test_full_view_is_exactly_one_and_full_cover_exactly_nothing(backend: Backend) -> None:
     radar, chirps = small_radar(tx_y=3, rx_y=2, tx_spacing_wavelengths=1.0), np.arange(30)
     for body, target in ((Curtain(edge=0.5), 1.0), (Curtain(edge=-0.3), 0.0)):
-        rung = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
-        echoes = rung.echoes(chirps)
-        assert rung.variant == backend.kind
+        model = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
+        echoes = model.echoes(chirps)
+        assert model.variant == backend.kind
         assert echoes.amplitude.shape == (3, 30, 2, 2)
         specular = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
         np.testing.assert_array_equal(echoes.amplitude[..., 0] != 0, target)
@@ -131,7 +131,7 @@ def test_full_view_is_exactly_one_and_full_cover_exactly_nothing(backend: Backen
 
 
 @pytest.mark.parametrize("edge", [-0.01, 0.0, 0.015])
-def test_the_rung_and_the_function_agree_phase_and_all(backend: Backend, edge: float) -> None:
+def test_the_model_and_the_function_agree_phase_and_all(backend: Backend, edge: float) -> None:
     radar, body = small_radar(), Curtain(edge=edge)
     echoes = Fresnel(radar, body, variant=backend.kind).echoes(np.arange(3))  # type: ignore[arg-type]
     assert 0.1 < np.abs(echoes.amplitude[0, 0, 0, 0] / echoes.amplitude[0, 0, 0, 1]) * 3 / 0.7 < 20
@@ -141,7 +141,7 @@ def test_the_rung_and_the_function_agree_phase_and_all(backend: Backend, edge: f
         received = np.sum(amplitude[0, 0].conj() * np.exp(-2j * np.pi * frequency / C * echoes.length[0, 0]))
         field = fresnel_scattering(target, ANTENNA[None], ANTENNA[None], np.array([frequency]), variant=backend.kind)
         there_and_back = np.exp(-2j * np.pi * frequency / C * 8.0) / 16
-        # The same search, but zones laid out for each frequency, and for the middle of the sweep in the rung.
+        # The same search, but zones laid out for each frequency, and for the middle of the sweep in the model.
         np.testing.assert_allclose(received, field[0] * there_and_back, rtol=0.03)
 
 
@@ -156,8 +156,8 @@ def test_tx_and_rx_may_be_swapped(backend: Backend) -> None:
 
 def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     radar, body = small_radar(tx_y=2, rx_y=2), Curtain(speed=1.0)
-    rung = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
-    whole = rung.echoes(np.arange(70, 150)).amplitude
+    model = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
+    whole = model.echoes(np.arange(70, 150)).amplitude
     for block in (np.arange(131, 150), np.arange(70, 71), np.arange(71, 131)):
         afresh = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
         # An anchor alone goes without its neighbours: the same but for the last digit.
@@ -192,9 +192,9 @@ def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(backend: 
 
 def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
     radar, body = small_radar(chirp_duration_s=0.25e-3), Curtain(speed=1.0)
-    rung = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
+    model = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
     chirps = np.arange(200, 601)
-    share = rung.shares.at(chirps)[1, :, 0, 0]
+    share = model.shares.at(chirps)[1, :, 0, 0]
     # 5 cm on either side, four Fresnel radii: a round edge diffracts a little more than the 0.1 of a straight one.
     assert np.abs(share[0]) < 0.15
     assert np.abs(share[-1] - 1) < 0.15

@@ -73,9 +73,9 @@ def unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
-def by_name(rung: Multipath, name: str) -> int:
+def by_name(model: Multipath, name: str) -> int:
     """Place of the echo of a one-part body over that path."""
-    return [path.name for path in rung.paths].index(name)
+    return [path.name for path in model.paths].index(name)
 
 
 # -- paths ----------------------------------------------------------------------------------------------------------
@@ -112,10 +112,10 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
 def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str, polarization: str, backend: Backend) -> None:
     body = one()
     radar = replace(Radar.preset("paper-12ghz"), polarization=polarization)
-    rung = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
     chirps = np.arange(24)
-    echoes = rung.echoes(chirps)
-    number = by_name(rung, f"{side} > body > {side}")
+    echoes = model.echoes(chirps)
+    number = by_name(model, f"{side} > body > {side}")
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
@@ -134,8 +134,8 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str,
 @pytest.mark.parametrize("side", ["floor", "left"])
 def test_one_way_over_a_conducting_plane_by_hand(side: str, polarization: str, backend: Backend) -> None:
     body, radar = one(), single(polarization=polarization)
-    rung = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind)  # type: ignore[arg-type]
-    echoes = rung.echoes(np.arange(1))
+    model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind)  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(1))
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
     antenna = np.array(radar.position_m)
@@ -156,7 +156,7 @@ def test_one_way_over_a_conducting_plane_by_hand(side: str, polarization: str, b
     normal = unit(unit(image - point) + unit(antenna - point))
     expected = -bare * straight @ (2 * (normal @ over_wall) * normal - over_wall)
     for name in (f"{side} > body", f"body > {side}"):
-        number = by_name(rung, name)
+        number = by_name(model, name)
         assert echoes.length[0, 0, number] == pytest.approx(length, abs=1e-9)
         # `mirror` settles its point to 1e-7 of a semi-axis, factors are complex64.
         assert echoes.amplitude[0, 0, 0, number] == pytest.approx(expected, rel=1e-5)
@@ -167,8 +167,8 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     radius, centre = 0.2, np.array([0.5, 0.2, 1.1])
     body, radar = one((radius,) * 3, tuple(centre)), single()
     walls = (wall("floor", "concrete", 1.0), wall("left", "concrete", 1.0))
-    rung = Multipath(radar, body, Scene(walls=walls), variant=backend.kind, order=2)  # type: ignore[arg-type]
-    echoes = rung.echoes(np.arange(1))
+    model = Multipath(radar, body, Scene(walls=walls), variant=backend.kind, order=2)  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(1))
     antenna = np.array(radar.position_m)
     tx, rx = antenna * [1, 1, -1], antenna * [1, -1, 1] + [0, 5, 0]
     at = Poses(centre[None, None], np.eye(3)[None, None], np.full((1, 3), radius))
@@ -193,7 +193,7 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
         fields.append(reflected(way, unit(up - (up @ way) * way), normal))
     normal = unit(point - centre)
     expected = -bare * fields[1] @ (2 * (normal @ fields[0]) * normal - fields[0])
-    number = by_name(rung, "floor > body > left")
+    number = by_name(model, "floor > body > left")
     assert echoes.length[0, 0, number] == pytest.approx(length, abs=1e-9)
     # Amplitudes of Echoes are conjugate. Half-space and slab, and the polynomial over the sweep, agree to 1e-3 here.
     assert echoes.amplitude[0, 0, 0, number] == pytest.approx(np.conj(expected), rel=2e-3)
@@ -206,11 +206,11 @@ def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend)
     body = rt.Body.from_motion(place(rt.synthetic_motion("kick", seed=1), start_s=0.9, duration_s=0.2))
     radar = Radar.preset("paper-12ghz")
     scene = Scene(walls=box())
-    rung = Multipath(radar, body, scene, variant=backend.kind)
+    model = Multipath(radar, body, scene, variant=backend.kind)
     chirps = np.arange(0, 2000, 41)
-    echoes, at = rung.echoes(chirps), chirp_poses(radar, body, chirps)
+    echoes, at = model.echoes(chirps), chirp_poses(radar, body, chirps)
     off, strength = [], []
-    for number, path in enumerate(rung.paths[1:], start=1):
+    for number, path in enumerate(model.paths[1:], start=1):
         own = slice(21 * number, 21 * (number + 1))
         seen = np.abs(echoes.amplitude[0, ..., own]) > 0
         length, amplitude, _ = mirror(images(path.out, at.tx), images(path.back, at.rx), *at[3:])
@@ -228,8 +228,8 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     scene = Scene(walls=box())
     chirps = np.arange(13, 60)
     whole = Multipath(radar, body, scene, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
-    rung = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
-    pieces = [rung.echoes(block) for block in np.split(chirps, [7, 8, 30])]
+    model = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    pieces = [model.echoes(block) for block in np.split(chirps, [7, 8, 30])]
     np.testing.assert_array_equal(np.concatenate([piece.length for piece in pieces]), whole.length)
     np.testing.assert_array_equal(np.concatenate([piece.amplitude for piece in pieces], axis=1), whole.amplitude)
 
@@ -256,8 +256,8 @@ def test_a_slab_before_the_radar_lets_its_square_through(backend: Backend) -> No
         material=material("plasterboard"),
         thickness_m=0.003,
     )
-    rung = Multipath(radar, body, Scene(walls=(plasterboard,)), variant=backend.kind)  # type: ignore[arg-type]
-    echoes, free = rung.echoes(np.arange(2)), Specular(radar, body, variant=backend.kind).echoes(np.arange(2))  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=(plasterboard,)), variant=backend.kind)  # type: ignore[arg-type]
+    echoes, free = model.echoes(np.arange(2)), Specular(radar, body, variant=backend.kind).echoes(np.arange(2))  # type: ignore[arg-type]
     # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
     root = np.sqrt(material("plasterboard").eta(echoes.frequency))
     wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
@@ -273,8 +273,8 @@ def test_a_slab_before_the_radar_lets_its_square_through(backend: Backend) -> No
 
 def test_behind_metal_there_is_nothing(backend: Backend) -> None:
     sheet = replace(wall("left", "metal"), corner_m=(-2.0, -2.0, 0.0), edge_u_m=(0.0, 6.0, 0.0), edge_v_m=(0.0, 0.0, 3.0))
-    rung = Multipath(single(), one(), Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
-    np.testing.assert_array_equal(rung.echoes(np.arange(3)).amplitude, 0)
+    model = Multipath(single(), one(), Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
 
 
 def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
@@ -282,11 +282,11 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
     sheet = replace(wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0))
     radar = single()
-    rung = Multipath(radar, body, Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
     chirps = np.arange(0, 1000, anchor_step(radar, ANCHORS_S))
-    echoes = rung.echoes(chirps)
+    echoes = model.echoes(chirps)
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    _, _, point = mirror(images(rung.paths[1].back, at.tx), at.rx, *at[3:], points=True)
+    _, _, point = mirror(images(model.paths[1].back, at.tx), at.rx, *at[3:], points=True)
     # Both stand equally far from the wall but for the body's surface: the share of the way by similar triangles.
     tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
     meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)
@@ -295,7 +295,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     assert 0 < seen.sum() < len(seen)
     # On its way in it fades: between two anchors it is neither all nor nothing.
     first = int(chirps[np.flatnonzero(seen)[0]])
-    fade = np.abs(rung.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[0, :, 0, 1])
+    fade = np.abs(model.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[0, :, 0, 1])
     assert fade[0] == 0
     assert (np.diff(fade) > 0).all()
 
@@ -307,8 +307,8 @@ def test_furniture_hides_both_legs_and_the_way_to_the_wall(hides: bool, backend:
     wardrobe = Furniture(name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place)
     scene = Scene(walls=(wall("floor"), wall("left")), furniture=(wardrobe,))
     body = one(centre=(1.0, 1.0, 1.0))
-    rung = Multipath(single(), body, scene, variant=backend.kind)  # type: ignore[arg-type]
-    seen = np.abs(rung.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
+    model = Multipath(single(), body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    seen = np.abs(model.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as well.
     np.testing.assert_array_equal(seen, not hides)
     second = Multipath(single(), body, scene, variant=backend.kind, order=2)  # type: ignore[arg-type]
@@ -324,11 +324,11 @@ def test_another_part_hides_a_leg_over_a_wall(backend: Backend) -> None:
     image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
     large = small + 0.6 * unit(image - small)
     body = Still(np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2))
-    rung = Multipath(radar, body, Scene(walls=(wall("left"),)), variant=backend.kind)  # type: ignore[arg-type]
-    echoes = rung.echoes(np.arange(1))
+    model = Multipath(radar, body, Scene(walls=(wall("left"),)), variant=backend.kind)  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(1))
     seen = {
         (name, part): bool(abs(echoes.amplitude[0, 0, 0, 2 * i + part]) > 0)
-        for i, name in enumerate(path.name for path in rung.paths)
+        for i, name in enumerate(path.name for path in model.paths)
         for part in (0, 1)
     }
     assert seen == {
@@ -347,16 +347,16 @@ def test_another_part_hides_a_leg_over_a_wall(backend: Backend) -> None:
 def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> None:
     body, radar = one(), single(frame_duration_s=0.1)
     scene = Scene(walls=(wall("floor", "wood", 0.02), wall("left")))
-    rung = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
-    whole = rung.echoes(np.arange(0, 100, 10))
+    model = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    whole = model.echoes(np.arange(0, 100, 10))
     power = (np.abs(whole.amplitude) ** 2).mean(axis=(0, 1, 2))
     gain = 256 * 100
-    of_path = np.array(rung.path_names)
+    of_path = np.array(model.path_names)
     floor, left = (power[of_path == f"{name} > body"].sum() for name in ("floor", "left"))
     assert 0 < floor < left
     # A noise that the floor's echo is below by 11 dB, and the left wall's is not.
-    accounts = rung.prune(100, floor * gain * 10**1.1)
-    kept = rung.echoes(np.arange(20))
+    accounts = model.prune(100, floor * gain * 10**1.1)
+    kept = model.echoes(np.arange(20))
     names = {account.path: account for account in accounts}
     assert names["floor > body"].dropped == ("part 0",)
     assert "10 dB below" in names["floor > body"].why
@@ -366,15 +366,15 @@ def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> No
     assert names["body"].kept == ("part 0",)
     assert kept.length.shape[2] == 3
     again = Multipath(radar, body, scene, variant=backend.kind).echoes(np.arange(20))  # type: ignore[arg-type]
-    stay = [0, by_name(rung, "body > left"), by_name(rung, "left > body")]
+    stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
     np.testing.assert_array_equal(kept.amplitude, again.amplitude[..., stay])
     np.testing.assert_array_equal(kept.length, again.length[..., stay])
 
 
 def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> None:
     aside = replace(wall("floor"), corner_m=(20.0, 20.0, 0.0), edge_u_m=(1.0, 0.0, 0.0), edge_v_m=(0.0, 1.0, 0.0))
-    rung = Multipath(single(), one(), Scene(walls=(aside, wall("left"))), variant=backend.kind)  # type: ignore[arg-type]
-    accounts = {account.path: account for account in rung.prune(50, 0.0)}
+    model = Multipath(single(), one(), Scene(walls=(aside, wall("left"))), variant=backend.kind)  # type: ignore[arg-type]
+    accounts = {account.path: account for account in model.prune(50, 0.0)}
     assert accounts["floor > body"].dropped == ("part 0",)
     assert accounts["floor > body"].power_m2 == 0
     assert "never seen" in accounts["floor > body"].why
@@ -402,9 +402,9 @@ def test_what_has_no_meaning_is_refused(given: dict[str, object], message: str) 
 def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
     body, radar = one((0.1, 0.1, 0.1)), single()
     scene = Scene(walls=(wall("left"),))
-    rung = Multipath(radar, body, scene, fidelity="analytic")  # type: ignore[arg-type]
-    echoes = rung.echoes(np.arange(5))
-    assert rung.variant is None
+    model = Multipath(radar, body, scene, fidelity="analytic")  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(5))
+    assert model.variant is None
     # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall the field stays vertical.
     point = np.linalg.norm(np.array(radar.position_m) - np.array([0.0, 0.3, 1.2]))
     assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6)
@@ -416,13 +416,13 @@ def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
 def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(backend: Backend) -> None:
     # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is not seen.
     walls = (wall("floor", "concrete", 0.2), wall("left", "plasterboard", 0.005))
-    rung = Multipath(single(), one(), Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
-    amplitude = rung.echoes(np.arange(3)).amplitude
+    model = Multipath(single(), one(), Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
+    amplitude = model.echoes(np.arange(3)).amplitude
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
-        number = by_name(rung, name)
+        number = by_name(model, name)
         np.testing.assert_array_equal(amplitude[..., number], np.broadcast_to(amplitude[1, ..., number], amplitude.shape[:3]))
-    number = by_name(rung, "left > body")
+    number = by_name(model, "left > body")
     assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
 
 

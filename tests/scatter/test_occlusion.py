@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
 from rtradar.scatter.specular_point import visibility as occlusion
 from rtradar.scatter.specular_point.solver import mirror
@@ -116,10 +116,10 @@ def test_any_block_of_chirps_gets_the_same_weights(backend: Backend) -> None:
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
-def test_the_rung_has_nothing_from_a_hidden_part_and_all_from_a_free_one(backend: Backend, polarization: str) -> None:
+def test_the_model_has_nothing_from_a_hidden_part_and_all_from_a_free_one(backend: Backend, polarization: str) -> None:
     radar = small_radar(polarization=polarization)
     chirps = np.arange(0, 20)
-    hidden = build_rung("specular", radar, Curtain(0.0), variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
+    hidden = build_model("specular", radar, Curtain(0.0), variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
     assert hidden.amplitude.shape == (1, 20, 2, 2)
     np.testing.assert_array_equal(hidden.amplitude[..., 0], 0)
     assert (hidden.amplitude[..., 1].real > 0).all()
@@ -131,8 +131,8 @@ def test_the_rung_has_nothing_from_a_hidden_part_and_all_from_a_free_one(backend
 
 def test_past_the_end_the_last_pose_stays(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(3.0, duration_s=0.1)
-    rung = build_rung("specular", radar, body, variant=backend.kind)  # type: ignore[arg-type]
-    echoes = rung.echoes(np.arange(90, 130))
+    model = build_model("specular", radar, body, variant=backend.kind)  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(90, 130))
     np.testing.assert_array_equal(echoes.length[12::2], np.broadcast_to(echoes.length[12], (14, 2, 2)))
 
 

@@ -1,4 +1,4 @@
-"""The rungs `reference` and `physical-optics`: what they are made of, and how far they are apart."""
+"""The models `reference` and `physical-optics`: what they are made of, and how far they are apart."""
 
 import dataclasses
 from collections.abc import Callable
@@ -94,8 +94,8 @@ def test_reference_is_the_scattering_length_of_each_pose() -> None:
 
 
 def test_reference_answers_for_any_chirps_alike() -> None:
-    rung = Reference(small_radar(), Passing(), facets=320)  # type: ignore[arg-type]
-    together, alone = rung.echoes(np.array([3, 4, 20])), rung.echoes(np.array([4]))
+    model = Reference(small_radar(), Passing(), facets=320)  # type: ignore[arg-type]
+    together, alone = model.echoes(np.array([3, 4, 20])), model.echoes(np.array([4]))
     np.testing.assert_allclose(together.amplitude[:, 1:2], alone.amplitude, rtol=1e-12)
     np.testing.assert_array_equal(together.length[1:2], alone.length)
     assert together.amplitude.shape == (7, 3, 2, 2)
@@ -118,10 +118,10 @@ def test_spreading_can_be_left_out() -> None:
 def test_physical_optics_is_close_to_the_reference_while_a_shadow_passes() -> None:
     radar, body = small_radar(), Passing()
     chirps = np.arange(10, 190, 7)
-    dials = {"facets": 1280}
-    reference = Reference(radar, body, **dials).echoes(chirps)  # type: ignore[arg-type]
+    model_options = {"facets": 1280}
+    reference = Reference(radar, body, **model_options).echoes(chirps)  # type: ignore[arg-type]
     ours, fewer = (
-        PhysicalOptics(radar, body, frequencies=n, **dials).echoes(chirps)  # type: ignore[arg-type]
+        PhysicalOptics(radar, body, frequencies=n, **model_options).echoes(chirps)  # type: ignore[arg-type]
         for n in (5, 3)
     )
     np.testing.assert_array_equal(ours.length, reference.length)
@@ -137,16 +137,16 @@ def test_blocks_of_chirps_do_not_matter() -> None:
     radar, body = small_radar(), Passing()
     chirps = np.arange(15, 65)
     whole = PhysicalOptics(radar, body, facets=320).echoes(chirps)  # type: ignore[arg-type]
-    rung = PhysicalOptics(radar, body, facets=320)  # type: ignore[arg-type]
+    model = PhysicalOptics(radar, body, facets=320)  # type: ignore[arg-type]
     for some in (chirps[:7], chirps[20:21], chirps[7:20]):
-        part = rung.echoes(some)
+        part = model.echoes(some)
         np.testing.assert_allclose(part.amplitude, whole.amplitude[:, some - 15], rtol=1e-9, atol=1e-15)
 
 
-@pytest.mark.parametrize("dial", ["anchor_s", "tolerance", "unevenness", "frequencies"])
-def test_dials_out_of_range_are_refused(dial: str) -> None:
-    with pytest.raises(InputError, match=f"{dial} = -1"):
-        PhysicalOptics(small_radar(), Passing(), **{dial: -1})  # type: ignore[arg-type]
+@pytest.mark.parametrize("option", ["anchor_s", "tolerance", "unevenness", "frequencies"])
+def test_options_out_of_range_are_refused(option: str) -> None:
+    with pytest.raises(InputError, match=f"{option} = -1"):
+        PhysicalOptics(small_radar(), Passing(), **{option: -1})  # type: ignore[arg-type]
 
 
 # -- the array --------------------------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""The rung `rays`: tubes, their footprints, corner reflectors, and the laws that any number of bounces keeps."""
+"""The echo model `rays`: tubes, their footprints, corner reflectors, and the laws that any number of bounces keeps."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.scatter.facets.triangle_mean import mean_of_phasor
 from rtradar.scatter.models.rays import Rays
 from rtradar.scatter.ray_tubes.target import rays_scattering
@@ -32,9 +32,9 @@ def sphere(radius: float = 0.05, *places: tuple[float, float, float]) -> rt.Elli
     return rt.Ellipsoids(centres, np.tile(np.eye(3), (len(centres), 1, 1)), np.full((len(centres), 3), radius))
 
 
-def backscatter(target: rt.Ellipsoids | trimesh.Trimesh, tx: object, frequency: float, **dials: object) -> complex:
+def backscatter(target: rt.Ellipsoids | trimesh.Trimesh, tx: object, frequency: float, **model_options: object) -> complex:
     place = np.atleast_2d(np.asarray(tx, dtype=float))
-    return complex(rays_scattering(target, place, place, np.array([frequency]), **dials)[0])  # type: ignore[arg-type]
+    return complex(rays_scattering(target, place, place, np.array([frequency]), **model_options)[0])  # type: ignore[arg-type]
 
 
 PLATE = sheet([[0, -0.1, -0.2], [0, 0.1, -0.2], [0, 0.1, 0.2], [0, -0.1, 0.2]], [[0, 1, 2], [0, 2, 3]])
@@ -120,8 +120,10 @@ def test_a_closed_box_shows_its_front_alone_wound_either_way() -> None:
 @pytest.mark.parametrize(("polarization", "turn"), [("v", -1j), ("h", 1j)])
 def test_a_dihedral_turns_over_what_lies_across_its_crease(backend: Backend, polarization: str, turn: complex) -> None:
     tx = FAR * np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
-    dials = {"polarization": polarization, "variant": backend.kind, "rays_per_wavelength": 1.0}
-    both = backscatter(DIHEDRAL, tx, 12e9, bounces=2, **dials) - backscatter(DIHEDRAL, tx, 12e9, bounces=1, **dials)
+    model_options = {"polarization": polarization, "variant": backend.kind, "rays_per_wavelength": 1.0}
+    both = backscatter(DIHEDRAL, tx, 12e9, bounces=2, **model_options) - backscatter(
+        DIHEDRAL, tx, 12e9, bounces=1, **model_options
+    )
     reference = np.sqrt(8 * np.pi) * 0.2 * 0.2 * 12e9 / SPEED_OF_LIGHT_MPS
     assert both == pytest.approx(turn * reference, rel=1e-4)
 
@@ -151,9 +153,9 @@ def test_two_spheres_send_each_other_what_one_of_them_alone_does_not() -> None:
 
 def test_a_part_behind_another_adds_nothing(backend: Backend) -> None:
     antenna = [4.0, 0.02, 0.01]
-    dials = {"bounces": 1, "variant": backend.kind, "rays_per_wavelength": 1.0}
+    model_options = {"bounces": 1, "variant": backend.kind, "rays_per_wavelength": 1.0}
     hidden = rt.Ellipsoids([[0, 0, 0], [-0.5, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1] * 3, [0.05] * 3])
-    assert backscatter(hidden, antenna, 12e9, **dials) == backscatter(sphere(0.1), antenna, 12e9, **dials)
+    assert backscatter(hidden, antenna, 12e9, **model_options) == backscatter(sphere(0.1), antenna, 12e9, **model_options)
 
 
 def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
@@ -174,9 +176,9 @@ def test_tx_and_rx_may_be_swapped(seed: int, polarization: str) -> None:
     tx = rng.normal(size=(2, 3))
     tx *= rng.uniform(1, 5, (2, 1)) / np.linalg.norm(tx, axis=1, keepdims=True)
     rx = tx + rng.normal(0, 0.3, (2, 3))
-    dials = {"bounces": 1, "polarization": polarization, "rays_per_wavelength": 1.0}
+    model_options = {"bounces": 1, "polarization": polarization, "rays_per_wavelength": 1.0}
     frequency = np.array([12e9, 16e9])
-    there, back = (rays_scattering(target, *pair, frequency, **dials) for pair in ((tx, rx), (rx, tx)))  # type: ignore[arg-type]
+    there, back = (rays_scattering(target, *pair, frequency, **model_options) for pair in ((tx, rx), (rx, tx)))  # type: ignore[arg-type]
     np.testing.assert_allclose(back, there, rtol=1e-9, atol=1e-9)
 
 
@@ -232,7 +234,10 @@ def test_echoes_are_the_scattering_lengths_of_the_pose() -> None:
 def test_one_bounce_is_what_specular_sees() -> None:
     radar, body = walk()
     chirps = np.array([8000])
-    rays, specular = Rays(radar, body, bounces=1, anchor_s=0.0).echoes(chirps), build_rung("specular", radar, body).echoes(chirps)
+    rays, specular = (
+        Rays(radar, body, bounces=1, anchor_s=0.0).echoes(chirps),
+        build_model("specular", radar, body).echoes(chirps),
+    )
     middle = BarycentricInterpolator(rays.frequency, rays.amplitude)(14e9)
     seen = np.abs(specular.amplitude[0]).max(axis=(0, 1)) > 0.02 * np.abs(specular.amplitude).max()
     # A part in full view is within some per cent of geometric optics; one at an occluder's edge may be half off.
@@ -253,7 +258,7 @@ def test_between_anchors_echoes_are_nearly_those_of_every_chirp() -> None:
 
 
 @pytest.mark.parametrize(
-    ("dials", "message"),
+    ("model_options", "message"),
     [
         ({"rays_per_wavelength": 0.0}, "rays_per_wavelength"),
         ({"rays_per_wavelength": float("nan")}, "rays_per_wavelength"),
@@ -261,9 +266,9 @@ def test_between_anchors_echoes_are_nearly_those_of_every_chirp() -> None:
         ({"bounces": 2.5}, "bounces"),
     ],
 )
-def test_dials_without_meaning_are_refused(dials: dict[str, object], message: str) -> None:
+def test_options_without_meaning_are_refused(model_options: dict[str, object], message: str) -> None:
     with pytest.raises(InputError, match=message):
-        backscatter(sphere(), [4, 0, 0], 12e9, **dials)
+        backscatter(sphere(), [4, 0, 0], 12e9, **model_options)
 
 
 def test_too_many_tubes_are_refused_before_they_are_made() -> None:

@@ -1,4 +1,4 @@
-"""Meshes as targets of `scattering_length`: one check, whatever the rung."""
+"""Meshes as targets of `scattering_length`: one check, whatever the model."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
 }
 
 
-def test_every_rung_is_told_of() -> None:
+def test_every_model_is_told_of() -> None:
     assert {*WITH_MESHES, *WITHOUT} == set(_HOMES)
 
 
@@ -75,7 +75,7 @@ def test_bad_meshes_are_refused_alike(case: str, fidelity: str, pairs: int) -> N
 
 @pytest.mark.parametrize("fidelity", WITHOUT)
 @pytest.mark.parametrize("make", [lambda: BOX, *(make for make, _ in BAD.values())], ids=["a good mesh", *BAD])
-def test_rungs_that_take_no_meshes_say_so(make: Callable[[], Any], fidelity: str) -> None:
+def test_models_that_take_no_meshes_say_so(make: Callable[[], Any], fidelity: str) -> None:
     with pytest.raises(InputError, match=f"'{fidelity}' takes rt.Ellipsoids, not") as caught:
         rt.scattering_length(make(), AWAY, AWAY, 3e9, fidelity=fidelity)
     assert "\n" not in str(caught.value)

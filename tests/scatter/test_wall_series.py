@@ -149,10 +149,10 @@ def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(name: str, thickness: f
 
 def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(backend: Backend) -> None:
     body = Ball((0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
-    rung = Multipath(PRESET, body, Scene(walls=(pane("brick", 0.24),)), variant=backend.kind, order=0)  # type: ignore[arg-type]
+    model = Multipath(PRESET, body, Scene(walls=(pane("brick", 0.24),)), variant=backend.kind, order=0)  # type: ignore[arg-type]
     # Between two anchors, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
-    echoes, free = rung.echoes(chirps), rung.person.echoes(chirps)
+    echoes, free = model.echoes(chirps), model.person.echoes(chirps)
     strongest = int((np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1)).argmax())
     farther = echoes.length[..., strongest] - free.length[..., 0]
     start = body.at(PRESET.centres_of(chirps)).centres[:, 0] - np.array([0.12, 0.0, 0.0])
@@ -171,18 +171,18 @@ def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
     # It walks out from behind a partition of brick.
     partition = replace(pane("brick", 0.1), corner_m=(-2.0, -3.0, -20.0), edge_v_m=(0.0, 3.5, 0.0))
     body = Ball((0.0, -0.6, 1.0), velocity=(0.0, 3.0, 0.0))
-    rung = Multipath(PRESET, body, Scene(walls=(partition,)), variant=backend.kind, order=1)  # type: ignore[arg-type]
+    model = Multipath(PRESET, body, Scene(walls=(partition,)), variant=backend.kind, order=1)  # type: ignore[arg-type]
     n_chirps = int(0.9 / PRESET.chirp_duration_s)
-    (direct, *_) = rung.prune(n_chirps, 0.0)
+    (direct, *_) = model.prune(n_chirps, 0.0)
     assert direct.kept == ("ball",)
-    early, late = rung.echoes(np.arange(4)), rung.echoes(np.arange(n_chirps - 400, n_chirps - 396))
-    assert early.amplitude.shape[-1] == late.amplitude.shape[-1] == len(rung.path_names)
+    early, late = model.echoes(np.arange(4)), model.echoes(np.arange(n_chirps - 400, n_chirps - 396))
+    assert early.amplitude.shape[-1] == late.amplitude.shape[-1] == len(model.path_names)
     power = [(np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2)) for echoes in (early, late)]
     # Behind it each wave has a delay, beside it none has.
     assert power[0][0] == 0
     assert power[0][1:].max() > 0
     assert power[1][0] > 0
-    assert rung.not_followed == {}
+    assert model.not_followed == {}
 
 
 @pytest.mark.parametrize(("name", "thickness"), [("brick", 0.11), ("plasterboard", 0.025)])
@@ -190,10 +190,10 @@ def test_ghosts_off_a_wall_whose_back_answers(name: str, thickness: float, backe
     body, radar = Ball((2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     found = {}
     for made, depth in ((name, thickness), ("perfect-conductor", 0.1)):
-        rung = Multipath(radar, body, Scene(walls=(side(made, depth),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
-        echoes = rung.echoes(np.arange(1))
+        model = Multipath(radar, body, Scene(walls=(side(made, depth),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
+        echoes = model.echoes(np.arange(1))
         for path in ("side > body", "side > body > side"):
-            own = np.array(rung.path_names) == path
+            own = np.array(model.path_names) == path
             found[path, made] = spectrum(echoes.length[..., own], echoes.amplitude[..., own], echoes.frequency)[:, 0, 0]
     for path, power in (("side > body", 1), ("side > body > side", 2)):
         # The image of the antenna, its leg to where the sphere is met, and so the angle on the wall.

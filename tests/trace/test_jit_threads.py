@@ -12,7 +12,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.body import Body
-from rtradar.scatter import build_rung
+from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, in_threads
 from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.unit_sphere import UnitSphere
@@ -105,7 +105,7 @@ print(drjit.thread_count())
     assert in_a_new_process(program, threads=2) == ["4"]
 
 
-def test_no_rung_takes_threads_of_dr_jit_away(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_model_takes_threads_of_dr_jit_away(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
     # It can wait for ever for one that falls asleep in the same moment.
     use(backend)
     import drjit as dr
@@ -115,7 +115,7 @@ def test_no_rung_takes_threads_of_dr_jit_away(backend: Backend, monkeypatch: pyt
     monkeypatch.setattr(dr, "set_thread_count", given.append)
     body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
     for fidelity in ("specular", "fresnel", "physical-optics", "rays"):
-        build_rung(fidelity, SMALL, body, variant=backend.kind).echoes(np.arange(2))
+        build_model(fidelity, SMALL, body, variant=backend.kind).echoes(np.arange(2))
     assert all(count >= dr.thread_count() for count in given)
 
 
@@ -126,8 +126,8 @@ def test_physical_optics_is_the_same_with_any_number_of_threads_and_any_blocks(
     body = Body.from_motion(rt.synthetic_motion("kick", seed=0, duration_s=0.25))
     chirps = np.arange(0, int(body.duration_s / SMALL.chirp_interval_s), 29)
     given = {"variant": backend.kind, "facets": 80}
-    at_once = build_rung("physical-optics", SMALL, body, **given).echoes(chirps).amplitude
+    at_once = build_model("physical-optics", SMALL, body, **given).echoes(chirps).amplitude
     monkeypatch.setenv(THREADS_VARIABLE, "1")
-    rung = build_rung("physical-optics", SMALL, body, **given)
-    by_blocks = [rung.echoes(chirps[first : first + 5]).amplitude for first in range(0, len(chirps), 5)]
+    model = build_model("physical-optics", SMALL, body, **given)
+    by_blocks = [model.echoes(chirps[first : first + 5]).amplitude for first in range(0, len(chirps), 5)]
     np.testing.assert_array_equal(at_once, np.concatenate(by_blocks, axis=1))

@@ -41,7 +41,7 @@ def summary_of(
         "seed": seed,
         "versions": {"python": platform.python_version(), **_versions()},
         "fidelity": parameters["fidelity"],
-        "variant": capture.rung.variant,
+        "variant": capture.model.variant,
         "fft_devices": capture.fft_devices._asdict(),
         **spent,
         "windows": len(capture.windows),
@@ -56,13 +56,13 @@ def summary_of(
         "noise_power_m2": capture.noise.power,
         **({"watts": _watts(capture)} if with_watts else {}),
         "limits": _limits(capture),
-        **({"modelled": capture.rung.account()} if isinstance(capture.rung, Accountable) else {}),
+        **({"modelled": capture.model.account()} if isinstance(capture.model, Accountable) else {}),
         **({"room": capture.inside.account} if capture.inside else {}),
     }
 
 
 def plain(value: object) -> Any:
-    """For JSON, which knows no scalars of NumPy: seeds from ``np.arange``, a rung's account."""
+    """For JSON, which knows no scalars of NumPy: seeds from ``np.arange``, a model's account."""
     if isinstance(value, np.generic):
         return value.item()
     raise TypeError(f"a {type(value).__name__} has no place in summary.json")

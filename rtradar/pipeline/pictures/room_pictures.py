@@ -54,7 +54,7 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
             panels = {"As received": (maps["range_doppler"][window], maps["detections"][window].astype(bool))}
             azimuth_map = maps["range_azimuth"][window] if "range_azimuth" in maps else None
         azimuth = maps["azimuth"][:] if "azimuth" in maps else None
-    found = ghosts(inside.rung, radar, time)
+    found = ghosts(inside.model, radar, time)
     moment = f"{title}, window at {time:.2f} s"
     # Out and back over the same walls is as far as the other way round: one mark, with their names.
     by_walls = {_walls(ghost.path): ghost for ghost in found}
@@ -71,7 +71,7 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
     times = np.linspace(0, body.duration_s, _TRACK_POINTS)
     track = body.motion.at(times)[0][:, 0, :2]
     middle = body.motion.at([min(time, body.duration_s)])[0][0, 0]
-    paths = {ghost.path: inside.rung.course(ghost.path, middle) for ghost in found}
+    paths = {ghost.path: inside.model.course(ghost.path, middle) for ghost in found}
     drawn["Plan of the room, with paths"] = folder / "plan.png"
     draw_plan(drawn["Plan of the room, with paths"], scene, radar, track, paths, moment)
     return drawn

@@ -12,7 +12,7 @@ from rtradar.body import Body
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import semi_axis_poses
-from rtradar.scatter import Rung
+from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scatter.specular_point.solver import mirror
@@ -46,12 +46,12 @@ class _Looked(NamedTuple):
     power_m2: NDArray[np.float64]
 
 
-def moments(rung: Rung, radar: Radar, body: Body, scene: Scene, windows: NDArray[np.int64], n_chirps: int) -> Moments:
+def moments(model: EchoModel, radar: Radar, body: Body, scene: Scene, windows: NDArray[np.int64], n_chirps: int) -> Moments:
     """Look at the middle of windows.
 
     Parameters
     ----------
-    rung : Rung
+    model : EchoModel
         Its echoes, by the Tx nearest to the middle of the array, summed up by path, part and bounces.
     radar : Radar
         Where it stands in the scene.
@@ -71,8 +71,8 @@ def moments(rung: Rung, radar: Radar, body: Body, scene: Scene, windows: NDArray
     every = max(math.ceil(len(windows) / MOST_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
     window = np.arange(0, len(windows), every)
     times = np.minimum(radar.window_times(windows[window]), body.duration_s)
-    paths = rung.paths if isinstance(rung, Multipath) else (WallPath((), ()),)
-    keys, looked = _look(rung, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx)
+    paths = model.paths if isinstance(model, Multipath) else (WallPath((), ()),)
+    keys, looked = _look(model, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx)
     chosen = _strongest(keys, looked.power_m2)
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
@@ -102,9 +102,9 @@ def moments(rung: Rung, radar: Radar, body: Body, scene: Scene, windows: NDArray
 # -- echoes ------------------------------------------------------------------------------------------------------------
 
 
-def _look(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> tuple[list[Key], _Looked]:
+def _look(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> tuple[list[Key], _Looked]:
     """Echoes about some cycles, with one column for each key that ever comes."""
-    looked = [_look_at(rung, radar, cycles[first : first + _AT_ONCE], n_cycles) for first in range(0, len(cycles), _AT_ONCE)]
+    looked = [_look_at(model, radar, cycles[first : first + _AT_ONCE], n_cycles) for first in range(0, len(cycles), _AT_ONCE)]
     keys = list(dict.fromkeys(key for one in looked for key in one.keys))
     place = {key: column for column, key in enumerate(keys)}
     tables = {name: np.zeros((len(cycles), len(keys))) for name in ("range_m", "velocity_mps", "power_m2")}
@@ -115,12 +115,12 @@ def _look(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) ->
     return keys, _Looked(keys, **tables)
 
 
-def _look_at(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> _Looked:
+def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> _Looked:
     middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
     ends = np.clip(cycles[:, None] + [-_RATE_CYCLES, _RATE_CYCLES], 0, n_cycles - 1)
     chirps, where = np.unique((ends * radar.n_tx + middle).astype(np.int64), return_inverse=True)
     where = where.reshape(ends.shape)
-    echoes = rung.echoes(chirps)
+    echoes = model.echoes(chirps)
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[where]  # (cycle, before and after, rx, echo)
     length = echoes.length[where]
     # By the power at both ends: where a receiver sees an echo at one end only, its length jumps to one of no meaning.
@@ -131,7 +131,7 @@ def _look_at(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int)
     before, after = (weight * length[:, 0]).sum(axis=1), (weight * length[:, 1]).sum(axis=1)
     apart_s = np.diff(ends, axis=1) * radar.cycle_duration_s
     rate = np.divide(after - before, apart_s, out=np.zeros_like(before), where=apart_s > 0)
-    owned = list(zip(_path_of_echoes(rung, len(echoes.part)), echoes.part.tolist(), echoes.bounces.tolist(), strict=True))
+    owned = list(zip(_path_of_echoes(model, len(echoes.part)), echoes.part.tolist(), echoes.bounces.tolist(), strict=True))
     keys = list(dict.fromkeys(owned))
     column = np.array([keys.index(key) for key in owned], dtype=np.int64) if len(keys) < len(owned) else np.arange(len(owned))
     shape = (len(cycles), len(keys))
@@ -144,12 +144,12 @@ def _look_at(rung: Rung, radar: Radar, cycles: NDArray[np.int64], n_cycles: int)
     return _Looked(keys, sums[1] / sums[0], sums[2] / sums[0], total)
 
 
-def _path_of_echoes(rung: Rung, n_echoes: int) -> list[int]:
+def _path_of_echoes(model: EchoModel, n_echoes: int) -> list[int]:
     """Number of each echo's path; without walls there is one."""
-    if not isinstance(rung, Multipath):
+    if not isinstance(model, Multipath):
         return [0] * n_echoes
-    numbers = {path.name: number for number, path in enumerate(rung.paths)}
-    return [numbers[name] for name in rung.path_names]
+    numbers = {path.name: number for number, path in enumerate(model.paths)}
+    return [numbers[name] for name in model.path_names]
 
 
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:

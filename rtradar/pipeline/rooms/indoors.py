@@ -23,11 +23,11 @@ _GHOST_STEP_CYCLES = 4
 class Indoors(NamedTuple):
     """The person in the room.
 
-    ``rung`` the person, ``room`` the IF of the room itself, ``account`` what was kept and dropped, for JSON; ``limits`` what the
+    ``model`` the person, ``room`` the IF of the room itself, ``account`` what was kept and dropped, for JSON; ``limits`` what the
     walls bring.
     """
 
-    rung: Multipath
+    model: Multipath
     room: RoomIf
     account: dict[str, Any]
     limits: tuple[Limit, ...]
@@ -44,7 +44,7 @@ class Ghost(NamedTuple):
 
 
 def indoors(
-    rung: Multipath,
+    model: Multipath,
     radar: Radar,
     body: Body,
     scene: Scene,
@@ -61,7 +61,7 @@ def indoors(
 
     Parameters
     ----------
-    rung : Multipath
+    model : Multipath
         The person in the room; what is not worth its cost is taken out of it.
     radar : Radar
         Where it stands in the scene.
@@ -85,7 +85,7 @@ def indoors(
     Indoors
     """
     noise = 0.0 if keep_all else noise_power_m2
-    paths = rung.prune(n_chirps, noise)
+    paths = model.prune(n_chirps, noise)
     clutter = Clutter(radar, scene, variant=variant, seed=seed, order=max(order, 1)).prune(noise)
     room = RoomIf(clutter, body, variant=variant)
     still = room.power_m2
@@ -98,15 +98,15 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
-    return Indoors(rung, room, account, _limits(rung))
+    return Indoors(model, room, account, _limits(model))
 
 
-def _limits(rung: Multipath) -> tuple[Limit, ...]:
+def _limits(model: Multipath) -> tuple[Limit, ...]:
     """Walls that are not followed over the sweep, where the person is seen by them."""
-    share = max(rung.not_followed.values(), default=0.0)
+    share = max(model.not_followed.values(), default=0.0)
     if share == 0:
         return ()
-    names = ", ".join(rung.not_followed)
+    names = ", ".join(model.not_followed)
     message = (
         f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, so dispersive they are or so "
         f"little they let through: {names}"
@@ -116,21 +116,21 @@ def _limits(rung: Multipath) -> tuple[Limit, ...]:
     return (limit,)
 
 
-def ghosts(rung: Multipath, radar: Radar, time_s: float) -> list[Ghost]:
+def ghosts(model: Multipath, radar: Radar, time_s: float) -> list[Ghost]:
     """Where the echoes over walls show at one time [s], path by path, each the mean of its parts weighted by their power.
 
     The azimuth is the one from which the last leg comes, that of its antenna's image mirrored back.
     """
     cycle = round(time_s / radar.cycle_duration_s - _GHOST_STEP_CYCLES / 2)
     chirps = (max(cycle, 0) + np.array([0, _GHOST_STEP_CYCLES])) * radar.n_tx
-    echoes = rung.echoes(chirps)
+    echoes = model.echoes(chirps)
     power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
     length = echoes.length.mean(axis=1)
     rate = (length[1] - length[0]) / (_GHOST_STEP_CYCLES * radar.cycle_duration_s)
     azimuth = _azimuth(echoes.length[0, : radar.rx_y], radar)
     found = []
-    for path in dict.fromkeys(rung.path_names):
-        own = np.array([name == path for name in rung.path_names]) & (echoes.bounces > 1) & (power > 0)
+    for path in dict.fromkeys(model.path_names):
+        own = np.array([name == path for name in model.path_names]) & (echoes.bounces > 1) & (power > 0)
         if own.any():
             weight = power[own] / power[own].sum()
             range_m, velocity = float(weight @ length.mean(axis=0)[own]) / 2, float(weight @ rate[own]) / 2

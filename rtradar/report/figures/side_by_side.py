@@ -1,4 +1,4 @@
-"""Pictures of several rungs side by side, with axes and units, as PNG files."""
+"""Pictures of several models side by side, with axes and units, as PNG files."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def draw_power_over_time(
     reference: str,
     title: str,
 ) -> None:
-    """Echo power of each rung over time, and how far it is from the reference.
+    """Echo power of each model over time, and how far it is from the reference.
 
     Parameters
     ----------
@@ -29,11 +29,11 @@ def draw_power_over_time(
     times : (time,) float64
         [s].
     power : mapping of str to (time,) float64
-        By rung [m^2].
+        By model [m^2].
     unit : FieldUnit
         In which they are drawn.
     reference : str
-        One of the rungs.
+        One of the models.
     title : str
     """
     figure = new_figure(9, 5.5)
@@ -61,7 +61,7 @@ def draw_part_power(
     unit: FieldUnit,
     title: str,
 ) -> None:
-    """Mean echo power of each body part by rung, and how much of the time it is hidden.
+    """Mean echo power of each body part by model, and how much of the time it is hidden.
 
     Parameters
     ----------
@@ -70,9 +70,9 @@ def draw_part_power(
     parts : sequence of str
         Names.
     power : mapping of str to (part,) float64
-        By rung [m^2].
+        By model [m^2].
     hidden : mapping of str to (part,) float64
-        By rung: share of time and channels, 0 to 1.
+        By model: share of time and channels, 0 to 1.
     unit : FieldUnit
         In which power is drawn.
     title : str
@@ -103,14 +103,14 @@ def draw_maps(
     up: tuple[str, NDArray[np.float64]],
     title: str,
 ) -> None:
-    """The same map of each rung in the same colours.
+    """The same map of each model in the same colours.
 
     Parameters
     ----------
     path : path
         PNG file.
     maps : mapping of str to (up, across) float64
-        By rung: levels [dB].
+        By model: levels [dB].
     label : str
         Of their colour bar, with its unit.
     across, up : (str, (n,) float64)
@@ -140,7 +140,7 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
     path : path
         PNG file.
     clouds : mapping of str to (point, 3) float64
-        By rung: time [s], range [m], velocity [m/s].
+        By model: time [s], range [m], velocity [m/s].
     title : str
     """
     figure = new_figure(1 + 4.6 * len(clouds), 4.8)

@@ -1,4 +1,4 @@
-"""`compare.html`: several rungs on one page, in one file that opens without a network."""
+"""`compare.html`: several models on one page, in one file that opens without a network."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ $style</style>
 <header>
 <p class="kind">rtradar compare</p>
 <h1>$title</h1>
-<p class="sub">$rungs</p>
+<p class="sub">$models</p>
 </header>
 <main>
 <section><h2>What differs</h2>$measures
 <p class="note">Differences are to the reference, $reference. Maps are compared in decibels: range-Doppler in the cells that
-either rung detects, spectrograms in the cells 10 dB above the median of either. All rungs have the same noise, sample by
+either model detects, spectrograms in the cells 10 dB above the median of either. All models have the same noise, sample by
 sample. Echo power is of one chirp every 10 ms, each from another Tx, which makes it saw.</p></section>
 <section id="maps"><h2>Side by side</h2><div class="pictures">$pictures</div></section>
 <div class="tables"><section><h2>Seconds a stage</h2>$stages</section>
@@ -69,7 +69,7 @@ def write_comparison(
     parameters = {key: value for key, value in summary["parameters"].items() if key != "radar"}
     page = _PAGE.substitute(
         title=escape(str(summary["parameters"]["motion"])),
-        rungs=escape(f"{summary['parameters']['radar']['name']}: {', '.join(names)}"),
+        models=escape(f"{summary['parameters']['radar']['name']}: {', '.join(names)}"),
         reference=escape(summary["reference"]),
         style=files("rtradar.report").joinpath("page.css").read_text(encoding="utf-8"),
         measures=table(rows[1:], rows[0]),

@@ -1,6 +1,6 @@
 """Furniture: physical optics over its facets, as each Tx lights them and each Rx sees them; sheets with several bounces.
 
-The machinery is that of the rung `rays`: facets are tubes, Mitsuba says which of them an antenna sees past all furniture,
+The machinery is that of the model `rays`: facets are tubes, Mitsuba says which of them an antenna sees past all furniture,
 lengths and phases are float64. A closed piece returns one bounce: each facet is a mirror by the Fresnel coefficients of a
 half-space of its material, TE and TM apart, at its own angle and the sweep's centre frequency. A thin sheet, which is of metal,
 reflects on both sides and up to `SHEET_BOUNCES` times: a corner reflector. Bounces between different pieces, and between

@@ -90,7 +90,7 @@ class Clutter:
     Raises
     ------
     InputError
-        Where a dial is out of range, a mesh cannot be used, or walls change a return faster over the sweep than a polynomial
+        Where an option is out of range, a mesh cannot be used, or walls change a return faster over the sweep than a polynomial
         follows to a thousandth of the strongest.
     BackendError
         Where no backend of that kind works here.

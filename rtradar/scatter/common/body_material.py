@@ -113,7 +113,7 @@ def material_factor(to_tx: Array, to_rx: Array, eta: Field, polarization: Litera
 
 
 class Surface:
-    """The surface of the body in free space, for rungs whose amplitudes are those of a conductor.
+    """The surface of the body in free space, for models whose amplitudes are those of a conductor.
 
     Parameters
     ----------

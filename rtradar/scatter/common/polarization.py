@@ -1,4 +1,4 @@
-"""Co-polar reflection by a conductor, for rungs that integrate over surfaces as scalars."""
+"""Co-polar reflection by a conductor, for models that integrate over surfaces as scalars."""
 
 from __future__ import annotations
 

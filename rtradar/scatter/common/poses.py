@@ -1,4 +1,4 @@
-"""Where body and antennas are when a chirp is on its way: the common ground of all rungs."""
+"""Where body and antennas are when a chirp is on its way: the common ground of all models."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def anchor_step(radar: Radar, apart_s: float = _ANCHORS_S) -> int:
     return max(1, round(apart_s / radar.chirp_interval_s))
 
 
-class Rung(Protocol):
-    """A rung of the fidelity ladder: a body seen by a radar, ready to answer for any chirps of the capture.
+class EchoModel(Protocol):
+    """An echo model: a body seen by a radar, ready to answer for any chirps of the capture.
 
     ``variant`` is the backend that traces, in the words of the command line; None where nothing is traced.
     """

@@ -1,4 +1,4 @@
-"""A moving body as facets: what the rungs `physical-optics` and `reference` share."""
+"""A moving body as facets: what the models `physical-optics` and `reference` share."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rung `analytic`: the closed-form cross-section of each ellipsoid at its specular range; nothing hides anything."""
+"""The echo model `analytic`: the closed-form cross-section of each ellipsoid at its specular range; nothing hides anything."""
 
 from __future__ import annotations
 
@@ -185,7 +185,7 @@ class Analytic:
 
 
 def analytic(radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor") -> Analytic:
-    """`Analytic` as the rung of that name."""
+    """`Analytic` as the model of that name."""
     return Analytic(radar, body, spreading=spreading, material=material)
 
 

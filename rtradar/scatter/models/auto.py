@@ -1,4 +1,4 @@
-"""The rung `auto`: each part at each time by the cheapest way that keeps the whole within a tolerance."""
+"""The echo model `auto`: each part at each time by the cheapest way that keeps the whole within a tolerance."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.poses import ChirpPoses, Rung, chirp_poses
+from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.models.auto_errors import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
@@ -262,16 +262,16 @@ class Auto:
         return ZoneShares(self._radar, self._body, sweep_nodes(self._radar), self._occluders)
 
     @cached_property
-    def _physical_optics(self) -> Rung:
+    def _physical_optics(self) -> EchoModel:
         return self._traced(PhysicalOptics(self._radar, self._body, variant=self._variant, spreading=self._spreading))
 
     @cached_property
-    def _reference(self) -> Rung:
+    def _reference(self) -> EchoModel:
         return self._traced(Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading))
 
-    def _traced(self, rung: Rung) -> Rung:
-        self.variant = rung.variant
-        return rung
+    def _traced(self, model: EchoModel) -> EchoModel:
+        self.variant = model.variant
+        return model
 
 
 def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:

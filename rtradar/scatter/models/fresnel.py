@@ -1,4 +1,4 @@
-"""The rung `fresnel`: `specular`, each return weighted by how much of its Fresnel zones is in view."""
+"""The echo model `fresnel`: `specular`, each return weighted by how much of its Fresnel zones is in view."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rung `physical-optics`: the exact carrier of the specular point at every chirp, times an envelope that changes slowly."""
+"""The echo model `physical-optics`: the exact carrier of the specular point at every chirp, times a slowly changing envelope."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ class PhysicalOptics:
     Raises
     ------
     InputError
-        Where a dial is out of range.
+        Where an option is out of range.
 
     Notes
     -----

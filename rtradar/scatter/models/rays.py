@@ -1,4 +1,4 @@
-"""The rung `rays`: shooting and bouncing rays by Mitsuba, on a moving body."""
+"""The echo model `rays`: shooting and bouncing rays by Mitsuba, on a moving body."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_dials
+from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
 from rtradar.scatter.specular_point.solver import mirror
 from rtradar.trace.backends.backend import select, use
@@ -60,7 +60,7 @@ class Rays:
     Raises
     ------
     InputError
-        Where a dial is out of range, or would take too many tubes.
+        Where an option is out of range, or would take too many tubes.
     BackendError
         Where no backend of that kind works here.
     """
@@ -76,7 +76,7 @@ class Rays:
         bounces: int = BOUNCES_OF_BODY,
         anchor_s: float = ANCHOR_S,
     ) -> None:
-        check_dials(rays_per_wavelength, bounces)
+        check_options(rays_per_wavelength, bounces)
         if not 0 <= anchor_s < 1:
             raise InputError(f"rays: anchor_s = {anchor_s}; allowed are 0 (every chirp) to 1 s")
         self._radar, self._body, self._spreading, self._bounces = radar, body, spreading, bounces

@@ -1,4 +1,4 @@
-"""The rung `reference`: physical optics over every facet, at every chirp and every receiver; slow, and the judge of speed."""
+"""The echo model `reference`: physical optics over every facet, at every chirp and receiver; slow, and the judge of speed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The rung `specular`: bistatic near-field geometric optics per chirp, with traced occlusion of the specular point."""
+"""The echo model `specular`: bistatic near-field geometric optics per chirp, with traced occlusion of the specular point."""
 
 from __future__ import annotations
 

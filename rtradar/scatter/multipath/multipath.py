@@ -1,4 +1,4 @@
-"""The person in a room: echoes over walls, floor and ceiling, and through walls, on top of the rungs `specular` and `analytic`.
+"""The person in a room: echoes over walls, floor and ceiling, and through walls, on top of the models `specular` and `analytic`.
 
 A leg over a wall is straight from the antenna's image, so lengths and returns of every path are those of the same geometric
 optics with images for antennas, in float64 at every chirp. What walls, polarisation, the surface of the body and shadows do to
@@ -287,7 +287,7 @@ class Multipath:
 
 
 class PersonAlone:
-    """The person of a `Multipath` in free space: the rung `specular` or `analytic`, at no further tracing."""
+    """The person of a `Multipath` in free space: the model `specular` or `analytic`, at no further tracing."""
 
     def __init__(self, room: Multipath) -> None:
         self._room = room

@@ -28,7 +28,7 @@ class WallEchoes:
     paths : sequence of WallPath
         Of which the echoes may be.
     far_field : bool
-        Whether the formula of the rung `analytic` is taken.
+        Whether the formula of the model `analytic` is taken.
     """
 
     def __init__(self, radar: Radar, paths: Sequence[WallPath], *, far_field: bool) -> None:

@@ -65,11 +65,11 @@ def rays_scattering(
     Raises
     ------
     InputError
-        Where a dial is out of range, or would take too many tubes, or a mesh cannot be used.
+        Where an option is out of range, or would take too many tubes, or a mesh cannot be used.
     BackendError
         Where no backend of that kind works here.
     """
-    check_dials(rays_per_wavelength, bounces)
+    check_options(rays_per_wavelength, bounces)
     solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
     field = np.zeros(len(tx), dtype=np.complex128)
     if len(tx) == 0:
@@ -117,8 +117,8 @@ def rays_scattering(
     return field
 
 
-def check_dials(rays_per_wavelength: float, bounces: int) -> None:
-    """Refuse dials that mean nothing.
+def check_options(rays_per_wavelength: float, bounces: int) -> None:
+    """Refuse options that mean nothing.
 
     Raises
     ------

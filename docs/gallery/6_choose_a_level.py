@@ -1,8 +1,8 @@
 """
-Choose a rung
+Choose a model
 =============
 
-The rungs of the ladder trade accuracy for time. Here one pose of a kick, seen from the side, meets each of them; its error is
+The echo models trade accuracy for time. Here one pose of a kick, seen from the side, meets each of them; its error is
 set against what it costs. The page "Choosing a fidelity level" has the same for whole runs, both radars and all activities.
 """
 
@@ -28,8 +28,8 @@ tx = np.broadcast_to([-4.0, 1.0, 1.0], rx.shape)
 judge = rt.scattering_length(pose, tx, rx, 14e9, "reference", facets=20480)
 
 # %%
-# Every rung once to compile what it needs, and once to be timed.
-rungs = {
+# Every model once to compile what it needs, and once to be timed.
+models = {
     "analytic": ("analytic", {}),
     "specular": ("specular", {}),
     "fresnel, 16 rays": ("fresnel", {"shadow_rays": 16}),
@@ -38,10 +38,10 @@ rungs = {
     "physical-optics, 5120 facets": ("physical-optics", {"facets": 5120}),
 }
 figure, axes = plt.subplots(figsize=(7, 4.5), layout="constrained")
-for name, (fidelity, dials) in rungs.items():
-    rt.scattering_length(pose, tx, rx, 14e9, fidelity, **dials)
+for name, (fidelity, model_options) in models.items():
+    rt.scattering_length(pose, tx, rx, 14e9, fidelity, **model_options)
     began = time.perf_counter()
-    found = rt.scattering_length(pose, tx, rx, 14e9, fidelity, **dials)
+    found = rt.scattering_length(pose, tx, rx, 14e9, fidelity, **model_options)
     cost = time.perf_counter() - began
     error = 100 * np.sqrt(np.mean(np.abs(found - judge) ** 2) / np.mean(np.abs(judge) ** 2))
     print(f"{name:30s} {error:6.1f} %  {1000 * cost:8.1f} ms")
@@ -50,4 +50,4 @@ axes.set(xscale="log", yscale="log", xlabel="Time of 48 Tx-Rx pairs [s]", ylabel
 axes.set_title("21 ellipsoids at 14 GHz, against 20 480 facets a part")
 axes.grid(alpha=0.3, which="both")
 axes.legend()
-figure.savefig(OUT / "6_choose_a_rung.png")
+figure.savefig(OUT / "6_choose_a_level.png")
