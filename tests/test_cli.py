@@ -16,6 +16,7 @@ import pytest
 import xarray
 
 from rtradar.cli import main
+from rtradar.cli.values import setting
 
 SHORT = ["--duration", "0.2", "--snr-db", "20"]
 
@@ -151,6 +152,20 @@ def test_json_goes_where_it_is_asked_for(tmp_path: Path) -> None:
     assert json.loads((tmp_path / "s.json").read_text())["fidelity"] == "analytic"
 
 
+@pytest.mark.parametrize(
+    ("text", "value"), [("3", 3), ("0.5", 0.5), ("true", True), ("false", False), ("inf", "inf"), ("a=b", "a=b")]
+)
+def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: object) -> None:
+    name, read = setting(f"shadow_rays={text}")
+    assert (name, type(read), read) == ("shadow_rays", type(value), value)
+
+
+def test_a_model_option_reaches_the_model(tmp_path: Path) -> None:
+    words = ["--fidelity", "fresnel", "--model-option", "shadow_rays=8", "--out", tmp_path / "out"]
+    assert run("synthetic:punch", *SHORT, *words) == 0
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]["dials"] == {"shadow_rays": 8}
+
+
 def _amc(folder: Path, frames: str = FRAMES) -> list[str]:
     (folder / "tiny.asf").write_text(SKELETON)
     (folder / "tiny.amc").write_text(frames)
@@ -187,6 +202,8 @@ BAD: dict[str, tuple[Callable[[Path], list[str]], str]] = {
     "too short for a frame": (lambda folder: ["synthetic:walk", "--duration", "0.05"], "frame"),
     "radar inside the person": (lambda folder: _radar(folder, "position_m = [0.0, 0.0, 1.0]"), "0.3 m"),
     "person beyond the range": (lambda folder: _radar(folder, "position_m = [-40.0, 0.0, 1.0]"), "range"),
+    "model option without a value": (lambda folder: ["synthetic:walk", "--model-option", "shadow_rays"], "NAME=VALUE"),
+    "unknown model option": (lambda folder: ["synthetic:walk", "--model-option", "rays=3"], "no option 'rays'"),
     "no such option": (lambda folder: ["synthetic:walk", "--fidelty", "analytic"], "fidelty"),
 }
 
