@@ -231,7 +231,7 @@ def draw(count: int, seed: int, only: str) -> list[Mutant]:
     chance = random.Random(seed)
     piles = []
     for package in PACKAGES:
-        files = sorted(path.relative_to(CHECKOUT).as_posix() for path in (CHECKOUT / "rtradar" / package).glob("*.py"))
+        files = sorted(path.relative_to(CHECKOUT).as_posix() for path in (CHECKOUT / "rtradar" / package).rglob("*.py"))
         pile = [mutant for file in files if only in file for mutant in mutants_of(file)]
         chance.shuffle(pile)
         piles.append(pile)
