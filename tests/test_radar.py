@@ -264,3 +264,8 @@ def test_axes_have_the_bins() -> None:
 def test_a_frame_of_exactly_whole_cycles_keeps_the_last_one() -> None:
     # 0.3 / 0.1 is 2.999... in float64.
     assert Radar(tx_y=1, tx_z=0, chirp_duration_s=0.1, frame_duration_s=0.3).cycles_per_frame == 3
+
+
+def test_carriers_of_fdm_lie_evenly_about_the_sweep() -> None:
+    radar = Radar(multiplexing="fdm", carrier_step_hz=10e6, tx_y=2, tx_z=1)
+    np.testing.assert_allclose(radar.tx_offset_hz, [-10e6, 0, 10e6])

@@ -181,6 +181,23 @@ def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> N
     assert rises.max() < 0.15
 
 
+@pytest.mark.parametrize("down", [0.0, 0.3, 1.0])
+def test_straight_arms_of_both_sides_mirror_each_other(tmp_path: Path, down: float) -> None:
+    """A straight arm does not say where it would bend; both sides must be guessed alike, whichever way the arms point."""
+    markers, _ = anatomical(1.77)
+    way = np.array([0.0, 1.0 - down, -down]) / np.hypot(1.0 - down, down)
+    shoulder = markers["SHO"]
+    for name, far in {"ELB": 0.33, "WRA": 0.59, "WRB": 0.59, "FIN": 0.68}.items():
+        markers[name] = shoulder + far * way
+    markers["WRA"], markers["WRB"] = markers["WRA"] + [0.03, 0, 0], markers["WRB"] - [0.03, 0, 0]
+    worn = [name for name in HDM05 if name in NEEDED]
+    points = [markers[n] if n in markers else markers[n[1:]] * [1, 1 if n[0] == "L" else -1, 1] for n in worn]
+    motion = load_motion(write(tmp_path / "straight.c3d", np.repeat([points], FRAMES, axis=0), worn))
+    left, right = ([j for j, node in enumerate(NODES) if node.startswith(side)] for side in ("l_", "r_"))
+    assert [NODES[j][2:] for j in left] == [NODES[j][2:] for j in right]
+    np.testing.assert_allclose(motion.positions[:, left], motion.positions[:, right] * [1, -1, 1], atol=2e-6)
+
+
 def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.ndarray) -> None:
     motion = load_motion(write(tmp_path / "walk.c3d", walk))
     # He turns by 1.2 rad/s as a whole: every bone's rotation from the first frame on is that turn.
