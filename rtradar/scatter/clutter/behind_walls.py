@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import lru_cache
 from itertools import product
@@ -70,14 +69,24 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
         behind |= crossed(wall, antennas[:, None], points).any(axis=0)
     if not behind.any():
         return returns
-    before, after = returns.take(~behind), _let_through(returns.take(behind), radar, scene)
-    return _joined([replace(before, amplitude=before.at_nodes(after.frequency, radar), frequency=after.frequency), after])
+    nodes = sweep_nodes(radar, FURNITURE_NODES)
+    returns = replace(returns, amplitude=returns.at_nodes(nodes, radar), frequency=nodes)
+    parts, off = _transmitted(returns.take(behind), radar, scene)
+    parts = [returns.take(~behind), *parts]
+    whole = replace(
+        returns,
+        length=np.concatenate([part.length for part in parts], axis=-1),
+        amplitude=np.concatenate([part.amplitude for part in parts], axis=-1),
+        bounces=np.concatenate([part.bounces for part in parts]),
+        points=np.concatenate([part.points for part in parts], axis=2),
+    ).with_fewest_nodes(radar, ENOUGH)
+    return replace(whole, off_m=max(whole.off_m, off))
 
 
-def _let_through(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
-    """`behind_walls` of points that some antennas see through a wall."""
-    points = returns.points[0, 0, :, 0]
-    series, nodes = delayed(scene, radar, FURNITURE_NODES), sweep_nodes(radar, FURNITURE_NODES)
+def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[RoomEchoes], float]:
+    """Echoes of points that some antennas see through a wall, group by group of alike delays, and what they are off by [m]."""
+    points, nodes = returns.points[0, 0, :, 0], returns.frequency
+    series = delayed(scene, radar, FURNITURE_NODES)
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
         ways = points - antennas[:, None]
@@ -91,31 +100,16 @@ def _let_through(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
         for one in (*out.met, *back.met):
             passes[one.wall] += one.passes
         alike.setdefault(tuple(sorted(passes.items())), []).append(_Pair(out, back, left_out, left_back))
-    bare, kept = returns.at_nodes(nodes, radar), radar.rx_of_tx
     # A bound of each echo, for most are not worth what they hold in memory.
-    strength = np.abs(bare).max(axis=(0, 1, 2))
+    strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
     sizes = np.array([sum(_most(pair.left_out) * _most(pair.left_back) for pair in pairs) * strength for pairs in alike.values()])
     parts, off = [], 0.0
     for pairs, size, some in zip(alike.values(), sizes, _worth(sizes), strict=True):
         if some.any():
-            parts.append(_together(replace(returns, amplitude=bare, frequency=nodes).take(some), pairs, some, kept))
+            parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
             if any(not series[one.wall].held[1] for pair in pairs for one in (*pair.out.met, *pair.back.met)):
                 off = max(off, float(size.max()))
-    if not parts:
-        return replace(returns, amplitude=np.zeros_like(returns.amplitude))
-    whole = _joined(parts).with_fewest_nodes(radar, ENOUGH)
-    return replace(whole, off_m=max(whole.off_m, off))
-
-
-def _joined(parts: Sequence[RoomEchoes]) -> RoomEchoes:
-    """Echoes of one object at the same nodes."""
-    return replace(
-        parts[-1],
-        length=np.concatenate([part.length for part in parts], axis=-1),
-        amplitude=np.concatenate([part.amplitude for part in parts], axis=-1),
-        bounces=np.concatenate([part.bounces for part in parts]),
-        points=np.concatenate([part.points for part in parts], axis=2),
-    )
+    return parts, off
 
 
 def _most(left: Field) -> Array:
