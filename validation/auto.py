@@ -1,4 +1,4 @@
-"""The rung `auto` against its tolerance, frame by frame of four whole activities, and its cost against the fixed rungs.
+"""The model `auto` against its tolerance, frame by frame of four whole activities, and its cost against the fixed models.
 
 Frames of 100 ms follow each other over 3 s of each activity. Of each, the received spectrum H(f, t) is held against that of
 `reference` at the four corner channels of the y-line, at the first, middle and last frequency of the sweep, in 4 TDM cycles
@@ -85,7 +85,7 @@ def measure(quick: bool) -> list[Row]:
                     cost.setdefault(label, []).append(_cost(fidelity, dials, radar, body, n_frames))
                     rows.append(reported(claim, "cost over analytic", "", cost[label][-1] / cost["analytic"][-1], key="auto"))
         if quick:
-            continue  # one activity does not tell which fixed rung meets the tolerance on all
+            continue  # one activity does not tell which fixed model meets the tolerance on all
         cheapest = next(fixed for fixed in FIXED if all(meets[fixed]))
         says = (
             f"{name}, time to the cloud by `auto` at 0.5 dB over that by `{cheapest}`, the cheapest fixed level that keeps it, "
@@ -97,14 +97,14 @@ def measure(quick: bool) -> list[Row]:
 
 
 def _cost(fidelity: str, dials: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int) -> float:
-    """Seconds of every third frame [s], by a new rung, for rungs keep what they traced."""
+    """Seconds of every third frame [s], by a new model, for models keep what they traced."""
     seconds(build_model(fidelity, radar, body, **dials), radar, 0)
     rung = build_model(fidelity, radar, body, **dials)
     return sum(seconds(rung, radar, frame * radar.chirps_per_frame) for frame in range(0, n_frames, 3))
 
 
 def to_cloud(fidelity: str, other: str, radar: rt.Radar, repeats: int = REPEATS, duration_s: float = DURATION_S) -> float:
-    """Time of all activities to the cloud by one level, with its own dials, over that by another."""
+    """Time of all activities to the cloud by one level, with its own options, over that by another."""
     whole = {fidelity: 0.0, other: 0.0}
     for activity in FRAMES:
         motion = rt.synthetic_motion(activity, seed=0, duration_s=duration_s)

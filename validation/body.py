@@ -7,7 +7,7 @@ spreading 1 / (R1 R2). No curvature and no wavefront matrix is written down, so 
 near-field factor is the ratio of that to the same for plane waves, spread over the way to the point that these meet.
 
 A standing person goes through `rtradar.compare`, and those parts are judged that it says are fully seen; four activities are
-looked at instant by instant. What is left between the two rungs is hidden by other parts, and reported.
+looked at instant by instant. What is left between the two models is hidden by other parts, and reported.
 
     python validation/body.py [--quick] [--json FILE]
 """
@@ -176,7 +176,7 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
     yield reported(claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean()))
     yield reported(claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min()))
-    # What the rungs' frame powers differ by: near field of all parts, then occlusion of some.
+    # What the models' frame powers differ by: near field of all parts, then occlusion of some.
     whole = decibels(specular.sum(axis=1) / analytic.sum(axis=1))
     bent = decibels((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
     yield reported(claim, "frame power, specular over analytic, mean", "dB", float(whole.mean()))

@@ -1,6 +1,6 @@
-"""Doppler floor of smooth motion: what stands beside the true Doppler of one ellipsoid, on every rung.
+"""Doppler floor of smooth motion: what stands beside the true Doppler of one ellipsoid, on every model.
 
-A sphere flies past and an ellipsoid turns, both analytically, through rung, IF, range and slow-time spectra, all in
+A sphere flies past and an ellipsoid turns, both analytically, through model, IF, range and slow-time spectra, all in
 complex128 under Chebyshev windows of 160 dB. Whatever is not smooth from chirp to chirp, a facet that flips or a mirror
 point that is found only nearly, would raise the floor; outside the Doppler that the motion really has, and the main lobe
 of the window round it, it must stay below -80 dB of the strongest cell, in every channel.
@@ -8,7 +8,7 @@ of the window round it, it must stay below -80 dB of the strongest cell, in ever
 The true Doppler comes from the shortest path over the surface, found here by a general minimiser at a few instants.
 
 Physical optics of a turning body has a wave of its own terminator, -60 to -65 dB, which is no fault of its sampling. There the
-median outside must stay below -80 dB, and the highest cell within 3 dB of that of `reference`. These rungs are seen by one Tx
+median outside must stay below -80 dB, and the highest cell within 3 dB of that of `reference`. These models are seen by one Tx
 that sends once in each TDM cycle, for `reference` takes every facet at every chirp.
 
     python validation/doppler_floor.py [--quick] [--json FILE]
@@ -41,7 +41,7 @@ OVER_REFERENCE_DB = 3.0
 
 
 class Moving(Protocol):
-    """All that a rung asks of a body."""
+    """All that a model asks of a body."""
 
     part_names: tuple[str, ...]
     duration_s: float
@@ -152,7 +152,7 @@ def floor_of(radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, in
     fast, slow = chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False), chebwin(n, ATTENUATION_DB, sym=False)
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
-    # The rung asks a body for its poses, its parts and its duration: this one has them.
+    # The model asks a body for its poses, its parts and its duration: this one has them.
     echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
     x = rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps)))
     spectrum = rt.process.range_doppler(x, radar, range_window=fast, doppler_window=slow)

@@ -1,8 +1,8 @@
-"""The closed form of the ellipsoid's cross-section against curvature, and both closed-form rungs against that far away.
+"""The closed form of the ellipsoid's cross-section against curvature, and both closed-form models against that far away.
 
 The reference is pi R1 R2 = pi / K, with the Gaussian curvature K from the first and second fundamental forms of the surface
 (a sin u cos v, b sin u sin v, c cos u): E, F, G, L, M, N. It knows nothing of the support function, with which the closed
-form and the rung `analytic` are written, nor of the path's Hessian, with which `specular` is. Two antennas far apart see
+form and the model `analytic` are written, nor of the path's Hessian, with which `specular` is. Two antennas far apart see
 the point whose normal halves their angle, and the same pi / K; co-polar, less what the mirror turns of the field,
 E_r = 2 (n.E) n - E.
 

@@ -95,7 +95,7 @@ def worst_error(pairs: list[tuple[complex, complex]], limit: float) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Ball:
-    """A sphere that flies along x; all that a rung asks of a body."""
+    """A sphere that flies along x; all that a model asks of a body."""
 
     speed: float = 0.0
     radius: float = 0.2
@@ -147,6 +147,6 @@ def chain(radar: rt.Radar | None = None, what: rt.Motion | None = None, **option
 def spectrum(radar: rt.Radar, body: Ball, rung: str = "analytic") -> Any:
     """Range-Doppler of one window of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
-    # The rung asks a body for its poses, its parts and its duration: this one has them.
+    # The model asks a body for its poses, its parts and its duration: this one has them.
     echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
     return rt.process.range_doppler(rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar)

@@ -47,7 +47,7 @@ def _() -> str:
         pairs.append((complex(rt.scattering_length(alone(0.5, 0.5, 0.5), [4.5, 0, 0], [4.5, 0, 0], frequency)[0]), reference))
         far = rt.scattering_length(alone(0.5, 0.5, 0.5), [1e6, 0, 0], [1e6, 0, 0], frequency, "analytic")[0]
         pairs.append((complex(far), along_axis(0.5, (0.5, 0.5), 1e6, frequency)))
-    return worst_error(pairs, 1e-5)  # the analytic rung has no near field: 0.5 m in 1000 km
+    return worst_error(pairs, 1e-5)  # the analytic model has no near field: 0.5 m in 1000 km
 
 
 @case("whole chain at 1 and 300 GHz", "finite; 1 GHz warns of radii below a wavelength")

@@ -142,7 +142,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
 
 @dataclass(frozen=True)
 class Standing:
-    """A body that stands still, for a rung."""
+    """A body that stands still, for a model."""
 
     pose: rt.Ellipsoids
     duration_s: float = 0.1

@@ -1,10 +1,11 @@
-"""Whole body: what every rung receives, against `reference`, for four activities at 12 and 77 GHz.
+"""Whole body: what every model receives, against `reference`, for four activities at 12 and 77 GHz.
 
 Compared is the received spectrum H(f, t) of the corner channels, first and last Tx with first and last Rx of the y-line, at the
 first, middle and last frequency of the sweep, in every fourth TDM cycle of one frame of 100 ms: rms |H - Href| over rms |Href|,
 and the power of that frame. Frames are taken where limbs are fast and hide each other; how much is hidden stands beside.
-Physical optics is judged on the walk: 2 % at 12 GHz, 4 % at 77 GHz. A rung that keeps a tolerance of frame power is judged by it.
-The others leave out what they leave out, and are reported. `reference` itself is held against itself with four times the facets.
+Physical optics is judged on the walk: 2 % at 12 GHz, 4 % at 77 GHz. A model that keeps a tolerance of frame power is judged by
+it. The others leave out what they leave out, and are reported. `reference` itself is held against itself with four times the
+facets.
 
     python validation/ladder.py [--quick] [--json FILE]
 """
@@ -36,7 +37,7 @@ FRAMES = {"walk": 0.75, "kick": 0.45, "punch": 0.35, "jumping_jack": 0.4}
 EVERY_CYCLES = 4
 # What was asked of physical optics on a walking body.
 MOST_ERROR = {("paper-12ghz", "walk"): 0.02, ("paper-77ghz", "walk"): 0.04}
-# The tolerance that this rung has where none is given.
+# The tolerance that this model has where none is given.
 MOST_DECIBELS = {"auto": 0.5}
 # They find each receiver's echo by itself, so that those between the ends of a line need not be asked.
 BY_RECEIVER = ("reference", "rays")
@@ -75,7 +76,7 @@ class Scene:
         return dataclasses.replace(self.radar, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)
 
     def spectrum(self, fidelity: str, **dials: Any) -> NDArray[np.complex128]:
-        """What a rung receives (frequency, chirp, rx)."""
+        """What a model receives (frequency, chirp, rx)."""
         radar = self.corner_radar if fidelity in BY_RECEIVER else self.radar
         return spectrum(build_model(fidelity, radar, self.body, **dials), radar, self.chirps)
 

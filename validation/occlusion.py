@@ -3,7 +3,7 @@
 A part straight behind another must return nothing. Half covered it returns all or nothing, by its specular point; how far
 that is from physical optics is reported over the covered share. Then the fade in time: a sphere passes before an upright
 ellipsoid, and the power beside the Doppler line of the ellipsoid is compared for ramps of several lengths, and for the
-rung itself with anchors 10 ms apart, whatever the instant between them at which the specular point goes.
+model itself with anchors 10 ms apart, whatever the instant between them at which the specular point goes.
 
 The reference adds up the points of ``physical_optics.py`` that the occluder, a sphere, does not hide from the antenna, by
 the distance of its centre from each ray; the edge is softened over one cell, so that it converges as the square of it.
@@ -220,7 +220,7 @@ def beside_db(field: Array | NDArray[np.complex128], band: Band) -> float:
 
 @dataclass(frozen=True)
 class Passing:
-    """A body of two parts for a rung: the ellipsoid stands, the sphere passes before it, and frees it at ``instant``."""
+    """A body of two parts for a model: the ellipsoid stands, the sphere passes before it, and frees it at ``instant``."""
 
     speed: float
     instant: float
@@ -270,7 +270,7 @@ def fade_rows(quick: bool) -> Iterator[Row]:
             floors, errors = [], []
             for shift in late:
                 moved = Passing(speed, passing.instant + shift * band.cycle_s)
-                # The rung asks a body for its poses, its parts and its duration: this one has them.
+                # The model asks a body for its poses, its parts and its duration: this one has them.
                 rung = build_model("specular", band.radar, moved)  # type: ignore[arg-type]
                 amplitude = rung.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
                 floors.append(beside_db(amplitude, band))

@@ -5,7 +5,7 @@ Tx..surface..Rx is found by Newton's method in decimal arithmetic, derivatives b
 begun from a general minimiser. Nothing of it is the library's. The law of reflection must hold at the point that is found,
 and seen from one place a sphere's path must be twice the distance less the radius: that judges the judge.
 
-Lengths are read from `mirror`, which solves for every Tx, Rx and part, and from whole rungs for a radar that stands far away
+Lengths are read from `mirror`, which solves for every Tx, Rx and part, and from whole models for a radar that stands far away
 and a scene that stands far from its own origin.
 
     python validation/path.py [--quick] [--json FILE]
@@ -213,7 +213,7 @@ def rung_rows(quick: bool) -> Iterator[Row]:
                 for rung in MODELS:
                     if rung == "rays" and (quick or away > 1e3):
                         continue  # a minute
-                    # The rung asks a body for its poses, its parts and its duration: this one has them.
+                    # The model asks a body for its poses, its parts and its duration: this one has them.
                     echoes = build_model(rung, radar, there).echoes(chirps)  # type: ignore[arg-type]
                     poses = there.at((chirps + 0.5) * radar.chirp_duration_s)
                     worst = 0.0

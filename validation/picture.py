@@ -1,4 +1,4 @@
-"""README's picture: a synthetic walk, its ellipsoids before the radar, and what both rungs make of it.
+"""README's picture: a synthetic walk, its ellipsoids before the radar, and what both models make of it.
 
 python validation/picture.py [--out validation/picture.png]
 """

@@ -317,7 +317,7 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
                 says = "Doppler floor of `rays` by its dials: sphere in flight, highest cell"
                 yield judged(name, what, "dB", floor, -80.0, key="doppler", says=says)
             else:
-                # The terminator of a turning body moves over it: a wave that physical optics has, and no other rung.
+                # The terminator of a turning body moves over it: a wave that physical optics has, and no other model.
                 yield reported(name, what, "dB", floor, key="doppler")
 
 

@@ -1,4 +1,4 @@
-"""Real recordings through the whole chain: both rungs, both radars; a table of what came out.
+"""Real recordings through the whole chain: both models, both radars; a table of what came out.
 
 RTRADAR_MOCAP=folder python validation/recordings.py --out out/recordings [--radar paper-12ghz] [--only cmu]
 """

@@ -2,7 +2,7 @@
 
 python validation/same_maps.py BEFORE AFTER
 
-BEFORE and AFTER are folders of `rtradar run`, of the same motion, radar, scene, rung and seed. Told is the largest difference of
+BEFORE and AFTER are folders of `rtradar run`, of the same motion, radar, scene, model and seed. Told is the largest difference of
 each map over its peak. Maps that only detected cells have (range_azimuth, range_elevation) change by all that a cell holds when
 it comes to stand on the other side of its threshold: these are compared in the windows whose detections are the same.
 """

@@ -230,7 +230,7 @@ def broadside_rows(quick: bool) -> Iterator[Row]:
     for band, frequencies in {"12 GHz": np.linspace(12e9, 16e9, 5 if quick else 33), "77 GHz": np.array([79e9])}.items():
         lacks = []
         for part, axes in shapes().items():
-            # As the rung `analytic` has it: the formula's return, spread over the way to the surface and not to the centre.
+            # As the model `analytic` has it: the formula's return, spread over the way to the surface and not to the centre.
             formula = np.sqrt(rt.rcs.ellipsoid(*axes, np.pi / 2, 0.0)) * (NEAR_M / (NEAR_M - axes[0])) ** 2
             quadrature = lit_points(antenna, antenna, axes, float(frequencies.max()))
             optics = np.array([quadrature.scattering_length(float(f)) for f in frequencies])

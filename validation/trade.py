@@ -1,4 +1,4 @@
-"""The trade of speed for accuracy: what every rung and every setting of its dials costs, and how far it is from `reference`.
+"""The trade of speed for accuracy: what every model and every setting of its options costs, and how far it is from `reference`.
 
 Error is that of ``ladder.py``: the received spectrum H(f, t) of the corner channels over one frame of 100 ms, rms over rms, and
 the power of that frame. Cost is the time of echoes and IF samples of that frame, all channels, over that of `analytic` in the
@@ -41,7 +41,7 @@ SLOW = ("rays", "reference")  # minutes a frame: after all others
 
 @dataclass(frozen=True)
 class Dial:
-    """Settings of one dial, from cheap to dear, for each radar; that which the rung takes by itself is among them."""
+    """Settings of one option, from cheap to dear, for each radar; that which the model takes by itself is among them."""
 
     fidelity: str
     name: str
@@ -83,7 +83,7 @@ MARKERS = {"walk": "o", "kick": "^", "punch": "s", "jumping_jack": "D"}
 
 @dataclass(frozen=True)
 class Setting:
-    """A rung with its own dials, or one of them turned."""
+    """A model with its own options, or one of them turned."""
 
     fidelity: str
     dial: str = ""
@@ -112,7 +112,7 @@ class Point:
 
 
 def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
-    """Along a dial, each with its value; where it stands by itself is the rung as it is."""
+    """Along an option, each with its value; where it stands by itself is the model as it is."""
 
     def at(value: float) -> Setting:
         return Setting(dial.fidelity) if value == dial.default[preset] else Setting(dial.fidelity, dial.name, value)
@@ -144,7 +144,7 @@ def timed(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
 
 
 def seconds_of(scene: Scene, setting: Setting) -> float:
-    """The same for a setting, by a rung that has traced nothing of it yet; of those that take minutes, from a part of it."""
+    """The same for a setting, by a model that has traced nothing of it yet; of those that take minutes, from a part of it."""
     radar, first = scene.radar, scene.first_chirp
     rung = build_model(setting.fidelity, radar, scene.body, **setting.dials)
     if setting.fidelity == "reference":
@@ -171,7 +171,7 @@ def best_seconds(scene: Scene, setting: Setting) -> float:
 
 
 def warm_up(scene: Scene, fidelity: str) -> None:
-    """Compile what the rung compiles."""
+    """Compile what the model compiles."""
     if fidelity in SLOW:
         return  # begun anyway
     chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
@@ -238,7 +238,7 @@ def figures(points: list[Point]) -> str:
 
 
 def table(points: dict[tuple[str, str, str], Point]) -> str:
-    """For docs/choosing-a-level.md: a line a rung, then a line a setting of a dial; from and to over the activities."""
+    """For docs/choosing-a-level.md: a line a model, then a line a setting of an option; from and to over the activities."""
     lines = ["| rung | " + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS) + " |"]
     lines.append("|---" * (1 + 3 * len(PRESETS)) + "|")
 
@@ -258,7 +258,7 @@ def table(points: dict[tuple[str, str, str], Point]) -> str:
 
 
 def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
-    """Complex error over cost: a colour a rung, a marker an activity, a line a dial."""
+    """Complex error over cost: a colour a model, a marker an activity, a line an option."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -278,7 +278,7 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                 found = [(value, point) for value, point in along if point is not None]
                 x, y = [point.cost for _, point in found], [100 * point.error for _, point in found]
                 axes.plot(x, y, dial.style, color=COLOURS[dial.fidelity], linewidth=0.8, alpha=0.6, zorder=2)
-                # The ends of the dial, once.
+                # The ends of the option, once.
                 if activity == "walk" and len(found) > 1:
                     for value, point in (found[0], found[-1]):
                         text = f"{1e3 * value:g} ms" if dial.name == "anchor_s" else f"{value:g}"
