@@ -1,6 +1,6 @@
 """
-Choose a model
-=============
+Choose a fidelity level
+=======================
 
 The echo models trade accuracy for time. Here one pose of a kick, seen from the side, meets each of them; its error is
 set against what it costs. The page "Choosing a fidelity level" has the same for whole runs, both radars and all activities.
