@@ -40,11 +40,20 @@ def page(package: str) -> str:
     heading = f"{PACKAGES[package]}: {package}"
     lines = [heading, "=" * len(heading), "", f".. automodule:: {package}", "   :no-members:", ""]
     if again := [name for name, thing in public(package).items() if id(thing) in first]:
-        lines += ["Also here: " + ", ".join(f":py:obj:`rtradar.{name}`" for name in again) + ".", ""]
+        lines += [
+            "Also here: " + ", ".join(f":py:obj:`rtradar.{name}`" for name in again) + ".",
+            "",
+        ]
     for name, thing in public(package).items():
         if id(thing) in first:
             continue
-        kind = "class" if inspect.isclass(thing) else "function" if inspect.isroutine(thing) else "data"
+        kind = (
+            "class"
+            if inspect.isclass(thing)
+            else "function"
+            if inspect.isroutine(thing)
+            else "data"
+        )
         lines.append(f".. auto{kind}:: {package}.{name}")
         if kind == "class":
             lines.append("   :members:")
@@ -62,7 +71,16 @@ def write(folder: Path) -> None:
     title = "Python interface"
     pages = dict(zip(names, map(page, PACKAGES), strict=True))
     pages["index"] = "\n".join(
-        [title, "=" * len(title), "", ".. toctree::", "   :maxdepth: 1", "", *(f"   {n}" for n in names), ""]
+        [
+            title,
+            "=" * len(title),
+            "",
+            ".. toctree::",
+            "   :maxdepth: 1",
+            "",
+            *(f"   {n}" for n in names),
+            "",
+        ]
     )
     folder.mkdir(exist_ok=True)
     for name, text in pages.items():

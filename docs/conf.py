@@ -23,7 +23,11 @@ extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.g
 exclude_patterns = ["gallery"]
 default_role = "py:obj"
 html_theme = "alabaster"
-html_theme_options = {"description": rtradar.__doc__.splitlines()[0], "page_width": "1100px", "fixed_sidebar": True}
+html_theme_options = {
+    "description": rtradar.__doc__.splitlines()[0],
+    "page_width": "1100px",
+    "fixed_sidebar": True,
+}
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 numpydoc_show_class_members = False

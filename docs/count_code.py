@@ -21,7 +21,14 @@ from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
 
 LONG = 250
-_NO_CODE = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+_NO_CODE = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
 
 
 def code_lines(source: str) -> int:
@@ -33,7 +40,11 @@ def code_lines(source: str) -> int:
     for node in ast.walk(ast.parse(source)):
         body = getattr(node, "body", None)
         for text in body if isinstance(body, list) else []:
-            if isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant) and isinstance(text.value.value, str):
+            if (
+                isinstance(text, ast.Expr)
+                and isinstance(text.value, ast.Constant)
+                and isinstance(text.value.value, str)
+            ):
                 lines.difference_update(range(text.lineno, (text.end_lineno or text.lineno) + 1))
     return len(lines)
 
@@ -50,7 +61,11 @@ def dependencies(project: dict[str, object]) -> tuple[int, int]:
             lines = requires(name) or []
         except PackageNotFoundError:
             continue
-        plain = {re.split(r"[^\w.-]", line)[0].lower().replace("_", "-") for line in lines if "extra ==" not in line}
+        plain = {
+            re.split(r"[^\w.-]", line)[0].lower().replace("_", "-")
+            for line in lines
+            if "extra ==" not in line
+        }
         waiting |= plain - found
     return len(named), len(found)
 
@@ -67,7 +82,11 @@ def near_copies(folder: Path) -> str:
         "--ignore-signatures=yes",
     ]
     done = subprocess.run(
-        [sys.executable, "-m", "pylint", *words, "rtradar"], cwd=folder, capture_output=True, text=True, check=False
+        [sys.executable, "-m", "pylint", *words, "rtradar"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
     )
     return str(done.stdout.count("R0801"))
 
@@ -86,9 +105,13 @@ def main() -> int:
         print(f"{name:<12}{number:>7}")
     print(f"{'rtradar':<12}{by_package.total():>7} lines of code")
     for name in ("tests", "validation", "docs"):
-        number = sum(code_lines(path.read_text(encoding="utf-8")) for path in (folder / name).rglob("*.py"))
+        number = sum(
+            code_lines(path.read_text(encoding="utf-8")) for path in (folder / name).rglob("*.py")
+        )
         print(f"{name:<12}{number:>7}")
-    named, everything = dependencies(tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"])
+    named, everything = dependencies(
+        tomllib.loads((folder / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    )
     print(f"dependencies: {named} named, {everything} with what they bring")
     print(f"near-copies of 8 lines or more in rtradar: {near_copies(folder)}")
     print(f"modules of more than {LONG} lines: {', '.join(long)}")

@@ -29,7 +29,9 @@ _COLOURS = ("#4477aa", "#ee6677", "#228833", "#aa8800", "#0099bb", "#aa3377")
 
 def order() -> list[str]:
     """Packages from the source of the data to its end."""
-    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]["contracts"]
+    contracts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"][
+        "importlinter"
+    ]["contracts"]
     layers = next(contract["layers"] for contract in contracts if contract["type"] == "layers")
     names = [name.strip() for layer in reversed(layers) for name in layer.split("|")]
     return [name for name in names if name not in GROUND]
@@ -56,7 +58,11 @@ def classes_handed_on() -> dict[str, set[str]]:
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             giver = package(node.module or "") if isinstance(node, ast.ImportFrom) else ""
             if giver in found and giver != taker and taker not in ("__init__", *GROUND):
-                names = {alias.name for alias in node.names} if isinstance(node, ast.ImportFrom) else set()
+                names = (
+                    {alias.name for alias in node.names}
+                    if isinstance(node, ast.ImportFrom)
+                    else set()
+                )
                 found[giver] |= {name for name in names if name[0].isupper() and not name.isupper()}
     return found
 

@@ -34,7 +34,10 @@ def boxes(solid: Sequence[Box], hollow: Sequence[Box] = ()) -> Mesh:
     planes = [np.unique(everything[:, axis]) for axis in range(3)]
     filled = np.zeros([len(plane) + 1 for plane in planes], dtype=bool)  # an empty cell all round
     for number, limits in enumerate(everything):
-        low, high = ([int(np.searchsorted(plane, limits[axis, end])) for axis, plane in enumerate(planes)] for end in range(2))
+        low, high = (
+            [int(np.searchsorted(plane, limits[axis, end])) for axis, plane in enumerate(planes)]
+            for end in range(2)
+        )
         cells = tuple(slice(first + 1, last + 1) for first, last in zip(low, high, strict=True))
         filled[cells] = number < len(solid)
     corners: list[tuple[int, int, int]] = []
@@ -45,7 +48,9 @@ def boxes(solid: Sequence[Box], hollow: Sequence[Box] = ()) -> Mesh:
         for cell in np.argwhere(before != after):
             index = np.insert(cell[1:], axis, 0)  # of the cell, in the order of the axes
             outward = bool(before[tuple(cell)])
-            square = [(0, 0), (1, 0), (1, 1), (0, 1)] if outward else [(0, 0), (0, 1), (1, 1), (1, 0)]
+            square = (
+                [(0, 0), (1, 0), (1, 1), (0, 1)] if outward else [(0, 0), (0, 1), (1, 1), (1, 0)]
+            )
             for first, second, third in ((0, 1, 2), (0, 2, 3)):
                 for step in (square[first], square[second], square[third]):
                     corner = [0, 0, 0]
@@ -106,15 +111,30 @@ def bed() -> Mesh:
 
 def wardrobe() -> Mesh:
     """1.5 m wide, 0.6 m deep, 2.1 m high, three doors with bar handles."""
-    doors: list[Box] = [(0.28, 0.3, -0.745 + 0.5 * k, -0.255 + 0.5 * k, 0.1, 2.06) for k in range(3)]
-    handles: list[Box] = [(0.3, 0.33, -0.31 + 0.5 * k, -0.29 + 0.5 * k, 0.95, 1.25) for k in range(3)]
-    return boxes([(-0.3, 0.28, -0.75, 0.75, 0.08, 2.1), (-0.28, 0.24, -0.72, 0.72, 0.0, 0.08), *doors, *handles])
+    doors: list[Box] = [
+        (0.28, 0.3, -0.745 + 0.5 * k, -0.255 + 0.5 * k, 0.1, 2.06) for k in range(3)
+    ]
+    handles: list[Box] = [
+        (0.3, 0.33, -0.31 + 0.5 * k, -0.29 + 0.5 * k, 0.95, 1.25) for k in range(3)
+    ]
+    return boxes(
+        [
+            (-0.3, 0.28, -0.75, 0.75, 0.08, 2.1),
+            (-0.28, 0.24, -0.72, 0.72, 0.0, 0.08),
+            *doors,
+            *handles,
+        ]
+    )
 
 
 def sofa() -> Mesh:
     """Three seats, 2.0 m wide, 0.9 m deep."""
-    cushions: list[Box] = [(-0.2, 0.42, -0.79 + 0.54 * k, -0.29 + 0.54 * k, 0.36, 0.46) for k in range(3)]
-    feet: list[Box] = [(x, x + 0.06, y, y + 0.06, 0.0, 0.08) for x in (-0.4, 0.34) for y in (-0.95, 0.89)]
+    cushions: list[Box] = [
+        (-0.2, 0.42, -0.79 + 0.54 * k, -0.29 + 0.54 * k, 0.36, 0.46) for k in range(3)
+    ]
+    feet: list[Box] = [
+        (x, x + 0.06, y, y + 0.06, 0.0, 0.08) for x in (-0.4, 0.34) for y in (-0.95, 0.89)
+    ]
     return boxes(
         [
             (-0.45, 0.45, -1.0, 1.0, 0.08, 0.36),
@@ -164,7 +184,9 @@ def desk() -> Mesh:
 
 def shelf() -> Mesh:
     """Open bookcase, 0.9 m wide, 0.3 m deep, 1.8 m high, a back and five boards."""
-    boards: list[Box] = [(-0.14, 0.15, -0.43, 0.43, z, z + 0.02) for z in (0.06, 0.42, 0.78, 1.14, 1.46)]
+    boards: list[Box] = [
+        (-0.14, 0.15, -0.43, 0.43, z, z + 0.02) for z in (0.06, 0.42, 0.78, 1.14, 1.46)
+    ]
     return boxes(
         [
             (-0.15, -0.14, -0.43, 0.43, 0.0, 1.8),
@@ -178,7 +200,9 @@ def shelf() -> Mesh:
 
 def bathtub() -> Mesh:
     """1.7 m long (along y), 0.75 m wide, hollow."""
-    return boxes([(-0.375, 0.375, -0.85, 0.85, 0.0, 0.58)], hollow=[(-0.305, 0.305, -0.77, 0.77, 0.14, 0.58)])
+    return boxes(
+        [(-0.375, 0.375, -0.85, 0.85, 0.0, 0.58)], hollow=[(-0.305, 0.305, -0.77, 0.77, 0.14, 0.58)]
+    )
 
 
 def toilet() -> Mesh:
@@ -196,14 +220,31 @@ def toilet() -> Mesh:
 
 def basin() -> Mesh:
     """Round basin of 0.5 m on a column, 0.85 m high."""
-    outside = [(0.0, 0.0), (0.13, 0.0), (0.1, 0.05), (0.085, 0.6), (0.15, 0.68), (0.23, 0.75), (0.25, 0.85)]
+    outside = [
+        (0.0, 0.0),
+        (0.13, 0.0),
+        (0.1, 0.05),
+        (0.085, 0.6),
+        (0.15, 0.68),
+        (0.23, 0.75),
+        (0.25, 0.85),
+    ]
     inside = [(0.23, 0.85), (0.2, 0.78), (0.13, 0.73), (0.03, 0.71), (0.0, 0.71)]
     return turned([*outside, *inside], 24)
 
 
 def lamp() -> Mesh:
     """Floor lamp, 1.6 m high: a foot, a pole, a shade closed all round."""
-    profile = [(0.0, 0.0), (0.14, 0.0), (0.14, 0.02), (0.015, 0.03), (0.015, 1.3), (0.2, 1.3), (0.12, 1.6), (0.0, 1.6)]
+    profile = [
+        (0.0, 0.0),
+        (0.14, 0.0),
+        (0.14, 0.02),
+        (0.015, 0.03),
+        (0.015, 1.3),
+        (0.2, 1.3),
+        (0.12, 1.6),
+        (0.0, 1.6),
+    ]
     return turned(profile, 24)
 
 
@@ -223,7 +264,9 @@ def door() -> Mesh:
 
 def radiator() -> Mesh:
     """1.0 m wide, 0.6 m high, its front of upright ribs, 0.12 m above the floor; the wall is the plane x = 0."""
-    ribs: list[Box] = [(0.09, 0.11, -0.475 + 0.1 * k, -0.425 + 0.1 * k, 0.15, 0.69) for k in range(10)]
+    ribs: list[Box] = [
+        (0.09, 0.11, -0.475 + 0.1 * k, -0.425 + 0.1 * k, 0.15, 0.69) for k in range(10)
+    ]
     return boxes([(0.03, 0.09, -0.5, 0.5, 0.12, 0.72), *ribs])
 
 
@@ -233,8 +276,13 @@ def trihedral() -> Mesh:
     Its edges along which two triangles meet are `EDGE_M` long, one of them leaning up in the plane y = 0.
     """
     along, radius = EDGE_M / sqrt(3), EDGE_M * sqrt(2 / 3)
-    tips = [(along, radius * y, radius * z) for y, z in ((0.0, 1.0), (-sqrt(3) / 2, -0.5), (sqrt(3) / 2, -0.5))]
-    return np.array([(0.0, 0.0, 0.0), *tips]), np.array([(0, 1, 2), (0, 2, 3), (0, 3, 1)], dtype=np.int32)
+    tips = [
+        (along, radius * y, radius * z)
+        for y, z in ((0.0, 1.0), (-sqrt(3) / 2, -0.5), (sqrt(3) / 2, -0.5))
+    ]
+    return np.array([(0.0, 0.0, 0.0), *tips]), np.array(
+        [(0, 1, 2), (0, 2, 3), (0, 3, 1)], dtype=np.int32
+    )
 
 
 def dihedral() -> Mesh:
@@ -243,7 +291,9 @@ def dihedral() -> Mesh:
     Their common edge is the z axis, its middle the origin.
     """
     side, half = EDGE_M / sqrt(2), EDGE_M / 2
-    vertices = [(x, y, z) for x, y in ((0.0, 0.0), (side, side), (side, -side)) for z in (-half, half)]
+    vertices = [
+        (x, y, z) for x, y in ((0.0, 0.0), (side, side), (side, -side)) for z in (-half, half)
+    ]
     faces = [(0, 3, 1), (0, 2, 3), (0, 5, 4), (0, 1, 5)]
     return np.array(vertices), np.array(faces, dtype=np.int32)
 

@@ -53,29 +53,45 @@ class Antenna:
 
     def __post_init__(self) -> None:
         if self.pattern not in _PATTERNS:
-            raise InputError(f"antenna: pattern = {shown(self.pattern)}; allowed: {', '.join(_PATTERNS)}")
+            raise InputError(
+                f"antenna: pattern = {shown(self.pattern)}; allowed: {', '.join(_PATTERNS)}"
+            )
         if (self.exponent is not None) != (self.pattern == "cosine"):
             raise InputError(
                 f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only 'cosine' has one, and needs it"
             )
         if self.exponent is not None:
-            object.__setattr__(self, "exponent", check_number("antenna", "exponent", self.exponent, 0, _MOST_EXPONENT))
+            object.__setattr__(
+                self,
+                "exponent",
+                check_number("antenna", "exponent", self.exponent, 0, _MOST_EXPONENT),
+            )
         if self.gain_dbi is not None:
-            object.__setattr__(self, "gain_dbi", check_number("antenna", "gain_dbi", self.gain_dbi, -100, 100))
+            object.__setattr__(
+                self, "gain_dbi", check_number("antenna", "gain_dbi", self.gain_dbi, -100, 100)
+            )
         elif self.pattern == "table":
             raise InputError("antenna: pattern = 'table' needs gain_dbi, the gain at its peak")
         for cut in _CUTS:
             values = getattr(self, cut)
             if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
-                raise InputError(f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {shown(values)}")
+                raise InputError(
+                    f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {shown(values)}"
+                )
             limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
-            object.__setattr__(self, cut, tuple(check_number("antenna", cut, value, *limits) for value in values))
+            object.__setattr__(
+                self, cut, tuple(check_number("antenna", cut, value, *limits) for value in values)
+            )
         for name in ("azimuth", "elevation"):
             angles, levels = getattr(self, f"{name}_deg"), getattr(self, f"{name}_db")
             if len(angles) != len(levels) or (np.diff(angles) <= 0).any():
-                raise InputError(f"antenna: {name}_deg and {name}_db must be as many, and the angles ascend")
+                raise InputError(
+                    f"antenna: {name}_deg and {name}_db must be as many, and the angles ascend"
+                )
         if self.pattern == "table" and not (self.azimuth_deg or self.elevation_deg):
-            raise InputError("antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and elevation_db")
+            raise InputError(
+                "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and elevation_db"
+            )
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Antenna:
@@ -131,11 +147,21 @@ class Antenna:
             return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)
         if self.pattern == "dipole":
             along = unit[..., 2] if polarization == "v" else unit[..., 1]
-            across = np.maximum(1 - along**2, 1e-12)  # on the axis itself it is 0 / 0, and its limit 0
+            across = np.maximum(
+                1 - along**2, 1e-12
+            )  # on the axis itself it is 0 / 0, and its limit 0
             return np.asarray(np.cos(np.pi / 2 * along) ** 2 / across)
         level = np.zeros(unit.shape[:-1])
         if self.azimuth_deg:
-            level += np.interp(np.degrees(np.arctan2(unit[..., 1], unit[..., 0])), self.azimuth_deg, self.azimuth_db)
+            level += np.interp(
+                np.degrees(np.arctan2(unit[..., 1], unit[..., 0])),
+                self.azimuth_deg,
+                self.azimuth_db,
+            )
         if self.elevation_deg:
-            level += np.interp(np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1))), self.elevation_deg, self.elevation_db)
+            level += np.interp(
+                np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1))),
+                self.elevation_deg,
+                self.elevation_db,
+            )
         return np.asarray(10 ** (level / 10))

@@ -20,7 +20,19 @@ from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, selec
 from rtradar.trace.backends.llvm import candidates
 from rtradar.trace.backends.verdict import judge
 
-PACKAGES = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "h5py", "zarr", "matplotlib")
+PACKAGES = (
+    "rtradar",
+    "mitsuba",
+    "drjit",
+    "numpy",
+    "scipy",
+    "numba",
+    "scikit-image",
+    "trimesh",
+    "h5py",
+    "zarr",
+    "matplotlib",
+)
 """Packages whose versions tell most when something goes wrong."""
 
 Row = dict[str, str | bool | None]
@@ -84,7 +96,10 @@ def examine() -> DoctorReport:
     """
     libraries = candidates()
     verdicts = [judge(VARIANTS["llvm"], library, fresh=True) for library in libraries]
-    good = next((library for library, verdict in zip(libraries, verdicts, strict=True) if verdict.good), None)
+    good = next(
+        (library for library, verdict in zip(libraries, verdicts, strict=True) if verdict.good),
+        None,
+    )
     backends: dict[Kind, str] = {"llvm": "good" if good else "no libLLVM that works"}
     backends["scalar"] = judge(VARIANTS["scalar"], good, fresh=True).finding
     backends["cuda"] = judge(VARIANTS["cuda"], good, fresh=True).finding
@@ -100,7 +115,9 @@ def examine() -> DoctorReport:
         if backends[backend.kind] == "good":
             chosen = backend.variant
         else:
-            advice.append(f"{backend.variant}: {backends[backend.kind]}; reinstall it: pip install --force-reinstall mitsuba")
+            advice.append(
+                f"{backend.variant}: {backends[backend.kind]}; reinstall it: pip install --force-reinstall mitsuba"
+            )
         if backend.warning:
             advice.append(backend.warning)
     packages = {name: _version(name) for name in PACKAGES}
@@ -150,7 +167,8 @@ def report_text(found: DoctorReport) -> str:
         f"System    {found.system}",
         f"Cores     {found.cores}",
         f"Memory    {memory}",
-        "Packages  " + ", ".join(f"{name} {version}" for name, version in found.packages.items() if version),
+        "Packages  "
+        + ", ".join(f"{name} {version}" for name, version in found.packages.items() if version),
         "libLLVM   " + ("in the order of trial:" if found.llvm else "none found"),
         *(
             f"  {_arrow(row['chosen'])} {row['version'] or '?':<8} {row['finding']:<28} {row['origin']:<12} {row['path']}"
@@ -164,7 +182,9 @@ def report_text(found: DoctorReport) -> str:
         f"GPU FFTs  {found.gpu_ffts}",
         f"Compiled  {found.compiled_code}",
         *(f"To do     {line}" for line in found.advice),
-        f"Verdict   ready, on {found.chosen}" if found.chosen else "Verdict   no backend works: rays cannot be traced",
+        f"Verdict   ready, on {found.chosen}"
+        if found.chosen
+        else "Verdict   no backend works: rays cannot be traced",
     ]
     return "\n".join(lines)
 
@@ -211,5 +231,7 @@ def _memory_mb() -> tuple[float | None, float | None]:
         meminfo = Path("/proc/meminfo").read_text(encoding="ascii")
     except OSError:
         return total, None
-    available = next((line.split()[1] for line in meminfo.splitlines() if line.startswith("MemAvailable:")), None)
+    available = next(
+        (line.split()[1] for line in meminfo.splitlines() if line.startswith("MemAvailable:")), None
+    )
     return total, float(available) / 1024 if available else None

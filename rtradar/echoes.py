@@ -50,7 +50,9 @@ class Echoes:
         for field in ("tx", "part", "bounces"):
             object.__setattr__(self, field, np.asarray(getattr(self, field), dtype=np.int64))
         if self.length.ndim != 3:
-            raise ValueError(f"Echoes.length has shape {self.length.shape}; it must be (chirp, rx, echo)")
+            raise ValueError(
+                f"Echoes.length has shape {self.length.shape}; it must be (chirp, rx, echo)"
+            )
         chirps, _, echoes = self.length.shape
         expected = {
             "amplitude": (*self.frequency.shape, *self.length.shape),
@@ -61,6 +63,10 @@ class Echoes:
         }
         for field, shape in expected.items():
             if getattr(self, field).shape != shape:
-                raise ValueError(f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it must be {shape}")
+                raise ValueError(
+                    f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it must be {shape}"
+                )
         if len(set(self.frequency.tolist())) < self.frequency.size:
-            raise ValueError("Echoes.frequency names a node twice; the nodes of a polynomial must differ")
+            raise ValueError(
+                "Echoes.frequency names a node twice; the nodes of a polynomial must differ"
+            )

@@ -28,9 +28,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Give every property test ``RTRADAR_EXAMPLES`` times as many examples as it has, also where it names their number."""
     if _MORE == 1:
         return
-    for test in {id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)}.values():
-        if (own := getattr(test, "_hypothesis_internal_use_settings", None)) is not None:  # there is no public way to it
-            test._hypothesis_internal_use_settings = hypothesis.settings(own, max_examples=math.ceil(_MORE * own.max_examples))
+    for test in {
+        id(item.obj): item.obj for item in items if isinstance(item, pytest.Function)
+    }.values():
+        if (
+            own := getattr(test, "_hypothesis_internal_use_settings", None)
+        ) is not None:  # there is no public way to it
+            test._hypothesis_internal_use_settings = hypothesis.settings(
+                own, max_examples=math.ceil(_MORE * own.max_examples)
+            )
 
 
 @cache
@@ -72,7 +78,14 @@ def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
     from rtradar.scene import Wall, material
 
     radar = rt.Radar(
-        name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+        name="small",
+        tx_y=2,
+        tx_z=0,
+        rx_y=4,
+        rx_z=0,
+        chirp_duration_s=250e-6,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
     )
     left = Wall(
         name="left",

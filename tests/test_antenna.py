@@ -26,7 +26,9 @@ BODY = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
 def towards(azimuth_deg: float, elevation_deg: float) -> NDArray[np.float64]:
     azimuth, elevation = math.radians(azimuth_deg), math.radians(elevation_deg)
     across = math.cos(elevation)
-    return 7.0 * np.array([across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)])
+    return 7.0 * np.array(
+        [across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation)]
+    )
 
 
 @pytest.mark.parametrize("exponent", [0.0, 1.0, 2.5, 20.0])
@@ -45,10 +47,18 @@ def test_dipole() -> None:
     antenna = Antenna(pattern="dipole")
     # Balanis, eq. 4-84: [cos(pi/2 cos t) / sin t]^2, t from the wire; 3 dB at 51 and 129 degrees.
     assert antenna.relative(towards(77, 0), "v") == pytest.approx(1)
-    assert antenna.relative(towards(0, 45), "v") == pytest.approx((math.cos(math.pi / 2 * math.sqrt(0.5)) ** 2) * 2)
-    assert antenna.relative(towards(45, 0), "h") == pytest.approx(antenna.relative(towards(0, 45), "v"))
+    assert antenna.relative(towards(0, 45), "v") == pytest.approx(
+        (math.cos(math.pi / 2 * math.sqrt(0.5)) ** 2) * 2
+    )
+    assert antenna.relative(towards(45, 0), "h") == pytest.approx(
+        antenna.relative(towards(0, 45), "v")
+    )
     assert antenna.relative(np.array([0, 0, 1.0]), "v") == pytest.approx(0, abs=1e-12)
-    power, _ = quad(lambda t: (math.cos(math.pi / 2 * math.cos(t)) / math.sin(t)) ** 2 * math.sin(t) / 2, 0, math.pi)
+    power, _ = quad(
+        lambda t: (math.cos(math.pi / 2 * math.cos(t)) / math.sin(t)) ** 2 * math.sin(t) / 2,
+        0,
+        math.pi,
+    )
     assert antenna.peak_gain * power == pytest.approx(1)
     assert 10 * math.log10(antenna.peak_gain) == pytest.approx(2.15, abs=0.005)
 
@@ -63,21 +73,35 @@ def test_table() -> None:
         elevation_db=(-6, 0),
     )
     assert antenna.peak_gain == pytest.approx(10)
-    for azimuth, elevation, level in ((0, 15, 0), (30, 15, -6), (-30, 0, -9), (60, -15, -18), (90, -40, -18)):
-        assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(level)
+    for azimuth, elevation, level in (
+        (0, 15, 0),
+        (30, 15, -6),
+        (-30, 0, -9),
+        (60, -15, -18),
+        (90, -40, -18),
+    ):
+        assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(
+            level
+        )
 
 
 @pytest.mark.parametrize("cut", ["azimuth", "elevation"])
 def test_a_cut_that_is_left_out_is_flat(cut: str) -> None:
-    antenna = Antenna.of({"pattern": "table", "gain_dbi": 3, f"{cut}_deg": [0, 40], f"{cut}_db": [0, -8]})
+    antenna = Antenna.of(
+        {"pattern": "table", "gain_dbi": 3, f"{cut}_deg": [0, 40], f"{cut}_db": [0, -8]}
+    )
     for angle, level in ((0, 0), (20, -4), (40, -8)):
         for other in (-30, 0, 60):
             azimuth, elevation = (angle, other) if cut == "azimuth" else (other, angle)
-            assert 10 * np.log10(antenna.relative(towards(azimuth, elevation), "v")) == pytest.approx(level, abs=1e-9)
+            assert 10 * np.log10(
+                antenna.relative(towards(azimuth, elevation), "v")
+            ) == pytest.approx(level, abs=1e-9)
 
 
 def test_an_isotropic_antenna_is_the_same_all_round() -> None:
-    everywhere = np.stack([towards(azimuth, elevation) for azimuth in (-120, 0, 77) for elevation in (-90, 0, 45)])
+    everywhere = np.stack(
+        [towards(azimuth, elevation) for azimuth in (-120, 0, 77) for elevation in (-90, 0, 45)]
+    )
     assert Antenna().relative(everywhere, "h").tolist() == [1.0] * 9
     assert Antenna().peak_gain == 1
 
@@ -92,19 +116,40 @@ def test_an_isotropic_antenna_is_the_same_all_round() -> None:
         ({"pattern": "cosine", "exponent": "two"}, "must be a number"),
         ({"pattern": "table", "azimuth_deg": [0], "azimuth_db": [0]}, "needs gain_dbi"),
         ({"pattern": "table", "gain_dbi": 3}, "needs azimuth_deg"),
-        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0, 0], "azimuth_db": [0, -1]}, "angles ascend"),
+        (
+            {"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0, 0], "azimuth_db": [0, -1]},
+            "angles ascend",
+        ),
         ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0, 1], "azimuth_db": [0]}, "as many"),
-        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0], "azimuth_db": [1]}, "must be a number from -300 to 0"),
-        ({"gain_dbi": 10**400}, "gain_dbi = a number of more than 20 digits; it must be a number from"),
+        (
+            {"pattern": "table", "gain_dbi": 3, "azimuth_deg": [0], "azimuth_db": [1]},
+            "must be a number from -300 to 0",
+        ),
+        (
+            {"gain_dbi": 10**400},
+            "gain_dbi = a number of more than 20 digits; it must be a number from",
+        ),
         ({"pattern": "cosine", "exponent": math.nan}, "exponent = nan; it must be a number"),
         ({"azimuth_deg": [0]}, "of pattern = 'table'"),
         ({"gain": 3}, "unknown key 'gain'"),
         ({"two\nlines": 3}, r"unknown key 'two\\nlines'"),
-        ({"pattern": "cosine", "exponent": 16**500}, "exponent = a number of more than 20 digits; it must be a number from 0"),
-        ({"pattern": "isotropic", "exponent": 16**5000}, "exponent = a number of more than 20 digits; only 'cosine'"),
-        ({"gain_dbi": -(16**500)}, "gain_dbi = a number of more than 20 digits; it must be a number from -100"),
+        (
+            {"pattern": "cosine", "exponent": 16**500},
+            "exponent = a number of more than 20 digits; it must be a number from 0",
+        ),
+        (
+            {"pattern": "isotropic", "exponent": 16**5000},
+            "exponent = a number of more than 20 digits; only 'cosine'",
+        ),
+        (
+            {"gain_dbi": -(16**500)},
+            "gain_dbi = a number of more than 20 digits; it must be a number from -100",
+        ),
         ({"gain_dbi": float("nan")}, "gain_dbi = nan; it must be a number from -100"),
-        ({"pattern": "table", "gain_dbi": 3, "azimuth_deg": 16**5000}, "here it is a number of more than 20 digits"),
+        (
+            {"pattern": "table", "gain_dbi": 3, "azimuth_deg": 16**5000},
+            "here it is a number of more than 20 digits",
+        ),
     ],
 )
 def test_what_has_no_meaning_is_refused(fields: dict[str, Any], said: str) -> None:
@@ -127,7 +172,9 @@ def test_from_a_file(tmp_path: Path) -> None:
 def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> None:
     plain = rt.Radar(tx_y=2, tx_z=1, rx_y=3, rx_z=3, position_m=(-2.0, 1.5, 0.8))
     shaped = dataclasses.replace(
-        plain, tx_antenna=Antenna(pattern="cosine", exponent=6.0), rx_antenna=Antenna(pattern="dipole", gain_dbi=0.0)
+        plain,
+        tx_antenna=Antenna(pattern="cosine", exponent=6.0),
+        rx_antenna=Antenna(pattern="dipole", gain_dbi=0.0),
     )
     chirps = np.arange(6)
     before, after = (build_model(fidelity, radar, BODY).echoes(chirps) for radar in (plain, shaped))
@@ -143,7 +190,10 @@ def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> Non
         ahead = out[0] / np.linalg.norm(out)
         along = back[2] / np.linalg.norm(back)
         expected = ahead**3 * math.cos(math.pi / 2 * along) / math.sqrt(1 - along**2)
-        found.append(abs(after.amplitude[0, chirp, rx, part] / before.amplitude[0, chirp, rx, part]) / expected)
+        found.append(
+            abs(after.amplitude[0, chirp, rx, part] / before.amplitude[0, chirp, rx, part])
+            / expected
+        )
     # By the centres of the parts here, by their specular points there: up to a few degrees at 2 m.
     assert np.median(found) == pytest.approx(1, abs=0.02)
     assert max(np.abs(np.log(found))) < 0.3
@@ -155,7 +205,9 @@ def test_directions_are_those_of_the_specular_points() -> None:
     # The length over the exact specular point is the least of all ways over the surface's near side; one over a point beside it
     # is longer by the square of how far beside.
     points = specular_points(at)
-    ways = np.linalg.norm(points - at.tx[:, None, None], axis=-1) + np.linalg.norm(points - at.rx[:, :, None], axis=-1)
+    ways = np.linalg.norm(points - at.tx[:, None, None], axis=-1) + np.linalg.norm(
+        points - at.rx[:, :, None], axis=-1
+    )
     exact = mirror(*at[1:])[0]
     assert (ways - exact).min() > -1e-9
     assert (ways - exact).max() < 5e-3

@@ -8,7 +8,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-pytest.importorskip("grimp", reason="the picture of the imports needs grimp: pip install -c constraints.txt --editable '.[dev]'")
+pytest.importorskip(
+    "grimp",
+    reason="the picture of the imports needs grimp: pip install -c constraints.txt --editable '.[dev]'",
+)
 DRAWN = runpy.run_path(str(ROOT / "docs" / "draw_architecture.py"))
 
 
@@ -20,7 +23,9 @@ def test_the_picture_is_that_of_the_code() -> None:
 def test_data_flow_down_the_picture() -> None:
     """Every flow, also those that are not drawn, goes from an earlier row to a later one."""
     rows = DRAWN["order"]()
-    assert [edge for edge in DRAWN["flows"]().edges if rows.index(edge[0]) >= rows.index(edge[1])] == []
+    assert [
+        edge for edge in DRAWN["flows"]().edges if rows.index(edge[0]) >= rows.index(edge[1])
+    ] == []
     assert {"Motion", "Body", "Echoes"} <= set().union(*DRAWN["classes_handed_on"]().values())
 
 

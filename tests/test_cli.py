@@ -48,7 +48,9 @@ SKELETON = """:version 1.10
     root leg
   end
 """
-FRAMES = ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 0 0 0 0 0 0\nleg 0 0 0\n2\nroot 0 0 0 0 0 0\nleg 0 0 1\n"
+FRAMES = (
+    ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 0 0 0 0 0 0\nleg 0 0 0\n2\nroot 0 0 0 0 0 0\nleg 0 0 1\n"
+)
 
 
 def run(*words: object) -> int:
@@ -64,7 +66,17 @@ def walked(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_run_writes_all_its_files_and_nothing_else(walked: Path) -> None:
     names = {file.name for file in walked.iterdir()}
-    pictures = {f"{name}.png" for name in ("range_time", "spectrogram", "range_doppler", "range_angle", "cloud_rdt", "cloud_xyz")}
+    pictures = {
+        f"{name}.png"
+        for name in (
+            "range_time",
+            "spectrogram",
+            "range_doppler",
+            "range_angle",
+            "cloud_rdt",
+            "cloud_xyz",
+        )
+    }
     clouds = {"cloud_rdt.npz", "cloud_rdt.ply", "cloud_xyz.npz", "view.npz"}
     assert names == {"maps.h5", "summary.json", "report.html", "if.zarr", *pictures, *clouds}
 
@@ -78,8 +90,12 @@ def test_the_summary_says_what_was_done(walked: Path) -> None:
     assert summary["rdt_points"] == 3000
     assert summary["detections"] > 0
     assert summary["parameters"]["radar"]["start_frequency_hz"] == 12e9
-    assert summary["real_time_factor"] == pytest.approx(summary["wall_s"] / summary["capture_s"], rel=1e-3)
-    assert {"scatter", "signal", "noise", "range", "doppler", "cfar", "cloud"} <= set(summary["stages"])
+    assert summary["real_time_factor"] == pytest.approx(
+        summary["wall_s"] / summary["capture_s"], rel=1e-3
+    )
+    assert {"scatter", "signal", "noise", "range", "doppler", "cfar", "cloud"} <= set(
+        summary["stages"]
+    )
     assert summary["variant"] in ("llvm", "scalar", "cuda")
     for key in ("warmup_s", "peak_memory_mb", "limits", "versions"):
         assert key in summary
@@ -103,7 +119,9 @@ def test_maps_open_in_xarray_with_their_axes(walked: Path) -> None:
         azimuth = int(np.argmax(maps.range_azimuth.sum(("time", "range")).data))
         assert -25 < np.degrees(float(maps.azimuth[azimuth])) < -5
         brightest = maps.range_doppler.isel(time=0).argmax(...)
-        assert 3.0 < float(maps.range[brightest["range"]]) < 7.0  # the walk is about 4 m from the radar
+        assert (
+            3.0 < float(maps.range[brightest["range"]]) < 7.0
+        )  # the walk is about 4 m from the radar
 
 
 def test_the_cloud_lies_where_the_person_is(walked: Path) -> None:
@@ -119,7 +137,13 @@ def test_the_cloud_lies_where_the_person_is(walked: Path) -> None:
 
 def test_the_cloud_in_the_room_is_about_the_person(walked: Path) -> None:
     cloud = np.load(walked / "cloud_xyz.npz")
-    assert len(cloud["points"]) == len(cloud["velocity"]) == len(cloud["power"]) == len(cloud["time"]) > 500
+    assert (
+        len(cloud["points"])
+        == len(cloud["velocity"])
+        == len(cloud["power"])
+        == len(cloud["time"])
+        > 500
+    )
     # The body walks from x = 0.1 m to -0.1 m, 0.2 m to either side of y = 0, and is 1.8 m high; a beam is 0.13 m wide.
     x, y, z = np.median(cloud["points"], axis=0)
     assert abs(x) < 0.4
@@ -143,17 +167,32 @@ def test_the_same_seed_gives_the_same_files_and_replaces_them(walked: Path, tmp_
     assert (tmp_path / "mine.txt").read_text() == "keep"
     with h5py.File(walked / "maps.h5") as first, h5py.File(tmp_path / "maps.h5") as second:
         assert np.array_equal(first["range_doppler"][:], second["range_doppler"][:])
-    assert np.array_equal(np.load(walked / "cloud_rdt.npz")["points"], np.load(tmp_path / "cloud_rdt.npz")["points"])
+    assert np.array_equal(
+        np.load(walked / "cloud_rdt.npz")["points"], np.load(tmp_path / "cloud_rdt.npz")["points"]
+    )
     assert not list(tmp_path.glob(".rtradar-*"))
 
 
 def test_json_goes_where_it_is_asked_for(tmp_path: Path) -> None:
-    assert run("synthetic:punch", *SHORT, "--fidelity", "analytic", "--out", tmp_path / "out", "--json", tmp_path / "s.json") == 0
+    assert (
+        run(
+            "synthetic:punch",
+            *SHORT,
+            "--fidelity",
+            "analytic",
+            "--out",
+            tmp_path / "out",
+            "--json",
+            tmp_path / "s.json",
+        )
+        == 0
+    )
     assert json.loads((tmp_path / "s.json").read_text())["fidelity"] == "analytic"
 
 
 @pytest.mark.parametrize(
-    ("text", "value"), [("3", 3), ("0.5", 0.5), ("true", True), ("false", False), ("inf", "inf"), ("a=b", "a=b")]
+    ("text", "value"),
+    [("3", 3), ("0.5", 0.5), ("true", True), ("false", False), ("inf", "inf"), ("a=b", "a=b")],
 )
 def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: object) -> None:
     name, read = setting(f"shadow_rays={text}")
@@ -163,7 +202,9 @@ def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: ob
 def test_a_model_option_reaches_the_model(tmp_path: Path) -> None:
     words = ["--fidelity", "fresnel", "--model-option", "shadow_rays=8", "--out", tmp_path / "out"]
     assert run("synthetic:punch", *SHORT, *words) == 0
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]["dials"] == {"shadow_rays": 8}
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]["dials"] == {
+        "shadow_rays": 8
+    }
 
 
 def _amc(folder: Path, frames: str = FRAMES) -> list[str]:
@@ -179,9 +220,15 @@ def _radar(folder: Path, text: str) -> list[str]:
 
 BAD: dict[str, tuple[Callable[[Path], list[str]], str]] = {
     "no skeleton": (lambda folder: _amc(folder)[:1], "skeleton"),
-    "skeleton not there": (lambda folder: [*_amc(folder)[:2], str(folder / "other.asf")], "other.asf"),
+    "skeleton not there": (
+        lambda folder: [*_amc(folder)[:2], str(folder / "other.asf")],
+        "other.asf",
+    ),
     "motion not there": (lambda folder: [str(folder / "none.bvh")], "none.bvh"),
-    "bone not in the skeleton": (lambda folder: _amc(folder, FRAMES.replace("leg", "tail")), "tail"),
+    "bone not in the skeleton": (
+        lambda folder: _amc(folder, FRAMES.replace("leg", "tail")),
+        "tail",
+    ),
     "truncated": (lambda folder: _amc(folder, FRAMES[:-12]), "tiny.amc"),
     "NaN": (lambda folder: _amc(folder, FRAMES.replace("leg 0 0 1", "leg 0 nan 1")), "nan"),
     "wrong frame number": (lambda folder: _amc(folder, FRAMES.replace("\n2\n", "\n7\n")), "7"),
@@ -200,16 +247,30 @@ BAD: dict[str, tuple[Callable[[Path], list[str]], str]] = {
     "huge number": (lambda folder: _radar(folder, "tx_y = 1" + 400 * "0"), "tx_y"),
     "negative start": (lambda folder: ["synthetic:walk", "--start", "-1"], "--start"),
     "too short for a frame": (lambda folder: ["synthetic:walk", "--duration", "0.05"], "frame"),
-    "radar inside the person": (lambda folder: _radar(folder, "position_m = [0.0, 0.0, 1.0]"), "0.3 m"),
-    "person beyond the range": (lambda folder: _radar(folder, "position_m = [-40.0, 0.0, 1.0]"), "range"),
-    "model option without a value": (lambda folder: ["synthetic:walk", "--model-option", "shadow_rays"], "NAME=VALUE"),
-    "unknown model option": (lambda folder: ["synthetic:walk", "--model-option", "rays=3"], "no option 'rays'"),
+    "radar inside the person": (
+        lambda folder: _radar(folder, "position_m = [0.0, 0.0, 1.0]"),
+        "0.3 m",
+    ),
+    "person beyond the range": (
+        lambda folder: _radar(folder, "position_m = [-40.0, 0.0, 1.0]"),
+        "range",
+    ),
+    "model option without a value": (
+        lambda folder: ["synthetic:walk", "--model-option", "shadow_rays"],
+        "NAME=VALUE",
+    ),
+    "unknown model option": (
+        lambda folder: ["synthetic:walk", "--model-option", "rays=3"],
+        "no option 'rays'",
+    ),
     "no such option": (lambda folder: ["synthetic:walk", "--fidelty", "analytic"], "fidelty"),
 }
 
 
 @pytest.mark.parametrize("case", BAD)
-def test_bad_input_gets_one_clear_line_and_leaves_nothing(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_gets_one_clear_line_and_leaves_nothing(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words, named = BAD[case]
     out = tmp_path / "deep" / "out"
     fidelity = [] if "--fidelity" in words(tmp_path) else ["--fidelity", "analytic"]
@@ -223,7 +284,9 @@ def test_bad_input_gets_one_clear_line_and_leaves_nothing(case: str, tmp_path: P
 
 
 @pytest.mark.parametrize("content", [b"\x00\xff\xfe" * 200, b"", b":FULLY-SPECIFIED\n"])
-def test_files_that_are_no_motion(content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_files_that_are_no_motion(
+    content: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     words = _amc(tmp_path)
     (tmp_path / "tiny.amc").write_bytes(content)
     assert run(*words, "--out", tmp_path / "out") == 2
@@ -231,8 +294,14 @@ def test_files_that_are_no_motion(content: bytes, tmp_path: Path, capsys: pytest
     assert not (tmp_path / "out").exists()
 
 
-def test_real_recording_past_its_end(mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = [mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", "--skeleton", mocap / "hdm05/HDM_bd.asf"]
+def test_real_recording_past_its_end(
+    mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc",
+        "--skeleton",
+        mocap / "hdm05/HDM_bd.asf",
+    ]
     assert run(*words, "--duration", "99", "--out", tmp_path / "out") == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
@@ -241,11 +310,15 @@ def test_real_recording_past_its_end(mocap: Path, tmp_path: Path, capsys: pytest
     assert not (tmp_path / "out").exists()
 
 
-def test_real_skeleton_with_a_bone_of_no_length(mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_real_skeleton_with_a_bone_of_no_length(
+    mocap: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     skeleton = (mocap / "hdm05/HDM_bd.asf").read_bytes().decode("latin-1")
     bone = re.search(r"name ltibia.*?length\s+([0-9.]+)", skeleton, re.DOTALL)
     assert bone is not None
-    (tmp_path / "flat.asf").write_text(skeleton[: bone.start(1)] + "0.0" + skeleton[bone.end(1) :], encoding="latin-1")
+    (tmp_path / "flat.asf").write_text(
+        skeleton[: bone.start(1)] + "0.0" + skeleton[bone.end(1) :], encoding="latin-1"
+    )
     motion = mocap / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc"
     assert run(motion, "--skeleton", tmp_path / "flat.asf", "--out", tmp_path / "out") == 2
     said = capsys.readouterr().err
@@ -267,14 +340,37 @@ def test_version(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_import_is_quick_and_light() -> None:
-    heavy = ["numba", "mitsuba", "drjit", "scipy", "matplotlib", "h5py", "skimage", "trimesh", "torch", "dask", "sklearn"]
+    heavy = [
+        "numba",
+        "mitsuba",
+        "drjit",
+        "scipy",
+        "matplotlib",
+        "h5py",
+        "skimage",
+        "trimesh",
+        "torch",
+        "dask",
+        "sklearn",
+    ]
     code = f"import sys, rtradar; print([name for name in {heavy} if name in sys.modules])"
-    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.strip() == "[]"
+    assert (
+        subprocess.run(
+            [sys.executable, "-c", code], capture_output=True, text=True, check=True
+        ).stdout.strip()
+        == "[]"
+    )
 
 
-@pytest.mark.parametrize("command", [["run", "synthetic:kick"], ["compare", "synthetic:kick"], ["export", "x"], ["view", "x"]])
+@pytest.mark.parametrize(
+    "command",
+    [["run", "synthetic:kick"], ["compare", "synthetic:kick"], ["export", "x"], ["view", "x"]],
+)
 def test_an_empty_name_is_not_the_current_folder(
-    command: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: list[str],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main([*command, "--out", ""]) == 2
@@ -284,11 +380,24 @@ def test_an_empty_name_is_not_the_current_folder(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device that is always full")
 @pytest.mark.parametrize("buffered", [True, False])
-def test_what_cannot_be_printed_is_said_in_one_line(walked: Path, tmp_path: Path, buffered: bool) -> None:
-    words = [sys.executable, *([] if buffered else ["-u"]), "-m", "rtradar", "view", walked, "--out", tmp_path / "page.html"]
+def test_what_cannot_be_printed_is_said_in_one_line(
+    walked: Path, tmp_path: Path, buffered: bool
+) -> None:
+    words = [
+        sys.executable,
+        *([] if buffered else ["-u"]),
+        "-m",
+        "rtradar",
+        "view",
+        walked,
+        "--out",
+        tmp_path / "page.html",
+    ]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONUNBUFFERED"}
     with open("/dev/full", "w") as full:
-        done = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment)
+        done = subprocess.run(
+            words, stdout=full, stderr=subprocess.PIPE, text=True, check=False, env=environment
+        )
     assert done.returncode == 1
     assert done.stderr == "rtradar: cannot write to the standard output: No space left on device\n"
 
@@ -303,13 +412,28 @@ sys.exit(main(sys.argv[1:]))
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of POSIX")
 @pytest.mark.parametrize("command", ["run", "export .nc", "export .mat"])
-def test_files_that_may_not_grow_are_told_in_one_line(walked: Path, tmp_path: Path, command: str) -> None:
+def test_files_that_may_not_grow_are_told_in_one_line(
+    walked: Path, tmp_path: Path, command: str
+) -> None:
     words = {
-        "run": ["run", "synthetic:kick", *SHORT, "--fidelity", "analytic", "--out", tmp_path / "out"],
+        "run": [
+            "run",
+            "synthetic:kick",
+            *SHORT,
+            "--fidelity",
+            "analytic",
+            "--out",
+            tmp_path / "out",
+        ],
         "export .nc": ["export", walked, "--out", tmp_path / "samples.nc"],
         "export .mat": ["export", walked, "--out", tmp_path / "samples.mat"],
     }[command]
-    done = subprocess.run([sys.executable, "-c", LIMITED, *map(str, words)], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, *map(str, words)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.returncode == 2, done.stderr
     assert "Traceback" not in done.stderr
     assert "File too large" in done.stderr.splitlines()[-1]

@@ -26,7 +26,10 @@ def public() -> Iterator[tuple[str, Any]]:
                 yield f"{package}.{name}", thing
             for member, value in members(thing).items() if inspect.isclass(thing) else ():
                 if not member.startswith("_") and (callable(value) or hasattr(value, "__get__")):
-                    yield f"{package}.{name}.{member}", inspect.unwrap(getattr(value, "__func__", value))
+                    yield (
+                        f"{package}.{name}.{member}",
+                        inspect.unwrap(getattr(value, "__func__", value)),
+                    )
 
 
 def members(thing: type) -> dict[str, Any]:
@@ -46,20 +49,29 @@ def section(text: str, title: str) -> str:
 
 def told(text: str, title: str) -> set[str]:
     """Names that a section tells of."""
-    lines = [line for line in section(text, title).splitlines() if line and not line.startswith(" ")]
+    lines = [
+        line for line in section(text, title).splitlines() if line and not line.startswith(" ")
+    ]
     return {name.strip().lstrip("*") for line in lines for name in line.split(" : ")[0].split(",")}
 
 
 def takes(thing: Any) -> set[str]:
     """Names of what a function takes, or a class that is not told what by its kind: protocols, exceptions, tuples."""
-    if isinstance(thing, type) and (getattr(thing, "_is_protocol", False) or issubclass(thing, Exception | tuple)):
+    if isinstance(thing, type) and (
+        getattr(thing, "_is_protocol", False) or issubclass(thing, Exception | tuple)
+    ):
         return set()
     return set(inspect.signature(thing).parameters) - {"self", "cls"} if callable(thing) else set()
 
 
 def test_there_is_something_to_look_at() -> None:
     assert len(THINGS) > 150
-    assert {"rtradar.run", "rtradar.Radar.load", "rtradar.Radar.window_starts", "rtradar.process.os_cfar"} <= set(THINGS)
+    assert {
+        "rtradar.run",
+        "rtradar.Radar.load",
+        "rtradar.Radar.window_starts",
+        "rtradar.process.os_cfar",
+    } <= set(THINGS)
 
 
 @pytest.mark.parametrize("name", THINGS)
@@ -70,7 +82,9 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
     names = takes(thing)
     assert names <= told(text, "Parameters"), f"not told of: {names - told(text, 'Parameters')}"
     if inspect.isfunction(thing) and names and thing.__annotations__.get("return") != "None":
-        assert (section(text, "Returns") + section(text, "Yields")).strip(), "it does not say what it returns"
+        assert (section(text, "Returns") + section(text, "Yields")).strip(), (
+            "it does not say what it returns"
+        )
 
 
 def test_a_gap_is_found() -> None:
@@ -81,16 +95,35 @@ def test_a_gap_is_found() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.skipif(find_spec("sphinx_gallery") is None, reason="pages are built by what the extra docs brings")
+@pytest.mark.skipif(
+    find_spec("sphinx_gallery") is None, reason="pages are built by what the extra docs brings"
+)
 def test_the_pages_can_be_built(tmp_path: Path) -> None:
     """All but the gallery's pictures, which `test_gallery` asks for; a warning is an error."""
-    words = ["-q", "--fail-on-warning", "--keep-going", "-D", "sphinx_gallery_conf.filename_pattern=^$"]
-    command = [sys.executable, "-m", "sphinx", *words, "--doctree-dir", tmp_path / "trees", ROOT / "docs", tmp_path / "pages"]
+    words = [
+        "-q",
+        "--fail-on-warning",
+        "--keep-going",
+        "-D",
+        "sphinx_gallery_conf.filename_pattern=^$",
+    ]
+    command = [
+        sys.executable,
+        "-m",
+        "sphinx",
+        *words,
+        "--doctree-dir",
+        tmp_path / "trees",
+        ROOT / "docs",
+        tmp_path / "pages",
+    ]
     done = subprocess.run(command, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "pages" / "theory.html").read_text(encoding="utf-8")
     assert page.count("<math") > 100
     sources = [
-        found for path in (tmp_path / "pages").rglob("*.html") for found in re.findall(r'src="(https?:[^"]*)', path.read_text())
+        found
+        for path in (tmp_path / "pages").rglob("*.html")
+        for found in re.findall(r'src="(https?:[^"]*)', path.read_text())
     ]
     assert sources == []  # the pages open without the internet

@@ -13,14 +13,23 @@ from rtradar.trace.backends import backend as backends
 from rtradar.trace.backends.llvm import Library
 from rtradar.trace.backends.verdict import Verdict
 
-LIBRARIES = [Library("/lib/libLLVM-15.so.1", "environment"), Library("/venv/libLLVM.so.23.1", "wheel")]
+LIBRARIES = [
+    Library("/lib/libLLVM-15.so.1", "environment"),
+    Library("/venv/libLLVM.so.23.1", "wheel"),
+]
 
 
-def _machine(monkeypatch: pytest.MonkeyPatch, libraries: list[Library], *, scalar: str = "good") -> None:
+def _machine(
+    monkeypatch: pytest.MonkeyPatch, libraries: list[Library], *, scalar: str = "good"
+) -> None:
     def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
         if variant.startswith("llvm"):
             assert library is not None
-            return Verdict("good", "23.1.4") if "23" in library.path else Verdict("aborts the process", "15.0.6")
+            return (
+                Verdict("good", "23.1.4")
+                if "23" in library.path
+                else Verdict("aborts the process", "15.0.6")
+            )
         return Verdict(scalar if variant.startswith("scalar") else "no CUDA driver or no GPU")
 
     for module in (doctor, backends):
@@ -44,7 +53,9 @@ def test_all_well(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("libraries", [[], LIBRARIES[:1]])
-def test_scalar_serves_and_the_cure_is_named(monkeypatch: pytest.MonkeyPatch, libraries: list[Library]) -> None:
+def test_scalar_serves_and_the_cure_is_named(
+    monkeypatch: pytest.MonkeyPatch, libraries: list[Library]
+) -> None:
     _machine(monkeypatch, libraries)
     found = doctor.examine()
     assert (found.chosen, found.exit_status) == ("scalar_rgb", 0)
@@ -60,13 +71,20 @@ def test_nothing_works(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize(
-    ("finding", "advice"), [("kept, for one in /cache", ""), ("not kept: no room", "name a folder in NUMBA_CACHE_DIR")]
+    ("finding", "advice"),
+    [("kept, for one in /cache", ""), ("not kept: no room", "name a folder in NUMBA_CACHE_DIR")],
 )
-def test_whether_compiled_code_is_kept(monkeypatch: pytest.MonkeyPatch, finding: str, advice: str) -> None:
+def test_whether_compiled_code_is_kept(
+    monkeypatch: pytest.MonkeyPatch, finding: str, advice: str
+) -> None:
     _machine(monkeypatch, LIBRARIES)
     monkeypatch.setattr(doctor, "try_cache", lambda: (finding, advice))
     found = doctor.examine()
-    assert (found.compiled_code, found.advice, found.exit_status) == (finding, [advice] if advice else [], 0)
+    assert (found.compiled_code, found.advice, found.exit_status) == (
+        finding,
+        [advice] if advice else [],
+        0,
+    )
     text = doctor.report_text(found)
     assert f"Compiled  {finding}" in text
     assert advice in text
@@ -87,7 +105,9 @@ def test_the_report_goes_to_the_terminal_and_to_json(
     _machine(monkeypatch, LIBRARIES)
     assert doctor.report(tmp_path / "doctor.json") == 0
     assert "Cores" in capsys.readouterr().out
-    assert json.loads((tmp_path / "doctor.json").read_text()) == doctor.examine().as_dict() | _memory(tmp_path / "doctor.json")
+    assert json.loads(
+        (tmp_path / "doctor.json").read_text()
+    ) == doctor.examine().as_dict() | _memory(tmp_path / "doctor.json")
     with pytest.raises(InputError, match="cannot write"):
         doctor.report(tmp_path / "no" / "doctor.json")
 

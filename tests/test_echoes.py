@@ -38,7 +38,9 @@ def test_none_at_all_is_allowed(shape: tuple[int, int, int]) -> None:
 
 
 def test_lists_become_arrays() -> None:
-    echoes = Echoes(length=[[[8]]], amplitude=[[[[1 + 2j]]]], frequency=[14e9], tx=[3], part=[20], bounces=[1])
+    echoes = Echoes(
+        length=[[[8]]], amplitude=[[[[1 + 2j]]]], frequency=[14e9], tx=[3], part=[20], bounces=[1]
+    )
     assert echoes.length.dtype == np.float64
     assert echoes.frequency.dtype == np.float64
     assert np.iscomplexobj(echoes.amplitude)
@@ -85,7 +87,9 @@ def test_no_nodes_are_refused_though_amplitude_fits() -> None:
 
 
 def test_the_message_says_what_is_allowed() -> None:
-    with pytest.raises(ValueError, match=r"Echoes\.tx has shape \(4,\); with this length it must be \(5,\)"):
+    with pytest.raises(
+        ValueError, match=r"Echoes\.tx has shape \(4,\); with this length it must be \(5,\)"
+    ):
         Echoes(**fields(tx=np.zeros(4)))
 
 

@@ -19,8 +19,13 @@ SOON_S = 10.0  # two seconds on a quiet machine, which validation/interruptions.
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("number", "says"), [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "ended by SIGTERM")])
-def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(tmp_path: Path, number: signal.Signals, says: str) -> None:
+@pytest.mark.parametrize(
+    ("number", "says"),
+    [(signal.SIGINT, "stopped by the user"), (signal.SIGTERM, "ended by SIGTERM")],
+)
+def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(
+    tmp_path: Path, number: signal.Signals, says: str
+) -> None:
     (tmp_path / "maps.h5").write_text("old")
     command = [
         sys.executable,
@@ -34,9 +39,13 @@ def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(tmp_path: P
         "--out",
         str(tmp_path),
     ]
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # what is ignored here would be ignored there
+    handler = signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # what is ignored here would be ignored there
     try:
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        process = subprocess.Popen(
+            command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
     finally:
         signal.signal(signal.SIGINT, handler)
     while not list(tmp_path.glob(".rtradar-*/maps.h5")):
@@ -77,7 +86,10 @@ with temporary_folder(inside=sys.argv[1]) as folder, atomic_file(sys.argv[1] + "
 
 def test_children_files_and_folders_go_too(tmp_path: Path) -> None:
     process = subprocess.Popen(
-        [sys.executable, "-c", CHILD, str(tmp_path)], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", CHILD, str(tmp_path)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     assert process.stdout is not None
     child = int(process.stdout.readline())
@@ -100,7 +112,10 @@ ctypes.CDLL(None).syscall({"x86_64": 60, "aarch64": 93}[platform.machine()], 0) 
 """
 
 
-@pytest.mark.skipif(not sys.platform.startswith("linux") or platform.machine() not in ("x86_64", "aarch64"), reason="Linux's way")
+@pytest.mark.skipif(
+    not sys.platform.startswith("linux") or platform.machine() not in ("x86_64", "aarch64"),
+    reason="Linux's way",
+)
 def test_a_child_runs_until_its_last_thread_has_ended() -> None:
     child = subprocess.Popen([sys.executable, "-c", FIRST_THREAD_ENDS])
     try:

@@ -34,7 +34,9 @@ Capture = pytest.CaptureFixture[str]
 def files_of_the_how_to() -> dict[str, str]:
     """Each file by its name, as the page has it."""
     page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
-    return dict(re.findall(r"^`([\w.]+)`\n\n```\w+\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL))
+    return dict(
+        re.findall(r"^`([\w.]+)`\n\n```\w+\n(.*?)^```$", page, flags=re.MULTILINE | re.DOTALL)
+    )
 
 
 def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None = None) -> None:
@@ -43,7 +45,9 @@ def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None 
     project = tomllib.loads(files["pyproject.toml"])["project"]
     about = folder / f"{project['name']}-{project['version']}.dist-info"
     about.mkdir()
-    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n")
+    (about / "METADATA").write_text(
+        f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    )
     lines = []
     for group, entries in project["entry-points"].items():
         lines += [f"[{group}]", *(f"{name} = {value}" for name, value in entries.items())]
@@ -97,7 +101,11 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
     assert done.returncode == 0, done.stderr
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     said = summary["parameters"]
-    assert (said["fidelity"], said["radar"]["name"], said["detector"]) == ("points", "lane-60ghz", "threshold")
+    assert (said["fidelity"], said["radar"]["name"], said["detector"]) == (
+        "points",
+        "lane-60ghz",
+        "threshold",
+    )
     # 21 parts of 0.01 m^2, 3 to 5 m from the radar.
     assert 21 * 0.01 / 5**4 < summary["echo_power_m2"] < 21 * 0.01 / 3**4
     assert summary["detections"] > 20
@@ -107,7 +115,11 @@ def test_a_package_from_outside_adds_one_of_each(tmp_path: Path, recording: Path
 @pytest.mark.parametrize(
     ("option", "name", "known"),
     [
-        ("--fidelity", "rough", "specular, fresnel, physical-optics, rays, reference, auto, points"),
+        (
+            "--fidelity",
+            "rough",
+            "specular, fresnel, physical-optics, rays, reference, auto, points",
+        ),
         ("--radar", "rough", "paper-12ghz, paper-77ghz, lane-60ghz, or the path"),
         ("--detector", "rough", "os-cfar, ca-cfar, threshold"),
         (None, "walk.rough", ".amc, .bvh, .c3d, .npz"),
@@ -128,20 +140,45 @@ def test_an_unknown_name_is_answered_with_all_that_there_are(
 @pytest.mark.parametrize(
     ("broken", "text", "said"),
     [
-        ("outside_model.py", "import nowhere_to_be_found", "fidelity 'points' of package 'outside' failed: ModuleNotFoundError"),
+        (
+            "outside_model.py",
+            "import nowhere_to_be_found",
+            "fidelity 'points' of package 'outside' failed: ModuleNotFoundError",
+        ),
         ("outside_model.py", "Points = 3", "is a int, not a function or class"),
-        ("outside_detector.py", "def threshold(power, *, pfa, looks):\n    return power", "gave float32"),
+        (
+            "outside_detector.py",
+            "def threshold(power, *, pfa, looks):\n    return power",
+            "gave float32",
+        ),
         ("outside_detector.py", "def threshold(power):\n    return power > 1", "failed: TypeError"),
-        ("outside_radar.py", "def lane():\n    raise SystemExit('no')", "radar 'lane-60ghz' of package 'outside' failed"),
+        (
+            "outside_radar.py",
+            "def lane():\n    raise SystemExit('no')",
+            "radar 'lane-60ghz' of package 'outside' failed",
+        ),
         ("outside_reader.py", "def read(path):\n    return path", "not a Motion"),
     ],
 )
 def test_a_broken_package_is_one_line(
-    tmp_path: Path, here: Install, capsys: Capture, recording: Path, broken: str, text: str, said: str
+    tmp_path: Path,
+    here: Install,
+    capsys: Capture,
+    recording: Path,
+    broken: str,
+    text: str,
+    said: str,
 ) -> None:
     here(tmp_path / "site", {broken: text})
-    assert main(["run", str(recording), *USED, "--duration", "0.2", "--out", str(tmp_path / "out")]) == 1
-    lines = [line for line in capsys.readouterr().err.splitlines() if line and not line.startswith("rtradar: warning")]
+    assert (
+        main(["run", str(recording), *USED, "--duration", "0.2", "--out", str(tmp_path / "out")])
+        == 1
+    )
+    lines = [
+        line
+        for line in capsys.readouterr().err.splitlines()
+        if line and not line.startswith("rtradar: warning")
+    ]
     assert len(lines) == 1
     assert said in lines[0]
     assert not (tmp_path / "out").exists()
@@ -152,9 +189,20 @@ PLACES: dict[str, tuple[str, str, tuple[str, ...]]] = {
     "model": ("points", "Points(radar, body, *, spreading=True)", USED[:2]),
     "reader": ("npz", "read(path)", ()),
     "radar": ("lane-60ghz", "lane()", USED[2:4]),
-    "detector": ("threshold", "threshold(power, *, pfa, looks)", ("--radar", "lane-60ghz", *USED[4:])),
+    "detector": (
+        "threshold",
+        "threshold(power, *, pfa, looks)",
+        ("--radar", "lane-60ghz", *USED[4:]),
+    ),
 }
-ENDS = ["SystemExit('gone')", "BaseException('gone')", "Ended('gone')", "Stopped('gone')", "Silent()", "GeneratorExit('gone')"]
+ENDS = [
+    "SystemExit('gone')",
+    "BaseException('gone')",
+    "Ended('gone')",
+    "Stopped('gone')",
+    "Silent()",
+    "GeneratorExit('gone')",
+]
 CLASSES = """
 class Ended(BaseException): pass
 class Stopped(KeyboardInterrupt): pass
@@ -167,14 +215,39 @@ class Silent(BaseException):
 @pytest.mark.parametrize("raised", ENDS)
 @pytest.mark.parametrize("place", PLACES)
 def test_a_package_may_raise_what_it_likes(
-    tmp_path: Path, here: Install, capsys: Capture, recording: Path, place: str, raised: str, called: bool
+    tmp_path: Path,
+    here: Install,
+    capsys: Capture,
+    recording: Path,
+    place: str,
+    raised: str,
+    called: bool,
 ) -> None:
     named, head, asked = PLACES[place]
     text = f"def {head}:\n    raise {raised}\n" if called else f"raise {raised}\n"
     here(tmp_path / "site", {f"outside_{place}.py": CLASSES + text})
     motion = str(recording) if place == "reader" else "synthetic:walk"
-    assert main(["run", motion, "--fidelity", "analytic", *asked, "--duration", "0.2", "--out", str(tmp_path / "out")]) == 1
-    said = [line for line in capsys.readouterr().err.splitlines() if line and not line.startswith("rtradar: warning")]
+    assert (
+        main(
+            [
+                "run",
+                motion,
+                "--fidelity",
+                "analytic",
+                *asked,
+                "--duration",
+                "0.2",
+                "--out",
+                str(tmp_path / "out"),
+            ]
+        )
+        == 1
+    )
+    said = [
+        line
+        for line in capsys.readouterr().err.splitlines()
+        if line and not line.startswith("rtradar: warning")
+    ]
     assert len(said) == 1
     assert f"'{named}' of package 'outside' failed: {raised.partition('(')[0]}" in said[0]
     # The others of its kind still work.
@@ -184,12 +257,19 @@ def test_a_package_may_raise_what_it_likes(
 
 def test_ctrl_c_is_still_ctrl_c(tmp_path: Path, here: Install, capsys: Capture) -> None:
     here(tmp_path / "site", {"outside_radar.py": "raise KeyboardInterrupt"})
-    assert main(["run", "synthetic:walk", "--radar", "lane-60ghz", "--out", str(tmp_path / "out")]) == 1
+    assert (
+        main(["run", "synthetic:walk", "--radar", "lane-60ghz", "--out", str(tmp_path / "out")])
+        == 1
+    )
     assert "stopped by the user" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("text", [b"[rtradar.radars]\nno equals sign\n", b"[rtradar.radars]\n\xe9 = x:y\n"])
-def test_entry_points_that_cannot_be_read_are_left_out(tmp_path: Path, here: Install, text: bytes) -> None:
+@pytest.mark.parametrize(
+    "text", [b"[rtradar.radars]\nno equals sign\n", b"[rtradar.radars]\n\xe9 = x:y\n"]
+)
+def test_entry_points_that_cannot_be_read_are_left_out(
+    tmp_path: Path, here: Install, text: bytes
+) -> None:
     here(tmp_path / "site", {})
     about = tmp_path / "broken" / "broken-1.dist-info"
     about.mkdir(parents=True)
@@ -249,7 +329,10 @@ class Wrong:
 
     def echoes(self, chirps: np.ndarray) -> object:
         good = self._model.echoes(chirps)
-        fields = {name: getattr(good, name) for name in ("length", "amplitude", "frequency", "tx", "part", "bounces")}
+        fields = {
+            name: getattr(good, name)
+            for name in ("length", "amplitude", "frequency", "tx", "part", "bounces")
+        }
         match self._spoil:
             case "type":
                 return fields
@@ -267,7 +350,13 @@ class Wrong:
 @pytest.mark.usefixtures("registered")
 @pytest.mark.parametrize(
     ("spoil", "said"),
-    [("type", "gave a dict"), ("rx", "of shape"), ("tx", "other Tx"), ("part", "parts outside 0 to 20"), ("value", "not finite")],
+    [
+        ("type", "gave a dict"),
+        ("rx", "of shape"),
+        ("tx", "other Tx"),
+        ("part", "parts outside 0 to 20"),
+        ("value", "not finite"),
+    ],
 )
 def test_a_model_must_give_what_the_rest_relies_on(spoil: str, said: str) -> None:
     rt.register_model("wrong", Wrong)
@@ -289,14 +378,20 @@ def test_every_built_in_name_is_there() -> None:
 def test_two_of_one_name_are_refused_by_that_name(tmp_path: Path, here: Install) -> None:
     files = files_of_the_how_to()
     here(tmp_path / "site", {})
-    taken = files["pyproject.toml"].replace("points =", "specular =").replace('"outside"', '"other"')
+    taken = (
+        files["pyproject.toml"].replace("points =", "specular =").replace('"outside"', '"other"')
+    )
     install(tmp_path / "other", {"pyproject.toml": taken})
     sys.path.insert(0, str(tmp_path / "other"))
     try:
-        with pytest.raises(rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"):
+        with pytest.raises(
+            rt.ExtensionError, match="'specular' is claimed by rtradar and by 'other'"
+        ):
             MODELS.find("specular")
         assert MODELS.find("analytic") is not None
-        with pytest.raises(rt.ExtensionError, match="'threshold' is claimed by 'other' and by 'outside'"):
+        with pytest.raises(
+            rt.ExtensionError, match="'threshold' is claimed by 'other' and by 'outside'"
+        ):
             DETECTORS.find("threshold")
     finally:
         sys.path.remove(str(tmp_path / "other"))

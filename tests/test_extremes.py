@@ -32,7 +32,8 @@ extremes = load("extremes")
 
 
 CASES = [
-    pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.slow else []) for case in extremes.CASES
+    pytest.param(case, id=case.name, marks=[pytest.mark.slow] if case.slow else [])
+    for case in extremes.CASES
 ]  # the slow one has a million triangles
 
 
@@ -49,5 +50,11 @@ def test_a_case_that_is_wrong_or_breaks_is_told() -> None:
     def broken() -> str:
         raise ZeroDivisionError("by nought")
 
-    assert extremes.outcome(extremes.Case("a", "b", wrong)) == (False, "WRONG: one is not more than two\nassert 1 > 2")
-    assert extremes.outcome(extremes.Case("a", "b", broken)) == (False, "ZeroDivisionError: by nought")
+    assert extremes.outcome(extremes.Case("a", "b", wrong)) == (
+        False,
+        "WRONG: one is not more than two\nassert 1 > 2",
+    )
+    assert extremes.outcome(extremes.Case("a", "b", broken)) == (
+        False,
+        "ZeroDivisionError: by nought",
+    )

@@ -14,9 +14,7 @@ from rtradar.cli import main
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, check_place, write_json
 
-WRITE = (
-    "import sys; from rtradar.system.files import write_json; print('before'); write_json(sys.argv[1], {'a': 1}); print('after')"
-)
+WRITE = "import sys; from rtradar.system.files import write_json; print('before'); write_json(sys.argv[1], {'a': 1}); print('after')"
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")
@@ -38,7 +36,10 @@ def test_json_goes_to_the_standard_output_wherever_that_goes(tmp_path: Path, kin
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX")
 def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "device")
-    with pytest.raises(InputError, match=r"cannot write '.*device': .* is no file"), atomic_file(tmp_path / "device"):
+    with (
+        pytest.raises(InputError, match=r"cannot write '.*device': .* is no file"),
+        atomic_file(tmp_path / "device"),
+    ):
         pass
     assert (tmp_path / "device").is_fifo()
 
@@ -51,7 +52,12 @@ def test_a_place_where_no_json_can_be_is_found_out_before_the_work(
     tmp_path: Path, name: str, says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     # There is no such folder of clouds either, which would be told next.
-    for command in (["doctor"], ["view", "nowhere"], ["evaluate", "nowhere"], ["export", "nowhere", "--out", "x.npz"]):
+    for command in (
+        ["doctor"],
+        ["view", "nowhere"],
+        ["evaluate", "nowhere"],
+        ["export", "nowhere", "--out", "x.npz"],
+    ):
         assert main([*command, "--json", str(tmp_path / name)]) == 2
         err = capsys.readouterr().err
         assert err.startswith("rtradar: --json")

@@ -16,13 +16,29 @@ from rtradar.cli import main
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of POSIX")
 
-RUN_NAMES = ("plan.png", "clutter_removal.png", "range_azimuth_walls.png", "maps.h5", "report.html", "summary.json", "view.npz")
+RUN_NAMES = (
+    "plan.png",
+    "clutter_removal.png",
+    "range_azimuth_walls.png",
+    "maps.h5",
+    "report.html",
+    "summary.json",
+    "view.npz",
+)
 
 
 @pytest.fixture(scope="module")
-def whole_run(beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def whole_run(
+    beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     out = tmp_path_factory.mktemp("run") / "out"
-    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.3), *beside_a_wall, out=out, fidelity="analytic", save_if=True)
+    rt.run(
+        rt.synthetic_motion("walk", seed=0, duration_s=0.3),
+        *beside_a_wall,
+        out=out,
+        fidelity="analytic",
+        save_if=True,
+    )
     return out
 
 
@@ -44,13 +60,31 @@ def snapshot(folder: Path) -> dict[str, tuple[object, ...]]:
         for name in (*folders, *files):
             path = Path(parent, name)
             status = path.lstat()
-            content = os.readlink(path) if path.is_symlink() else path.read_bytes() if path.is_file() else None
+            content = (
+                os.readlink(path)
+                if path.is_symlink()
+                else path.read_bytes()
+                if path.is_file()
+                else None
+            )
             found[str(path.relative_to(folder))] = (status.st_mode, status.st_ino, content)
     return found
 
 
 def small_run(out: Path, *words: str) -> int:
-    return main(["run", "synthetic:kick", "--duration", "0.2", "--fidelity", "analytic", *words, "--out", str(out)])
+    return main(
+        [
+            "run",
+            "synthetic:kick",
+            "--duration",
+            "0.2",
+            "--fidelity",
+            "analytic",
+            *words,
+            "--out",
+            str(out),
+        ]
+    )
 
 
 def reading_commands(run: Path, elsewhere: Path) -> list[list[str]]:
@@ -85,7 +119,12 @@ def plant_linked_work(run: Path) -> None:
 def plant_list(run: Path) -> None:
     path = run / "summary.json"
     summary = json.loads(path.read_text())
-    summary["files"] = [*summary.get("files", []), "../../Documents/letter.txt", "../../Documents/", "/etc/hosts"]
+    summary["files"] = [
+        *summary.get("files", []),
+        "../../Documents/letter.txt",
+        "../../Documents/",
+        "/etc/hosts",
+    ]
     path.write_text(json.dumps(summary))
 
 
@@ -98,7 +137,9 @@ PLANTED = [plant_patterns, plant_link, plant_damage, plant_linked_work, plant_li
 
 
 @pytest.mark.parametrize("plant", PLANTED)
-def test_commands_that_read_change_nothing(home: Path, plant: object, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_commands_that_read_change_nothing(
+    home: Path, plant: object, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     plant(home / "Downloads" / "run")  # type: ignore[operator]
     before = snapshot(home)
     elsewhere = tmp_path_factory.mktemp("elsewhere")
@@ -115,7 +156,9 @@ def test_a_run_into_such_a_folder_touches_nothing_outside(home: Path, plant: obj
     planted = {name: what for name, what in snapshot(run).items() if name.startswith(".rtradar")}
     assert small_run(run) == 0
     assert snapshot(home / "Documents") == before
-    assert {name: what for name, what in snapshot(run).items() if name.startswith(".rtradar")} == planted
+    assert {
+        name: what for name, what in snapshot(run).items() if name.startswith(".rtradar")
+    } == planted
 
 
 @pytest.mark.parametrize("name", RUN_NAMES)
@@ -153,7 +196,16 @@ def test_overwrite_replaces_what_the_run_makes_and_leaves_the_rest(tmp_path: Pat
 
 
 def test_compare_and_its_runs_replace_their_own_and_refuse_the_users(tmp_path: Path) -> None:
-    words = ["compare", "synthetic:kick", "--duration", "0.2", "--fidelities", "analytic,analytic-paper", "--out", str(tmp_path)]
+    words = [
+        "compare",
+        "synthetic:kick",
+        "--duration",
+        "0.2",
+        "--fidelities",
+        "analytic,analytic-paper",
+        "--out",
+        str(tmp_path),
+    ]
     (tmp_path / "analytic").mkdir()
     (tmp_path / "analytic" / "notes.txt").write_text("mine")
     assert main(words) == 0
@@ -167,7 +219,9 @@ def test_compare_and_its_runs_replace_their_own_and_refuse_the_users(tmp_path: P
     assert snapshot(tmp_path) == before
 
 
-def test_a_page_of_the_users_own_is_not_replaced(home: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_page_of_the_users_own_is_not_replaced(
+    home: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     run = home / "Downloads" / "run"
     assert main(["view", str(run), "--no-browser"]) == 0
     assert main(["view", str(run), "--no-browser"]) == 0
@@ -196,12 +250,19 @@ def test_sweeping_takes_only_what_an_interrupted_writer_leaves(tmp_path: Path) -
     from rtradar.clouds.collection_index import sweep
 
     ours = [".0a1b2c.npz.0123456789ab.part", ".collection.json.0123456789ab.part"]
-    users = [".x.npz.y.part", ".x.npz.0123456789ab.part.txt", "x.npz.0123456789ab.part", ".notes.0123456789ab.part"]
+    users = [
+        ".x.npz.y.part",
+        ".x.npz.0123456789ab.part.txt",
+        "x.npz.0123456789ab.part",
+        ".notes.0123456789ab.part",
+    ]
     for name in (*ours, *users):
         (tmp_path / name).write_text("mine")
     (tmp_path / ".d.npz.0123456789ab.part").mkdir()
     assert sweep(tmp_path) == 2
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*users, ".d.npz.0123456789ab.part"])
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted(
+        [*users, ".d.npz.0123456789ab.part"]
+    )
 
 
 def test_trainings_of_somebody_else_are_not_taken_up(tmp_path: Path) -> None:
@@ -214,18 +275,30 @@ def test_trainings_of_somebody_else_are_not_taken_up(tmp_path: Path) -> None:
         check_plan(tmp_path, {})
 
 
-PIPES = ("summary.json", "view.npz", "cloud_rdt.npz", "maps.h5", "if.zarr/zarr.json", "if.zarr/c/0/0/0", "cloud_xyz.npz")
+PIPES = (
+    "summary.json",
+    "view.npz",
+    "cloud_rdt.npz",
+    "maps.h5",
+    "if.zarr/zarr.json",
+    "if.zarr/c/0/0/0",
+    "cloud_xyz.npz",
+)
 
 
 @pytest.mark.parametrize("name", PIPES)
-def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(home: Path, name: str, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_pipe_in_the_place_of_a_file_is_not_waited_for(
+    home: Path, name: str, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     run = home / "Downloads" / "run"
     (run / name).unlink()
     os.mkfifo(run / name)
     before = snapshot(home)
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     commands = reading_commands(run, elsewhere)
-    words = commands[3] if name == "cloud_xyz.npz" else commands[2 if name.startswith("if.zarr") else 0]
+    words = (
+        commands[3] if name == "cloud_xyz.npz" else commands[2 if name.startswith("if.zarr") else 0]
+    )
     done = subprocess.run(
         [sys.executable, "-m", "rtradar", *words],
         capture_output=True,

@@ -14,7 +14,16 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.exchange.recording import open_recording
-from rtradar.process import angle, build_detector, os_cfar, power_map, range_spectrum, range_time, spectrogram, window_cycles
+from rtradar.process import (
+    angle,
+    build_detector,
+    os_cfar,
+    power_map,
+    range_spectrum,
+    range_time,
+    spectrogram,
+    window_cycles,
+)
 from rtradar.signal import Noise, receive, separate, synthesize
 
 ALL = ("tdm", "fdm", "ddm")
@@ -40,7 +49,9 @@ def vars_of(made: rt.Radar) -> dict[str, Any]:
     return {name: getattr(made, name) for name in made.__dataclass_fields__}
 
 
-def point(made: rt.Radar, place: tuple[float, float, float], rate: float, amplitude: float = 1.0) -> NDArray[np.complexfloating]:
+def point(
+    made: rt.Radar, place: tuple[float, float, float], rate: float, amplitude: float = 1.0
+) -> NDArray[np.complexfloating]:
     """Rows of one window of a point that is at ``place`` in its middle and recedes at ``rate``; exact lengths."""
     chirps = np.arange(made.chirps_per_frame)
     # Written out: when each chirp is on the air is what is tested.
@@ -76,18 +87,26 @@ def test_the_unambiguous_velocity(bands: int) -> None:
     # lambda / (4 T), T the time until the same Tx transmits again: 62.5 us, times four under TDM.
     quarter = SPEED_OF_LIGHT_MPS / 14e9 / 4
     found = [radar("tdm"), radar("fdm"), radar("ddm", doppler_bands=bands)]
-    assert [made.max_velocity_mps for made in found] == pytest.approx([quarter / 250e-6, quarter / 62.5e-6, quarter / 62.5e-6])
+    assert [made.max_velocity_mps for made in found] == pytest.approx(
+        [quarter / 250e-6, quarter / 62.5e-6, quarter / 62.5e-6]
+    )
     assert [made.cycles_per_frame % made.n_doppler_bands for made in found] == [0, 0, 0]
 
 
 @pytest.mark.parametrize("multiplexing", ALL)
 @pytest.mark.parametrize("rate", [0.0, 3.7, -9.3])
-def test_a_moving_point_has_its_range_velocity_and_direction(multiplexing: str, rate: float) -> None:
+def test_a_moving_point_has_its_range_velocity_and_direction(
+    multiplexing: str, rate: float
+) -> None:
     made = radar(multiplexing)
     assert abs(rate) < made.max_velocity_mps
     azimuth, elevation, distance = math.radians(14), math.radians(-9), 4.2
     across = math.cos(elevation)
-    place = (across * math.cos(azimuth) * distance, across * math.sin(azimuth) * distance, math.sin(elevation) * distance)
+    place = (
+        across * math.cos(azimuth) * distance,
+        across * math.sin(azimuth) * distance,
+        math.sin(elevation) * distance,
+    )
     rows = point(made, place, rate)
     power = power_map(window(made, rows), made)
     row, column = np.unravel_index(power.argmax(), power.shape)
@@ -100,12 +119,18 @@ def test_a_moving_point_has_its_range_velocity_and_direction(multiplexing: str, 
     assert np.degrees(found) == pytest.approx([14, -9], abs=0.7)
 
 
-@pytest.mark.parametrize(("multiplexing", "reads"), [("tdm", 25.0 - 2 * 21.414), ("fdm", 25.0), ("ddm", 25.0)])
-def test_what_is_too_fast_for_tdm_folds_there_and_nowhere_else(multiplexing: str, reads: float) -> None:
+@pytest.mark.parametrize(
+    ("multiplexing", "reads"), [("tdm", 25.0 - 2 * 21.414), ("fdm", 25.0), ("ddm", 25.0)]
+)
+def test_what_is_too_fast_for_tdm_folds_there_and_nowhere_else(
+    multiplexing: str, reads: float
+) -> None:
     made = radar(multiplexing)
     power = power_map(window(made, point(made, (5.0, 0.0, 0.0), 25.0)), made)
     column = int(power.sum(axis=0).argmax())
-    assert made.velocity_mps(power.shape[1])[column] == pytest.approx(reads, abs=made.velocity_bin_mps)
+    assert made.velocity_mps(power.shape[1])[column] == pytest.approx(
+        reads, abs=made.velocity_bin_mps
+    )
 
 
 @pytest.mark.parametrize("multiplexing", ALL)
@@ -156,7 +181,9 @@ def test_each_carrier_of_fdm_turns_by_its_own_frequency() -> None:
     slope = 4e9 / 62.5e-6
     for k, start in enumerate((12e9 - 15e6, 12e9 - 5e6, 12e9 + 5e6, 12e9 + 15e6)):
         phase = start * delay + slope * delay * time - slope * delay**2 / 2
-        np.testing.assert_allclose(samples[k], np.exp(2j * np.pi * phase)[None].repeat(4, axis=0), atol=1e-7)
+        np.testing.assert_allclose(
+            samples[k], np.exp(2j * np.pi * phase)[None].repeat(4, axis=0), atol=1e-7
+        )
     assert made.occupied_bandwidth_hz == pytest.approx(4.03e9)
     assert made.receiver_rate_hz == pytest.approx(256 / 62.5e-6 + 30e6)
 
@@ -171,9 +198,13 @@ def test_noise_of_one_receiver_and_its_false_alarms() -> None:
     made = radar("ddm", samples_per_chirp=128)
     pfa, alarms, cells, mean = 1e-3, 0, 0, []
     for seed in range(4):
-        received = np.zeros((made.cycles_per_frame, made.n_rx, made.samples_per_chirp), np.complex64)
+        received = np.zeros(
+            (made.cycles_per_frame, made.n_rx, made.samples_per_chirp), np.complex64
+        )
         Noise(2.0, seed).add(received, made, 0)
-        assert (np.abs(received) ** 2).mean() == pytest.approx(2.0, rel=5 / math.sqrt(received.size))
+        assert (np.abs(received) ** 2).mean() == pytest.approx(
+            2.0, rel=5 / math.sqrt(received.size)
+        )
         spectra = range_spectrum(separate(received, made, 0), made)
         power = power_map(spectra.reshape(-1, made.n_tx, *spectra.shape[1:]), made)
         mean.append(power.mean())
@@ -210,11 +241,15 @@ def test_the_spectrogram_of_doppler_division_shows_one_line(tx: int) -> None:
     cycles = 16 * made.n_doppler_bands
     found = spectrogram(spectra[:, tx, 0], made, tx=tx, window=cycles)
     column = found.power.argmax(axis=1)
-    assert np.abs(found.velocity[column] - 20.0).max() < 2 * SPEED_OF_LIGHT_MPS / 28e9 / (cycles * 62.5e-6)
+    assert np.abs(found.velocity[column] - 20.0).max() < 2 * SPEED_OF_LIGHT_MPS / 28e9 / (
+        cycles * 62.5e-6
+    )
     beside = np.abs(found.velocity - 20) > 10
     assert found.power[:, beside].max() < 1e-4 * found.power.max()
     assert window_cycles(made) % made.n_doppler_bands == 0
-    assert window_cycles(made) * made.cycle_duration_s == pytest.approx(window_cycles(radar("tdm")) * 250e-6, rel=0.02)
+    assert window_cycles(made) * made.cycle_duration_s == pytest.approx(
+        window_cycles(radar("tdm")) * 250e-6, rel=0.02
+    )
 
 
 @pytest.mark.slow
@@ -251,12 +286,21 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
         ({"multiplexing": "cdm"}, "allowed: tdm, fdm, ddm"),
         ({"multiplexing": "fdm", "carrier_step_hz": 4e6}, "bands of the IF are 4.096e"),
         ({"multiplexing": "fdm", "carrier_step_hz": 12e9 / 5.5}, "at no positive frequency"),
-        ({"multiplexing": "fdm", "start_frequency_hz": 20e6}, "12 carriers 4.096e.06 Hz apart begin 2.25"),
+        (
+            {"multiplexing": "fdm", "start_frequency_hz": 20e6},
+            "12 carriers 4.096e.06 Hz apart begin 2.25",
+        ),
         ({"carrier_step_hz": 4e6}, "belongs to multiplexing = 'fdm'"),
         ({"multiplexing": "fdm", "doppler_bands": 16}, "belongs to multiplexing = 'ddm'"),
-        ({"multiplexing": "ddm", "channels": "all", "doppler_bands": 12}, "above 12, the number of Tx"),
+        (
+            {"multiplexing": "ddm", "channels": "all", "doppler_bands": 12},
+            "above 12, the number of Tx",
+        ),
         ({"multiplexing": "ddm"}, "every Rx hears all Tx; set channels = 'all'"),
-        ({"multiplexing": "ddm", "channels": "all", "frame_duration_s": 900e-6}, "no whole DDM cycle of 0.001 s"),
+        (
+            {"multiplexing": "ddm", "channels": "all", "frame_duration_s": 900e-6},
+            "no whole DDM cycle of 0.001 s",
+        ),
     ],
 )
 def test_what_has_no_meaning_is_refused(changes: dict[str, Any], said: str) -> None:

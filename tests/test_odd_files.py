@@ -163,7 +163,12 @@ end
 @pytest.fixture(scope="module")
 def imported() -> None:
     """What is slow to import is, before time is taken."""
-    for name in ("torch", "matplotlib.pyplot", "rtradar.pipeline.pictures.run_view", "rtradar.campaign"):
+    for name in (
+        "torch",
+        "matplotlib.pyplot",
+        "rtradar.pipeline.pictures.run_view",
+        "rtradar.campaign",
+    ):
         pytest.importorskip(name)
 
 
@@ -178,8 +183,13 @@ def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, imported: None) -> It
 
 @pytest.mark.parametrize("kind", ODD)
 @pytest.mark.parametrize("given", GIVEN)
-def test_a_given_path_that_is_something_else(there: Path, capfd: pytest.CaptureFixture[str], given: str, kind: str) -> None:
-    if given in ("a radar", "a radar to measure", "a scene") and kind in ("no bytes", "byte order mark"):
+def test_a_given_path_that_is_something_else(
+    there: Path, capfd: pytest.CaptureFixture[str], given: str, kind: str
+) -> None:
+    if given in ("a radar", "a radar to measure", "a scene") and kind in (
+        "no bytes",
+        "byte order mark",
+    ):
         pytest.skip("that leaves everything as it is by default")
     ending, words = GIVEN[given]
     path = there / f"odd{ending}"
@@ -191,7 +201,9 @@ def test_a_given_path_that_is_something_else(there: Path, capfd: pytest.CaptureF
 
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("given", GIVEN)
-def test_a_given_path_that_no_file_has(there: Path, capfd: pytest.CaptureFixture[str], given: str, name: str) -> None:
+def test_a_given_path_that_no_file_has(
+    there: Path, capfd: pytest.CaptureFixture[str], given: str, name: str
+) -> None:
     ending, words = GIVEN[given]
     one_line(words(NAMES[name](ending)), capfd)
 
@@ -211,8 +223,22 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from rtradar.clouds.sample import write_sample
 
     root = tmp_path_factory.mktemp("folders")
-    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05)
-    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.2), radar, out=root / "run", fidelity="analytic", save_if=True)
+    radar = rt.Radar(
+        tx_y=2,
+        tx_z=0,
+        rx_y=2,
+        rx_z=0,
+        chirp_duration_s=250e-6,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+    )
+    rt.run(
+        rt.synthetic_motion("walk", seed=0, duration_s=0.2),
+        radar,
+        out=root / "run",
+        fidelity="analytic",
+        save_if=True,
+    )
     (root / "scene").mkdir()
     for ending in ("obj", "stl", "ply", "glb"):
         trimesh.creation.box((1, 1, 1)).export(root / "scene" / f"box.{ending}")
@@ -230,29 +256,58 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (root / "set" / "x.bvh").write_text("HIERARCHY\n")
     (root / "clouds").mkdir()
     write_index(root / "clouds", ["one"])
-    write_sample(root / "clouds", "one", Sample(np.ones((9, 3)), "walk", {"recording": "r"}), np.zeros((0, 3)))
-    plan = {"data": [], "clouds": 2, "fingerprint": "", "made": "", "classes": ["kick", "walk"], "split": "folds"}
-    write_plan(root / "trained", plan | {"recipe": RECIPES["lean"].as_dict(), "folds": 2, "seed": 0, "trainings": ["1"]})
+    write_sample(
+        root / "clouds",
+        "one",
+        Sample(np.ones((9, 3)), "walk", {"recording": "r"}),
+        np.zeros((0, 3)),
+    )
+    plan = {
+        "data": [],
+        "clouds": 2,
+        "fingerprint": "",
+        "made": "",
+        "classes": ["kick", "walk"],
+        "split": "folds",
+    }
+    write_plan(
+        root / "trained",
+        plan | {"recipe": RECIPES["lean"].as_dict(), "folds": 2, "seed": 0, "trainings": ["1"]},
+    )
     (root / "trained" / "training-01").mkdir()
     column, words = np.array([0, 1]), np.array(["", ""])
     history = [dict.fromkeys(HISTORY, 0.5)]
     save_outcome(
-        root / "trained" / "training-01" / "outcome.json", Outcome("1", "", column, column, column, words, words, history)
+        root / "trained" / "training-01" / "outcome.json",
+        Outcome("1", "", column, column, column, words, words, history),
     )
     return root
 
 
 VIEW: Words = ["view", "run", "--out", "out.html"]
 INSIDE: dict[str, Words] = {
-    **{f"run/{name}": VIEW for name in ("summary.json", "view.npz", "cloud_rdt.npz", "cloud_xyz.npz", "maps.h5")},
+    **{
+        f"run/{name}": VIEW
+        for name in ("summary.json", "view.npz", "cloud_rdt.npz", "cloud_xyz.npz", "maps.h5")
+    },
     "run/if.zarr": ["export", "run", "--out", "out.nc"],
     "run/if.zarr/zarr.json": ["export", "run", "--out", "out.nc"],
     "run/if.zarr/c/0/0/0": ["export", "run", "--out", "out.nc"],
     **{
-        f"scene/box.{ending}": ["run", "synthetic:walk", "--scene", f"scene/{ending}.toml", "--out", "out"]
+        f"scene/box.{ending}": [
+            "run",
+            "synthetic:walk",
+            "--scene",
+            f"scene/{ending}.toml",
+            "--out",
+            "out",
+        ]
         for ending in ("obj", "stl", "ply", "glb")
     },
-    **{f"set/{name}": ["dataset", "build", "set/set.toml", "--out", "out"] for name in ("radar.toml", "scene.toml", "x.bvh")},
+    **{
+        f"set/{name}": ["dataset", "build", "set/set.toml", "--out", "out"]
+        for name in ("radar.toml", "scene.toml", "x.bvh")
+    },
     "clouds/collection.json": ["train", "clouds", "--out", "out"],
     "clouds/one.npz": ["train", "clouds", "--out", "out"],
     "trained/plan.json": ["evaluate", "trained", "--out", "out"],
@@ -300,7 +355,9 @@ def test_a_checkpoint_that_is_something_else(tmp_path: Path, kind: str) -> None:
 # -- what they all use ------------------------------------------------------------------------------------------------
 
 
-def test_what_is_opened_counts_not_what_had_the_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_opened_counts_not_what_had_the_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "file").write_bytes(b"x")
     os.mkfifo(tmp_path / "pipe")
     regular = os.stat(tmp_path / "file")
@@ -352,12 +409,24 @@ def test_a_link_inside_of_hdf5_is_not_followed(tmp_path: Path) -> None:
 
 
 def test_a_samples_folder_of_links_is_not_followed(tmp_path: Path) -> None:
-    radar = rt.Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=4, chirp_duration_s=1e-3, frame_duration_s=4e-3)
+    radar = rt.Radar(
+        tx_y=1,
+        tx_z=0,
+        rx_y=2,
+        rx_z=0,
+        samples_per_chirp=4,
+        chirp_duration_s=1e-3,
+        frame_duration_s=4e-3,
+    )
     import dataclasses
 
     (tmp_path / "run").mkdir()
-    (tmp_path / "run" / "summary.json").write_text(json.dumps({"parameters": {"radar": dataclasses.asdict(radar)}}))
-    zarr.create_array(tmp_path / "run" / "if.zarr", data=np.ones((2, 2, 4), "<c8"), chunks=(1, 2, 4))
+    (tmp_path / "run" / "summary.json").write_text(
+        json.dumps({"parameters": {"radar": dataclasses.asdict(radar)}})
+    )
+    zarr.create_array(
+        tmp_path / "run" / "if.zarr", data=np.ones((2, 2, 4), "<c8"), chunks=(1, 2, 4)
+    )
     os.mkfifo(tmp_path / "run" / "if.zarr" / "c" / "pipe")
     from rtradar.exchange import read_if
 

@@ -17,7 +17,9 @@ from rtradar.validate import validation_folder
 
 @pytest.fixture(scope="module")
 def paper() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("paper_numpy", validation_folder() / "paper_numpy.py")
+    spec = importlib.util.spec_from_file_location(
+        "paper_numpy", validation_folder() / "paper_numpy.py"
+    )
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -32,7 +34,9 @@ def test_if_samples_are_those_of_analytic_paper(paper: ModuleType, name: str) ->
     chirps = np.arange(first, first + 2 * radar.n_tx)
     body = Body.from_motion(rt.synthetic_motion("kick", seed=1, duration_s=0.5))
     times = radar.chirp_times(len(chirps), first)
-    ours = rt.signal.synthesize(build_model("analytic-paper", radar, body).echoes(chirps), radar, times)
+    ours = rt.signal.synthesize(
+        build_model("analytic-paper", radar, body).echoes(chirps), radar, times
+    )
     theirs = paper.if_samples(radar, paper.Poses(*body.at(times)), first)
     # 3000 rad of phase at 77 GHz in float64.
     assert np.abs(ours - theirs).max() < 1e-10 * np.abs(ours).max()

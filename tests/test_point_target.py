@@ -38,12 +38,21 @@ def point(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> tuple[Echoes, 
     chirps = radar.chirps_per_frame
     times = radar.chirp_times(chirps)
     tx = radar.tx_of_chirp(np.arange(chirps))
-    at = np.asarray(place) + (times - chirps * radar.chirp_duration_s / 2)[:, None] * np.asarray(velocity)
+    at = np.asarray(place) + (times - chirps * radar.chirp_duration_s / 2)[:, None] * np.asarray(
+        velocity
+    )
     there = np.linalg.norm(radar.tx[tx] - at, axis=1)
     back = np.linalg.norm(radar.rx[radar.rx_of_tx[tx]] - at[:, None], axis=2)
     length = (there[:, None] + back)[..., None]
     amplitude = np.full((1, *length.shape), 0.3 - 0.4j)
-    echoes = Echoes(length=length, amplitude=amplitude, frequency=[radar.centre_frequency_hz], tx=tx, part=[0], bounces=[1])
+    echoes = Echoes(
+        length=length,
+        amplitude=amplitude,
+        frequency=[radar.centre_frequency_hz],
+        tx=tx,
+        part=[0],
+        bounces=[1],
+    )
     return echoes, radar, times
 
 
@@ -87,7 +96,9 @@ CASES += [(HIGH, TORSO, 0.0), (HIGH, TORSO, 2.0), (HIGH, LEFT, -2.0)]
 
 
 @pytest.mark.parametrize(
-    ("radar", "place", "speed"), CASES, ids=lambda value: value.name if isinstance(value, Radar) else str(value)
+    ("radar", "place", "speed"),
+    CASES,
+    ids=lambda value: value.name if isinstance(value, Radar) else str(value),
 )
 def test_a_point_reads_back(radar: Radar, place: tuple[float, ...], speed: float) -> None:
     range_m, direction = sight(radar, place)
@@ -106,7 +117,9 @@ def test_a_point_reads_back(radar: Radar, place: tuple[float, ...], speed: float
 def test_a_walker_toward_the_radar_off_the_line_of_sight(radar: Radar) -> None:
     range_m, direction = sight(radar, TORSO)
     velocity = np.array([-1.4, 0.0, 0.0])
-    reading = read(radar, spectra(radar, TORSO, velocity).sum(axis=2), range_m, float(velocity @ direction))
+    reading = read(
+        radar, spectra(radar, TORSO, velocity).sum(axis=2), range_m, float(velocity @ direction)
+    )
     assert abs(reading.range_error) < 0.1
     assert abs(reading.velocity_error) < 0.03
 
@@ -142,7 +155,9 @@ def test_too_fast_aliases_to_its_known_place(radar: Radar, speed: float) -> None
     # A kick. 12 GHz: 8 - 2 x 7.14 = -6.28 m/s; 77 GHz: 8 - 2 x 6.32 = -4.65 m/s: receding reads as approaching.
     range_m, direction = sight(radar, TORSO)
     seen = speed - np.sign(speed) * 2 * radar.max_velocity_mps
-    assert seen == pytest.approx(np.sign(speed) * {"paper-12ghz": -6.276, "paper-77ghz": -4.649}[radar.name], abs=1e-3)
+    assert seen == pytest.approx(
+        np.sign(speed) * {"paper-12ghz": -6.276, "paper-77ghz": -4.649}[radar.name], abs=1e-3
+    )
     power = spectra(radar, TORSO, speed * direction).sum(axis=2)
     reading = read(radar, power, range_m, seen)
     cycles = radar.cycles_per_frame

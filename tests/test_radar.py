@@ -34,11 +34,18 @@ def test_table_1() -> None:
     assert LOW.position_m == (-4.0, 1.0, 1.0)
     assert LOW.slope_hz_per_s == approx(6.4e13)
     assert LOW.sample_rate_hz == approx(4.096e6)
-    assert LOW.start_wavelength_m == approx(0.025, rel=1e-3)  # the paper's c is 3e8, 0.7 per mille more
+    assert LOW.start_wavelength_m == approx(
+        0.025, rel=1e-3
+    )  # the paper's c is 3e8, 0.7 per mille more
 
 
 def test_the_77_ghz_preset_differs_in_frequency_and_chirp_only() -> None:
-    assert dataclasses.replace(LOW, name="paper-77ghz", start_frequency_hz=77e9, chirp_duration_s=12.5e-6) == HIGH
+    assert (
+        dataclasses.replace(
+            LOW, name="paper-77ghz", start_frequency_hz=77e9, chirp_duration_s=12.5e-6
+        )
+        == HIGH
+    )
 
 
 @pytest.mark.parametrize(
@@ -84,14 +91,18 @@ def test_table_2_as_the_paper_has_it() -> None:
     assert wavelength / (4 * 12 * chirp_s) == approx(8.33, rounded)
     assert wavelength / (2 * frame_s) == approx(0.125, rounded)
     # 2 asin(1/48) is 2.387; the paper cuts off and writes 2.38.
-    assert math.degrees(2 * math.asin(wavelength / (2 * virtual * (wavelength / 2)))) == approx(2.38, 5e-3)
+    assert math.degrees(2 * math.asin(wavelength / (2 * virtual * (wavelength / 2)))) == approx(
+        2.38, 5e-3
+    )
     # Ours from theirs: the sweep centre instead of its start, and the whole cycles instead of 0.1 s.
     exact_c = SPEED_OF_LIGHT_MPS / c
     centre = exact_c * 12 / 14
     assert LOW.max_range_m == approx(exact_c * 9.6)
     assert LOW.range_bin_m == approx(exact_c * 0.0375)
     assert LOW.max_velocity_mps == approx(centre * wavelength / (4 * 12 * chirp_s))
-    assert LOW.velocity_bin_mps == approx(centre * wavelength / (2 * frame_s) * frame_s / (133 * 12 * chirp_s))
+    assert LOW.velocity_bin_mps == approx(
+        centre * wavelength / (2 * frame_s) * frame_s / (133 * 12 * chirp_s)
+    )
     # The paper's +-90 deg needs half a wavelength between receivers; at the centre of the sweep it is 0.583.
     assert math.sin(math.radians(LOW.max_angle_deg)) == approx(12 / 14)
 
@@ -110,18 +121,31 @@ def test_a_single_channel_has_no_angle_resolution() -> None:
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
 def test_antenna_places(radar: Radar) -> None:
     wavelength = SPEED_OF_LIGHT_MPS / radar.start_frequency_hz
-    expected_tx = [(0, (i - 2.5) * 4, 0) for i in range(6)] + [(0, 0, (i - 2.5) * 4) for i in range(6)]
-    expected_rx = [(0, (j - 3.5) / 2, 0) for j in range(8)] + [(0, 0, (j - 3.5) / 2) for j in range(8)]
+    expected_tx = [(0, (i - 2.5) * 4, 0) for i in range(6)] + [
+        (0, 0, (i - 2.5) * 4) for i in range(6)
+    ]
+    expected_rx = [(0, (j - 3.5) / 2, 0) for j in range(8)] + [
+        (0, 0, (j - 3.5) / 2) for j in range(8)
+    ]
     for places, expected in ((radar.tx, expected_tx), (radar.rx, expected_rx)):
         assert places.dtype == np.float64
         # Rounding where metres are added to millimetres.
-        np.testing.assert_allclose(places, np.array([-4.0, 1.0, 1.0]) + wavelength * np.array(expected), rtol=0, atol=1e-14)
+        np.testing.assert_allclose(
+            places, np.array([-4.0, 1.0, 1.0]) + wavelength * np.array(expected), rtol=0, atol=1e-14
+        )
 
 
 counts = st.integers(0, 7)
 
 
-@given(tx_y=counts, tx_z=counts, rx_y=counts, rx_z=counts, tx_spacing=st.floats(0.1, 9), rx_spacing=st.floats(0.1, 9))
+@given(
+    tx_y=counts,
+    tx_z=counts,
+    rx_y=counts,
+    rx_z=counts,
+    tx_spacing=st.floats(0.1, 9),
+    rx_spacing=st.floats(0.1, 9),
+)
 def test_lines_are_centred_even_and_rising(
     tx_y: int, tx_z: int, rx_y: int, rx_z: int, tx_spacing: float, rx_spacing: float
 ) -> None:
@@ -140,7 +164,9 @@ def test_lines_are_centred_even_and_rising(
     for places, along_y, spacing in ((radar.tx, tx_y, tx_spacing), (radar.rx, rx_y, rx_spacing)):
         for line, axis in ((places[:along_y], 1), (places[along_y:], 2)):
             assert not np.delete(line, axis, axis=1).any()
-            np.testing.assert_allclose(np.diff(line[:, axis]), spacing * radar.start_wavelength_m, rtol=1e-9)
+            np.testing.assert_allclose(
+                np.diff(line[:, axis]), spacing * radar.start_wavelength_m, rtol=1e-9
+            )
             if len(line):
                 assert abs(line[:, axis].sum()) < 1e-12  # rounding: symmetric pairs cancel
     assert len(radar.tx) == radar.n_tx
@@ -203,11 +229,15 @@ def test_transmitters_take_turns() -> None:
     ],
     ids=["12 GHz", "77 GHz"],
 )
-def test_windows_of_three_seconds(radar: Radar, chirps: int, cycles_per_hop: Fraction, last_start: int) -> None:
+def test_windows_of_three_seconds(
+    radar: Radar, chirps: int, cycles_per_hop: Fraction, last_start: int
+) -> None:
     starts = radar.window_starts(chirps)
     assert len(starts) == 117
     assert starts[-1] == last_start
-    assert starts.tolist() == [round(k * cycles_per_hop) for k in range(117)]  # thirds: never half-way between cycles
+    assert starts.tolist() == [
+        round(k * cycles_per_hop) for k in range(117)
+    ]  # thirds: never half-way between cycles
     # Every start is within half a cycle of k x 25 ms, and the time of a window is its middle.
     error = starts * radar.cycle_duration_s - np.arange(117) * 0.025
     assert np.abs(error).max() < radar.cycle_duration_s / 2
@@ -231,7 +261,9 @@ def test_windows_at_the_end_of_a_capture() -> None:
     n_tx=st.integers(1, 5),
     chirps=st.integers(0, 2000),
 )
-def test_windows_by_brute_force(hop_eighths: int, frame_cycles: int, n_tx: int, chirps: int) -> None:
+def test_windows_by_brute_force(
+    hop_eighths: int, frame_cycles: int, n_tx: int, chirps: int
+) -> None:
     # Binary fractions, so nothing is rounded: cycles of n_tx / 1024 s, hops of eighths of a cycle.
     chirp = 2.0**-10
     radar = Radar(
@@ -245,7 +277,9 @@ def test_windows_by_brute_force(hop_eighths: int, frame_cycles: int, n_tx: int, 
     last = chirps // n_tx - frame_cycles
     hop = Fraction(hop_eighths, 8)
     nearest = {round(k * hop) for k in range(int((last + 1) / hop) + 2)} if last >= 0 else set()
-    assert radar.window_starts(chirps).tolist() == sorted(start for start in nearest if start <= last)
+    assert radar.window_starts(chirps).tolist() == sorted(
+        start for start in nearest if start <= last
+    )
 
 
 @given(n=st.integers(1, 700))

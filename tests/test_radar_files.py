@@ -104,13 +104,16 @@ def test_a_folder_is_no_file(tmp_path: Path) -> None:
     assert "folder.toml" in refusal(Radar.load, tmp_path / "folder.toml")
 
 
-@pytest.mark.parametrize("text", ["name = ", "tx_y = 6\ntx_y = 7", "\0", b"\xff\xfe", b'name = "\xe9"', "[radar", "12"])
+@pytest.mark.parametrize(
+    "text", ["name = ", "tx_y = 6\ntx_y = 7", "\0", b"\xff\xfe", b'name = "\xe9"', "[radar", "12"]
+)
 def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
     assert "mine.toml' is not TOML: " in refusal(Radar.load, write(tmp_path, text))
 
 
 @pytest.mark.parametrize(
-    ("text", "key"), [("chirp_time_s = 1", "chirp_time_s"), ("[radar]\ntx_y = 1", "radar"), ("n_tx = 3", "n_tx")]
+    ("text", "key"),
+    [("chirp_time_s = 1", "chirp_time_s"), ("[radar]\ntx_y = 1", "radar"), ("n_tx = 3", "n_tx")],
 )
 def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
     message = refusal(Radar.load, write(tmp_path, text))
@@ -132,7 +135,21 @@ WHOLE = ("samples_per_chirp", "tx_y", "tx_z", "rx_y", "rx_z")
 
 @pytest.mark.parametrize("field", POSITIVE)
 @pytest.mark.parametrize(
-    "value", ["-4e9", "-1", "0", "0.0", "nan", "inf", "-inf", '"4e9"', "true", "[4e9]", "{hz = 4e9}", "1979-05-27"]
+    "value",
+    [
+        "-4e9",
+        "-1",
+        "0",
+        "0.0",
+        "nan",
+        "inf",
+        "-inf",
+        '"4e9"',
+        "true",
+        "[4e9]",
+        "{hz = 4e9}",
+        "1979-05-27",
+    ],
 )
 def test_a_quantity_is_a_positive_finite_number(tmp_path: Path, field: str, value: str) -> None:
     message = refusal(Radar.load, write(tmp_path, f"{field} = {value}"))
@@ -167,10 +184,15 @@ def test_a_count_is_a_whole_number(tmp_path: Path, field: str, value: str) -> No
         ({"frame_duration_s": 1e9}, "more than 2.1e+09"),
         ({"chirp_duration_s": 1e-14}, "shorten the frame"),
         # Every Tx with every Rx: 137 GB, were they written down before the frame is looked at.
-        (dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), 65536) | {"channels": "all"}, "holds no whole TDM cycle"),
+        (
+            dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), 65536) | {"channels": "all"},
+            "holds no whole TDM cycle",
+        ),
     ],
 )
-def test_values_far_outside_are_refused_in_one_short_line(values: dict[str, Any], says: str) -> None:
+def test_values_far_outside_are_refused_in_one_short_line(
+    values: dict[str, Any], says: str
+) -> None:
     message = refusal(Radar, **values)
     assert says in message
     assert len(message) < 300
@@ -192,11 +214,25 @@ def test_a_hop_far_below_a_cycle_takes_every_cycle() -> None:
 
 
 def test_a_chirp_has_a_sample() -> None:
-    assert "samples_per_chirp = 0; it must be a whole number from 1 to 65536" in refusal(Radar, samples_per_chirp=0)
+    assert "samples_per_chirp = 0; it must be a whole number from 1 to 65536" in refusal(
+        Radar, samples_per_chirp=0
+    )
 
 
 @pytest.mark.parametrize(
-    "value", ["[1, 2]", "[1, 2, 3, 4]", "[]", "5", "true", '"here"', "[1, 2, nan]", "[1, inf, 3]", '[1, 2, "x"]', "[[1, 2, 3]]"]
+    "value",
+    [
+        "[1, 2]",
+        "[1, 2, 3, 4]",
+        "[]",
+        "5",
+        "true",
+        '"here"',
+        "[1, 2, nan]",
+        "[1, inf, 3]",
+        '[1, 2, "x"]',
+        "[[1, 2, 3]]",
+    ],
 )
 def test_a_place_is_three_finite_numbers(tmp_path: Path, value: str) -> None:
     message = refusal(Radar.load, write(tmp_path, f"position_m = {value}"))
@@ -204,9 +240,13 @@ def test_a_place_is_three_finite_numbers(tmp_path: Path, value: str) -> None:
     assert "three finite numbers" in message
 
 
-@pytest.mark.parametrize(("field", "allowed"), [("channels", "pairs, all"), ("polarization", "v, h")])
+@pytest.mark.parametrize(
+    ("field", "allowed"), [("channels", "pairs, all"), ("polarization", "v, h")]
+)
 @pytest.mark.parametrize("value", ['"x"', '"V"', '""', "1", "true", '["v"]'])
-def test_a_choice_is_one_of_those_named(tmp_path: Path, field: str, allowed: str, value: str) -> None:
+def test_a_choice_is_one_of_those_named(
+    tmp_path: Path, field: str, allowed: str, value: str
+) -> None:
     message = refusal(Radar.load, write(tmp_path, f"{field} = {value}"))
     assert f"{field} = " in message
     assert f"allowed: {allowed}" in message
@@ -239,7 +279,14 @@ def test_a_frame_holds_a_cycle() -> None:
 
 @given(
     field=st.sampled_from(POSITIVE),
-    value=st.one_of(st.floats(max_value=0), st.just(math.nan), st.just(math.inf), st.none(), st.text(max_size=5), st.booleans()),
+    value=st.one_of(
+        st.floats(max_value=0),
+        st.just(math.nan),
+        st.just(math.inf),
+        st.none(),
+        st.text(max_size=5),
+        st.booleans(),
+    ),
 )
 def test_no_value_without_meaning_gets_through(field: str, value: object) -> None:
     assert f"{field} = {value!r}" in refusal(Radar, **{field: value})

@@ -71,7 +71,9 @@ def test_if_signal_and_its_spectrum() -> None:
         return RADAR.start_frequency_hz * at + RADAR.slope_hz_per_s * at**2 / 2
 
     # 12e9 turns a second for 62 us, of which a double keeps 1e-10.
-    np.testing.assert_allclose(got, amplitude * np.exp(2j * np.pi * (turns(t) - turns(t - tau))), atol=1e-8)
+    np.testing.assert_allclose(
+        got, amplitude * np.exp(2j * np.pi * (turns(t) - turns(t - tau))), atol=1e-8
+    )
     frequency = RADAR.start_frequency_hz + RADAR.slope_hz_per_s * t
     received = np.conj(amplitude) * np.exp(-2j * np.pi * frequency * tau)
     rest = np.exp(-1j * np.pi * RADAR.slope_hz_per_s * tau**2)  # of the mixer alone
@@ -83,8 +85,15 @@ def test_axes_of_the_maps() -> None:
     wavelength, cycle = c / (12e9 + 4e9 / 2), 12 * 62.5e-6
     spacing = c / 12e9 / 2
     expected = [c / 8e9, c / 8e9 * 256, wavelength / (4 * cycle), wavelength / (2 * 133 * cycle)]
-    assert [radar.range_bin_m, radar.max_range_m, radar.max_velocity_mps, radar.velocity_bin_mps] == pytest.approx(expected)
-    angles = np.degrees([np.arcsin(wavelength / (2 * spacing)), 0.886 * wavelength / (48 * spacing)])
+    assert [
+        radar.range_bin_m,
+        radar.max_range_m,
+        radar.max_velocity_mps,
+        radar.velocity_bin_mps,
+    ] == pytest.approx(expected)
+    angles = np.degrees(
+        [np.arcsin(wavelength / (2 * spacing)), 0.886 * wavelength / (48 * spacing)]
+    )
     assert [radar.max_angle_deg, radar.angle_resolution_deg] == pytest.approx(angles)
     assert radar.chirp_times(3) == pytest.approx(62.5e-6 * np.array([0.5, 1.5, 2.5]))
     assert list(radar.tx_of_chirp(np.arange(11, 14))) == [11, 0, 1]
@@ -97,7 +106,9 @@ def test_range_doppler() -> None:
     k, velocity, tx, rx = 5, -1, 1, 2
     turn = np.exp(-2j * np.pi * (k * np.arange(64) / 64 + velocity * np.arange(4)[:, None] / 4))
     expected = (slow[:, None] * fast * x[tx::2, rx] * turn).sum() / (slow.sum() * fast.sum())
-    assert rt.process.range_doppler(x, RADAR).values[k, velocity + 2, tx * 3 + rx] == pytest.approx(expected, rel=1e-12)
+    assert rt.process.range_doppler(x, RADAR).values[k, velocity + 2, tx * 3 + rx] == pytest.approx(
+        expected, rel=1e-12
+    )
 
 
 def test_radii_and_cross_section_of_an_ellipsoid() -> None:
@@ -117,7 +128,9 @@ def test_mirror_return_of_a_sphere_near_by() -> None:
     antenna, k = np.array([[distance, 0.0, 0.0]]), 2 * np.pi * 77e9 / SPEED_OF_LIGHT_MPS
     way = distance - radius
     h = 2 / way + 2 / radius
-    expected = 2 * np.sqrt(np.pi) / h * (distance / way) ** 2 * np.exp(-1j * k * (2 * way - 2 * distance))
+    expected = (
+        2 * np.sqrt(np.pi) / h * (distance / way) ** 2 * np.exp(-1j * k * (2 * way - 2 * distance))
+    )
     got = rt.scattering_length(sphere, antenna, antenna, 77e9, "specular", variant="scalar")
     # A phase of 1000 radians, of which a double keeps 1e-13; the visibility is that of a mesh, and 1 here.
     assert got[0] == pytest.approx(expected, rel=1e-9)
@@ -131,7 +144,8 @@ def test_spheres(method: str, tolerance: float) -> None:
         expected = np.sqrt(np.pi) * radius * np.exp(2j * k * radius)
     else:  # (po) far away, over the cap of heights z = a cos: n.s = z/a, dS = 2 pi a dz
         parts = [
-            integrate.quad(lambda z, f=f: z / radius * f(2 * k * z) * 2 * np.pi * radius, 0, radius) for f in (np.cos, np.sin)
+            integrate.quad(lambda z, f=f: z / radius * f(2 * k * z) * 2 * np.pi * radius, 0, radius)
+            for f in (np.cos, np.sin)
         ]
         expected = 1j * k / np.sqrt(np.pi) * (parts[0][0] + 1j * parts[1][0])
     assert rt.rcs.sphere(radius, frequency, method) == pytest.approx(expected, rel=tolerance)
@@ -141,10 +155,14 @@ def test_mean_of_a_phase_over_a_triangle() -> None:
     """(facet) against quadrature over the triangle: what the facets' code sums is judged in its own tests."""
     phases = np.array([0.3, 2.1, -1.7])
     others = [[1, 2], [0, 2], [0, 1]]
-    closed = 2 * sum(np.exp(1j * phases[i]) / np.prod(1j * (phases[i] - phases[o])) for i, o in enumerate(others))
+    closed = 2 * sum(
+        np.exp(1j * phases[i]) / np.prod(1j * (phases[i] - phases[o])) for i, o in enumerate(others)
+    )
 
     def at(v: float, u: float) -> complex:
-        return 2 * np.exp(1j * (phases[0] + u * (phases[1] - phases[0]) + v * (phases[2] - phases[0])))
+        return 2 * np.exp(
+            1j * (phases[0] + u * (phases[1] - phases[0]) + v * (phases[2] - phases[0]))
+        )
 
     real = integrate.dblquad(lambda v, u: at(v, u).real, 0, 1, 0, lambda u: 1 - u)[0]
     imaginary = integrate.dblquad(lambda v, u: at(v, u).imag, 0, 1, 0, lambda u: 1 - u)[0]
@@ -156,15 +174,22 @@ def test_walls(polarization: str) -> None:
     eta, thickness, frequency, cosine = 5.3 - 0.2j, 0.05, 14e9, 0.6
     root = np.sqrt(eta - (1 - cosine**2))
     outer = cosine if polarization == "te" else eta * cosine
-    r, q = (outer - root) / (outer + root), np.exp(-2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * thickness * root)
+    r, q = (
+        (outer - root) / (outer + root),
+        np.exp(-2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * thickness * root),
+    )
     assert reflection(eta, cosine, polarization) == pytest.approx(r)
     expected = r * (1 - q**2) / (1 - r**2 * q**2), (1 - r**2) * q / (1 - r**2 * q**2)
     assert slab(eta, thickness, frequency, cosine, polarization) == pytest.approx(expected)
     passes = [slab_passes(eta, thickness, frequency, cosine, polarization, p) for p in range(4)]
-    assert passes == pytest.approx([r, (1 - r**2) * q, -(1 - r**2) * r * q**2, (1 - r**2) * r**2 * q**3])
+    assert passes == pytest.approx(
+        [r, (1 - r**2) * q, -(1 - r**2) * r * q**2, (1 - r**2) * r**2 * q**3]
+    )
     for p in range(4):
         longer = p * thickness * np.sqrt(5.3 - (1 - cosine**2)) - p % 2 * thickness * cosine
-        assert Term(p, rest=False, index_squared=5.3).extra_m(thickness, np.array(cosine)) == pytest.approx(longer)
+        assert Term(p, rest=False, index_squared=5.3).extra_m(
+            thickness, np.array(cosine)
+        ) == pytest.approx(longer)
 
 
 def test_noise() -> None:
@@ -178,9 +203,15 @@ def test_cfar_laws() -> None:
     looks = 8
     alpha = rt.process.os_scale(cells, 0.75, 1e-4, looks)
     law = stats.beta(rank, cells - rank + 1)
-    rate = law.expect(lambda u: special.gammaincc(looks, alpha * special.gammaincinv(looks, u)), epsabs=1e-12)
-    assert rate == pytest.approx(1e-4, rel=1e-4)  # what the quadrature over U, which peaks sharply, leaves
-    assert stats.f.sf(rt.process.ca_scale(cells, 1e-4, looks), 2 * looks, 2 * cells * looks) == pytest.approx(1e-4, rel=1e-9)
+    rate = law.expect(
+        lambda u: special.gammaincc(looks, alpha * special.gammaincinv(looks, u)), epsabs=1e-12
+    )
+    assert rate == pytest.approx(
+        1e-4, rel=1e-4
+    )  # what the quadrature over U, which peaks sharply, leaves
+    assert stats.f.sf(
+        rt.process.ca_scale(cells, 1e-4, looks), 2 * looks, 2 * cells * looks
+    ) == pytest.approx(1e-4, rel=1e-9)
     assert rt.process.ca_scale(cells, 1e-4) == pytest.approx(cells * (1e-4 ** (-1 / cells) - 1))
     spread = np.array([0.5, 0.3, 0.2])
     alpha = rt.process.clutter_map_scale(spread, 1e-4)

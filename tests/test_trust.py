@@ -37,7 +37,11 @@ def calls_of(tree: ast.AST) -> list[tuple[str, dict[str, Any]]]:
     found = []
     for node in ast.walk(tree):
         if isinstance(node, ast.Call):
-            words = {word.arg: word.value.value for word in node.keywords if word.arg and isinstance(word.value, ast.Constant)}
+            words = {
+                word.arg: word.value.value
+                for word in node.keywords
+                if word.arg and isinstance(word.value, ast.Constant)
+            }
             found.append((ast.unparse(node.func), words))
     return found
 
@@ -45,18 +49,28 @@ def calls_of(tree: ast.AST) -> list[tuple[str, dict[str, Any]]]:
 def unsafe(source: str) -> list[str]:
     """What in a source could load a pickle, or run what a file says."""
     tree = ast.parse(source)
-    modules = [alias.name for node in ast.walk(tree) if isinstance(node, ast.Import) for alias in node.names]
+    modules = [
+        alias.name
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    ]
     modules += [node.module or "" for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     found = [
         name
         for name in modules
-        if name.split(".")[0] in ("pickle", "cPickle", "dill", "joblib", "shelve", "marshal", "cloudpickle")
+        if name.split(".")[0]
+        in ("pickle", "cPickle", "dill", "joblib", "shelve", "marshal", "cloudpickle")
     ]
     for name, words in calls_of(tree):
         last = name.rpartition(".")[2]
         loads = last in ("load", "read_array") and name.split(".")[0] in ("np", "numpy", "torch")
         safe = words.get("allow_pickle") is False or words.get("weights_only") is True
-        if (name.endswith("read_array") or name in ("np.load", "numpy.load")) and "allow_pickle" not in words and last == "load":
+        if (
+            (name.endswith("read_array") or name in ("np.load", "numpy.load"))
+            and "allow_pickle" not in words
+            and last == "load"
+        ):
             safe = True  # False is the default of numpy.load
         if (loads and not safe) or words.get("allow_pickle") is True or name in ("eval", "exec"):
             found.append(name)
@@ -65,7 +79,9 @@ def unsafe(source: str) -> list[str]:
 
 def test_no_source_can_load_a_pickle() -> None:
     assert len(SOURCES) > 100
-    assert {str(path): found for path in SOURCES if (found := unsafe(path.read_text(encoding="utf-8")))} == {}
+    assert {
+        str(path): found for path in SOURCES if (found := unsafe(path.read_text(encoding="utf-8")))
+    } == {}
 
 
 @pytest.mark.parametrize(
@@ -112,12 +128,17 @@ def npy(values: Any, **header: Any) -> bytes:
     return buffer.getvalue()
 
 
-ABOUT = np.frombuffer(json.dumps({"format": 1, "label": "walk", "provenance": {}}).encode(), dtype=np.uint8)
+ABOUT = np.frombuffer(
+    json.dumps({"format": 1, "label": "walk", "provenance": {}}).encode(), dtype=np.uint8
+)
 
 
 def test_a_pickle_in_a_cloud_is_not_run(tmp_path: Path) -> None:
     harm = tmp_path / "harm"
-    collection_of(tmp_path, {"about.npy": npy(ABOUT), "points.npy": npy(np.array([[Harm(harm)] * 3], dtype=object))})
+    collection_of(
+        tmp_path,
+        {"about.npy": npy(ABOUT), "points.npy": npy(np.array([[Harm(harm)] * 3], dtype=object))},
+    )
     clouds = Collection(tmp_path)
     with pytest.raises(InputError, match="is damaged"):
         clouds.points(0)
@@ -144,9 +165,15 @@ def test_a_pickle_for_a_checkpoint_is_not_run(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("shape", [(10**12, 3), (2**62, 3), (1, 3, 10**9)])
-def test_a_cloud_that_promises_more_than_it_holds_is_damaged(tmp_path: Path, shape: tuple[int, ...]) -> None:
+def test_a_cloud_that_promises_more_than_it_holds_is_damaged(
+    tmp_path: Path, shape: tuple[int, ...]
+) -> None:
     collection_of(
-        tmp_path, {"about.npy": npy(ABOUT), "points.npy": npy([0.0] * 3, descr="<f8", fortran_order=False, shape=shape)}
+        tmp_path,
+        {
+            "about.npy": npy(ABOUT),
+            "points.npy": npy([0.0] * 3, descr="<f8", fortran_order=False, shape=shape),
+        },
     )
     with pytest.raises(InputError, match="is damaged"):
         Collection(tmp_path).points(0)
@@ -154,7 +181,9 @@ def test_a_cloud_that_promises_more_than_it_holds_is_damaged(tmp_path: Path, sha
 
 def test_a_compressed_bomb_is_not_unpacked(tmp_path: Path) -> None:
     bomb = npy(np.zeros((10**6, 3)))
-    collection_of(tmp_path, {"about.npy": npy(ABOUT), "points.npy": bomb}, compression=zipfile.ZIP_DEFLATED)
+    collection_of(
+        tmp_path, {"about.npy": npy(ABOUT), "points.npy": bomb}, compression=zipfile.ZIP_DEFLATED
+    )
     assert (tmp_path / "a.npz").stat().st_size < len(bomb) / 100
     with pytest.raises(InputError, match="is damaged"):
         Collection(tmp_path)
@@ -190,7 +219,9 @@ def test_too_many_joints_and_poses_are_refused_with_the_limit(tmp_path: Path) ->
         load_motion(path)
     joints = "".join(f"JOINT j{number}\n{{\nOFFSET 0 1 0\n}}\n" for number in range(999))
     path.write_text(BVH_HEAD + joints + BVH_TAIL % (100_001, "0 0 0\n" * 100_001))
-    with pytest.raises(InputError, match="100001 frames of 1000 joints; frames times joints may be 100000000"):
+    with pytest.raises(
+        InputError, match="100001 frames of 1000 joints; frames times joints may be 100000000"
+    ):
         load_motion(path)
 
 
@@ -217,7 +248,9 @@ def test_a_collection_names_no_files_elsewhere(tmp_path: Path, identity: str) ->
         Collection(folder)
 
 
-@pytest.mark.parametrize("way", ["../out.bvh", "link/out.bvh", "{root}/out.bvh", "inside/../../out.bvh", "loop/x.bvh"])
+@pytest.mark.parametrize(
+    "way", ["../out.bvh", "link/out.bvh", "{root}/out.bvh", "inside/../../out.bvh", "loop/x.bvh"]
+)
 def test_a_data_set_file_reads_nothing_elsewhere(tmp_path: Path, way: str) -> None:
     folder = tmp_path / "set"
     (folder / "inside").mkdir(parents=True)
@@ -238,7 +271,9 @@ def test_a_data_set_file_reads_nothing_elsewhere(tmp_path: Path, way: str) -> No
             read_spec(folder / "set.toml")
 
 
-def test_an_environment_variable_allows_its_folder_and_no_other(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_environment_variable_allows_its_folder_and_no_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "far" / "deep").mkdir(parents=True)
     (tmp_path / "set").mkdir()
     (tmp_path / "far" / "deep" / "walk.bvh").write_text("")
@@ -254,7 +289,11 @@ def test_an_environment_variable_allows_its_folder_and_no_other(tmp_path: Path, 
 
 # -- whatever the bytes ----------------------------------------------------------------------------------------------------
 
-BVH = BVH_HEAD + "JOINT knee\n{\nOFFSET 0 -50 0\nCHANNELS 1 Xrotation\n}\n" + BVH_TAIL % (2, "0 0 0 1\n0 1 0 2\n")
+BVH = (
+    BVH_HEAD
+    + "JOINT knee\n{\nOFFSET 0 -50 0\nCHANNELS 1 Xrotation\n}\n"
+    + BVH_TAIL % (2, "0 0 0 1\n0 1 0 2\n")
+)
 AMC = ":DEGREES\n1\nroot 1 2 3 0 0 0\nfirst 0 0 0\n2\nroot 1 2 3 0 90 0\nfirst 0 0 450\n"
 ASF = (
     ":units\nlength 0.45\nangle deg\n:root\norder TX TY TZ RX RY RZ\naxis XYZ\nposition 0 0 0\norientation 0 0 0\n:bonedata\n"
@@ -316,10 +355,26 @@ def one_line_or_well(read: Any, *paths: Path) -> None:
     assert len(said.splitlines()) == 1
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(bvh=bent(BVH), amc=bent(AMC), asf=bent(ASF), toml=bent(TOML), index=bent('{\n"format": 1,\n"samples": ["a"]\n}'))
-def test_bent_files_give_one_line_or_are_read(tmp_path: Path, bvh: str, amc: str, asf: str, toml: str, index: str) -> None:
-    for name, text in (("x.bvh", bvh), ("x.amc", amc), ("x.asf", asf), ("x.toml", toml), ("collection.json", index)):
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    bvh=bent(BVH),
+    amc=bent(AMC),
+    asf=bent(ASF),
+    toml=bent(TOML),
+    index=bent('{\n"format": 1,\n"samples": ["a"]\n}'),
+)
+def test_bent_files_give_one_line_or_are_read(
+    tmp_path: Path, bvh: str, amc: str, asf: str, toml: str, index: str
+) -> None:
+    for name, text in (
+        ("x.bvh", bvh),
+        ("x.amc", amc),
+        ("x.asf", asf),
+        ("x.toml", toml),
+        ("collection.json", index),
+    ):
         (tmp_path / name).write_bytes(text.encode("latin-1"))
     (tmp_path / "good.asf").write_text(ASF)
     (tmp_path / "good.amc").write_text(AMC)
@@ -337,14 +392,24 @@ def test_files_to_bend_are_good(tmp_path: Path) -> None:
     for name, text in (("x.amc", AMC), ("x.bvh", BVH)):
         (tmp_path / name).write_text(text)
         skeleton = tmp_path / "x.asf" if name == "x.amc" else None
-        assert load_motion(tmp_path / name, skeleton, unit_m=None if skeleton else 0.02).duration_s > 0
+        assert (
+            load_motion(tmp_path / name, skeleton, unit_m=None if skeleton else 0.02).duration_s > 0
+        )
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("\n2\n", "\n\xb2\n", "has 0 values|not in the skeleton"),  # int() takes no superscript, which str.isdigit() takes
-        ("\n2\n", "\n" + "2" * 5000 + "\n", "not in the skeleton"),  # more digits than int() converts
+        (
+            "\n2\n",
+            "\n\xb2\n",
+            "has 0 values|not in the skeleton",
+        ),  # int() takes no superscript, which str.isdigit() takes
+        (
+            "\n2\n",
+            "\n" + "2" * 5000 + "\n",
+            "not in the skeleton",
+        ),  # more digits than int() converts
         ("450", "1e308", "1e[+]09 at most"),
     ],
 )
@@ -357,16 +422,27 @@ def test_what_the_fuzzer_found_in_amc(tmp_path: Path, old: str, new: str, says: 
 
 def test_what_the_fuzzer_found_in_asf_and_bvh(tmp_path: Path) -> None:
     (tmp_path / "x.amc").write_text(AMC)
-    (tmp_path / "x.asf").write_text(ASF.replace("order TX TY TZ RX RY RZ\n", "").replace("dof rx ry rz\n", ""))
+    (tmp_path / "x.asf").write_text(
+        ASF.replace("order TX TY TZ RX RY RZ\n", "").replace("dof rx ry rz\n", "")
+    )
     with pytest.raises(InputError, match="the root has no order"):
         load_motion(tmp_path / "x.amc", tmp_path / "x.asf")
     (tmp_path / "x.bvh").write_text(BVH.replace("0.01", "1e-320"))
-    with pytest.raises(InputError, match="Frame Time: needs a positive number of seconds, 1e-06 to 10"):
+    with pytest.raises(
+        InputError, match="Frame Time: needs a positive number of seconds, 1e-06 to 10"
+    ):
         load_motion(tmp_path / "x.bvh")
 
 
 @pytest.mark.parametrize(
-    "about", [b"[]", b"{}", b'{"format": 1, "label": 3, "provenance": {}}', b'{"format": 1, "label": "x"}', b"[" * 10**5]
+    "about",
+    [
+        b"[]",
+        b"{}",
+        b'{"format": 1, "label": 3, "provenance": {}}',
+        b'{"format": 1, "label": "x"}',
+        b"[" * 10**5,
+    ],
 )
 def test_what_the_fuzzer_found_in_clouds(tmp_path: Path, about: bytes) -> None:
     collection_of(tmp_path, {"about.npy": npy(np.frombuffer(about, dtype=np.uint8))})

@@ -37,12 +37,26 @@ RADAR = rt.Radar(
 def test_a_sphere_by_the_radar_equation() -> None:
     # Skolnik: P_r = P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R^4), by decibels.
     distance, sigma, wavelength = 64 * RADAR.range_bin_m, 0.25, 299_792_458 / 14e9
-    expected_dbm = 12 + 8 + 5 + 20 * math.log10(wavelength) + 10 * math.log10(sigma) - 30 * math.log10(4 * math.pi)
+    expected_dbm = (
+        12
+        + 8
+        + 5
+        + 20 * math.log10(wavelength)
+        + 10 * math.log10(sigma)
+        - 30 * math.log10(4 * math.pi)
+    )
     expected_dbm -= 40 * math.log10(distance)
     length = np.full((1, 4, 1), 2 * distance)
     amplitude = np.full((1, 1, 4, 1), math.sqrt(sigma) / distance**2, dtype=np.complex128)
     one = np.zeros(1, np.int64)
-    echoes = rt.Echoes(length=length, amplitude=amplitude, frequency=np.array([14e9]), tx=one, part=one, bounces=one + 1)
+    echoes = rt.Echoes(
+        length=length,
+        amplitude=amplitude,
+        frequency=np.array([14e9]),
+        tx=one,
+        part=one,
+        bounces=one + 1,
+    )
     spectra = range_spectrum(synthesize(echoes, RADAR, RADAR.chirp_times(1)), RADAR)
     peak = np.abs(spectra[0, 0, 64]) ** 2 * RADAR.watts_per_m2
     assert 10 * math.log10(peak * 1e3) == pytest.approx(expected_dbm, abs=0.001)
@@ -51,13 +65,18 @@ def test_a_sphere_by_the_radar_equation() -> None:
 def test_noise_is_ktbf() -> None:
     # -174 dBm/Hz, 11 dB, 512 kHz.
     assert RADAR.sample_rate_hz == pytest.approx(512e3)
-    assert 10 * math.log10(RADAR.noise_power_w * 1e3) == pytest.approx(-173.975 + 11 + 10 * math.log10(512e3), abs=0.001)
+    assert 10 * math.log10(RADAR.noise_power_w * 1e3) == pytest.approx(
+        -173.975 + 11 + 10 * math.log10(512e3), abs=0.001
+    )
 
 
 @pytest.mark.parametrize(
-    ("figure_db", "antenna_k"), [(11.0, 20.0), (11.0, 0.0), (3.0, 290.0), (3.0, 2900.0), (0.0, 77.0), (0.0, 0.0)]
+    ("figure_db", "antenna_k"),
+    [(11.0, 20.0), (11.0, 0.0), (3.0, 290.0), (3.0, 2900.0), (0.0, 77.0), (0.0, 0.0)],
 )
-def test_the_receiver_adds_its_noise_whatever_the_antennas_see(figure_db: float, antenna_k: float) -> None:
+def test_the_receiver_adds_its_noise_whatever_the_antennas_see(
+    figure_db: float, antenna_k: float
+) -> None:
     # The definition of the noise figure: the receiver adds F - 1 times the noise of a source at 290 K (Friis 1944).
     radar = dataclasses.replace(RADAR, noise_figure_db=figure_db, noise_temperature_k=antenna_k)
     received = 1.380649e-23 * antenna_k * 512e3
@@ -80,13 +99,18 @@ def test_a_run_by_watts(tmp_path: Path) -> None:
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
     results = [
         rt.run(motion, radar, out=tmp_path / name, fidelity="analytic", snr_db="physical")
-        for name, radar in (("a", RADAR), ("b", dataclasses.replace(RADAR, transmit_power_dbm=22.0)))
+        for name, radar in (
+            ("a", RADAR),
+            ("b", dataclasses.replace(RADAR, transmit_power_dbm=22.0)),
+        )
     ]
     first, second = (result.summary for result in results)
     assert first["parameters"]["snr_db"] == "physical"
     assert first["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w, rel=1e-12, abs=0)
     assert second["watts"]["noise_power_w"] == pytest.approx(RADAR.noise_power_w, rel=1e-12, abs=0)
-    assert second["watts"]["echo_power_w"] == pytest.approx(10 * first["watts"]["echo_power_w"], rel=1e-12, abs=0)
+    assert second["watts"]["echo_power_w"] == pytest.approx(
+        10 * first["watts"]["echo_power_w"], rel=1e-12, abs=0
+    )
     assert second["noise_power_m2"] == pytest.approx(first["noise_power_m2"] / 10, rel=1e-12, abs=0)
     with h5py.File(tmp_path / "a" / "maps.h5") as file:
         floor = float(np.median(file["range_doppler"][0])) * RADAR.watts_per_m2
@@ -109,13 +133,23 @@ def test_what_is_missing_is_said_before_the_work(
 ) -> None:
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
     with pytest.raises(rt.InputError, match=said):
-        rt.run(motion, dataclasses.replace(RADAR, **changes), out=tmp_path / "out", **({"snr_db": "physical"} | options))
+        rt.run(
+            motion,
+            dataclasses.replace(RADAR, **changes),
+            out=tmp_path / "out",
+            **({"snr_db": "physical"} | options),
+        )
     assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [("transmit_power_dbm", 1e3), ("noise_figure_db", -1.0), ("noise_temperature_k", None), ("noise_figure_db", "a")],
+    [
+        ("transmit_power_dbm", 1e3),
+        ("noise_figure_db", -1.0),
+        ("noise_temperature_k", None),
+        ("noise_figure_db", "a"),
+    ],
 )
 def test_powers_without_meaning(field: str, value: object) -> None:
     with pytest.raises(rt.InputError, match=f"{field} = .*must lie between"):

@@ -47,7 +47,11 @@ TRAININGS = {
     **{f"lean-{size}": f"paper-400 --points {size}" for size in SIZES},
     "paper-1000": "paper-400 --recipe paper",
     # One fold of each other size: ten take a day.
-    **{f"paper-{size}": f"paper-400 --recipe paper --points {size} --fold 1" for size in SIZES if size != 1000},
+    **{
+        f"paper-{size}": f"paper-400 --recipe paper --points {size} --fold 1"
+        for size in SIZES
+        if size != 1000
+    },
     "paper-1000-unit-sphere": "paper-400 --recipe paper --scaling unit-sphere --fold 1",
     "paper-1000-turned": "paper-400 --recipe paper --augmentation turned --fold 1",
     "paper-1000-all-epochs": "paper-400 --recipe paper --all-epochs --fold 1",
@@ -66,7 +70,18 @@ SHOWN = {
     "table-4": (*(f"lean-{size}" for size in SIZES), *(f"paper-{size}" for size in SIZES)),
     "dead-rate": ("paper-1000", "paper-1000-all-epochs", "paper-1000-first-trial"),
     "readings": ("paper-1000", "paper-1000-unit-sphere", "paper-1000-turned"),
-    **{name: (name,) for name in ("subject", "recorded", "real", "noise", "transfer-free-space", "transfer-scenes", "transfer")},
+    **{
+        name: (name,)
+        for name in (
+            "subject",
+            "recorded",
+            "real",
+            "noise",
+            "transfer-free-space",
+            "transfer-scenes",
+            "transfer",
+        )
+    },
 }
 """Evaluations, each with simple classifiers on the first of its trainings."""
 
@@ -82,7 +97,13 @@ AT_CHANCE = {
 def commands(out: Path) -> dict[str, list[str]]:
     """Words of every step's command, by the name of the step."""
     steps = {
-        f"data/{name}": ["dataset", "build", str(HERE / f"{spec}.toml"), "--out", str(out / "data" / name)]
+        f"data/{name}": [
+            "dataset",
+            "build",
+            str(HERE / f"{spec}.toml"),
+            "--out",
+            str(out / "data" / name),
+        ]
         for name, spec in DATA.items()
     }
     for name, words in TRAININGS.items():
@@ -116,9 +137,17 @@ def by_metadata() -> list[str]:
         planned = Planned(replace(spec, seed=seed))
         forest = RandomForestClassifier(n_estimators=150, random_state=0)
         folds = StratifiedKFold(10, shuffle=True, random_state=0)
-        shares.append(float(np.mean(cross_val_score(forest, metadata_features(planned), planned.labels, cv=folds))))
+        shares.append(
+            float(
+                np.mean(
+                    cross_val_score(forest, metadata_features(planned), planned.labels, cv=folds)
+                )
+            )
+        )
         answers += len(planned)
-    print(f"\nmetadata alone, eight seeds of the 400: {np.mean(shares):.1%}, from {min(shares):.1%} to {max(shares):.1%}")
+    print(
+        f"\nmetadata alone, eight seeds of the 400: {np.mean(shares):.1%}, from {min(shares):.1%} to {max(shares):.1%}"
+    )
     return judged("metadata", "random forest", float(np.mean(shares)), answers)
 
 
@@ -133,9 +162,14 @@ def evaluate(out: Path) -> list[str]:
             continue
         print(f"\n{name}", flush=True)
         folder = out / "evaluated" / name
-        subprocess.run([*RTRADAR, "evaluate", *map(str, there), "--baselines", "--out", str(folder)], check=True)
+        subprocess.run(
+            [*RTRADAR, "evaluate", *map(str, there), "--baselines", "--out", str(folder)],
+            check=True,
+        )
         for group in json.loads((folder / "evaluation.json").read_text())["groups"]:
-            missed += judged(name, group["title"], group["summary"]["mean"], group["summary"]["test_clouds"])
+            missed += judged(
+                name, group["title"], group["summary"]["mean"], group["summary"]["test_clouds"]
+            )
     wandering(out)
     return missed
 
@@ -145,11 +179,15 @@ def wandering(out: Path) -> None:
     path = out / "trained" / "paper-1000-all-epochs" / "training-01" / "outcome.json"
     if path.exists():
         history = json.loads(path.read_text())["history"]
-        print("\n200 epochs of one fold: epochs, loss and accuracy of the clouds it learns from, accuracy of test clouds")
+        print(
+            "\n200 epochs of one fold: epochs, loss and accuracy of the clouds it learns from, accuracy of test clouds"
+        )
         for first, last in ((51, 60), (61, 70), (71, 100), (101, 150), (151, 200)):
             rows = history[first - 1 : last]
             loss, learning, test = (np.array([row[name] for row in rows]) for name in _WATCHED)
-            print(f"{first} to {last}: {loss.mean():.2f}, {learning.mean():.1%}, {test.mean():.1%} +- {test.std():.1%}")
+            print(
+                f"{first} to {last}: {loss.mean():.2f}, {learning.mean():.1%}, {test.mean():.1%} +- {test.std():.1%}"
+            )
 
 
 _WATCHED = ("train_loss", "train_accuracy", "test_accuracy")
@@ -157,21 +195,40 @@ _WATCHED = ("train_loss", "train_accuracy", "test_accuracy")
 
 def judged(name: str, title: str, accuracy: float, answers: int) -> list[str]:
     """What is wrong with an accuracy, in words."""
-    least = next((share for (where, what), share in LEAST.items() if where == name and title.startswith(what)), None)
+    least = next(
+        (
+            share
+            for (where, what), share in LEAST.items()
+            if where == name and title.startswith(what)
+        ),
+        None,
+    )
     if least is not None and accuracy < least:
         return [f"{name}, {title}: {accuracy:.1%} is less than {least:.0%}"]
     if any(where == name and title.startswith(what) for where, what in AT_CHANCE):
-        most = 0.25 + 2.33 * math.sqrt(0.25 * 0.75 / answers)  # 2.33: the 99th percentile of a normal distribution
+        most = 0.25 + 2.33 * math.sqrt(
+            0.25 * 0.75 / answers
+        )  # 2.33: the 99th percentile of a normal distribution
         if accuracy > most:
-            return [f"{name}, {title}: {accuracy:.1%} of {answers} answers is more than chance ({most:.1%})"]
+            return [
+                f"{name}, {title}: {accuracy:.1%} of {answers} answers is more than chance ({most:.1%})"
+            ]
     return []
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("out", type=Path, metavar="OUT", help="folder for clouds, trainings and tables")
-    parser.add_argument("--only", metavar="A,B,...", help="these steps only (see --list); tables are made of all that is there")
-    parser.add_argument("--list", action="store_true", help="say what would be run, and run nothing")
+    parser.add_argument(
+        "out", type=Path, metavar="OUT", help="folder for clouds, trainings and tables"
+    )
+    parser.add_argument(
+        "--only",
+        metavar="A,B,...",
+        help="these steps only (see --list); tables are made of all that is there",
+    )
+    parser.add_argument(
+        "--list", action="store_true", help="say what would be run, and run nothing"
+    )
     options = parser.parse_args()
     steps = commands(options.out)
     names = list(steps) if options.only is None else options.only.split(",")

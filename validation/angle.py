@@ -48,7 +48,11 @@ def line_places(preset: str) -> tuple[Array, Array]:
 def place_of(azimuth_deg: float, elevation_deg: float) -> Array:
     """Place at the range of all points, in the radar's frame [m]."""
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    way = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    way = [
+        np.cos(elevation) * np.cos(azimuth),
+        np.cos(elevation) * np.sin(azimuth),
+        np.sin(elevation),
+    ]
     return RANGE_M * np.array(way)
 
 
@@ -67,11 +71,15 @@ def samples_of(preset: str, place: Array, speed: float) -> NDArray[np.complex64]
         there = np.sqrt(square - 2 * along * tx[number] + tx[number] ** 2)
         back = np.sqrt(square - 2 * along * rx[:, None] + rx[:, None] ** 2)
         tau = (there + back) / C
-        x[chirp] = np.exp(2j * np.pi * (START_HZ[preset] * tau + slope * tau * fast - slope * tau**2 / 2))
+        x[chirp] = np.exp(
+            2j * np.pi * (START_HZ[preset] * tau + slope * tau * fast - slope * tau**2 / 2)
+        )
     return x
 
 
-def spectra_of(preset: str, x: NDArray[np.complex64], speed: float, focus: bool, taper: Taper) -> AngleSpectra:
+def spectra_of(
+    preset: str, x: NDArray[np.complex64], speed: float, focus: bool, taper: Taper
+) -> AngleSpectra:
     """Spectra of the cell in which the point is in the middle of the window."""
     radar = Radar.preset(preset)
     cube = range_spectrum(x, radar).reshape(CYCLES[preset], 2 * N_TX, N_RX, N_SAMPLES)
@@ -105,7 +113,9 @@ def closed_form(preset: str, focus: bool) -> tuple[float, float]:
     u = np.sin(np.radians(angles))
 
     def ways(sines: ArrayLike) -> Array:
-        legs = [np.sqrt(RANGE_M**2 - 2 * RANGE_M * np.multiply.outer(sines, p) + p**2) for p in (tx, rx)]
+        legs = [
+            np.sqrt(RANGE_M**2 - 2 * RANGE_M * np.multiply.outer(sines, p) + p**2) for p in (tx, rx)
+        ]
         return np.asarray(legs[0][..., :, None] + legs[1][..., None, :])
 
     plane = 2 * RANGE_M - np.multiply.outer(u, tx[:, None] + rx)
@@ -122,22 +132,38 @@ def direction_rows(preset: str, direction: tuple[float, float], speed: float) ->
     place = place_of(*direction)
     x = samples_of(preset, place, speed)
     case = f"{preset}, azimuth {direction[0]:+.0f}, elevation {direction[1]:+.0f}, {speed:+.0f} m/s"
-    for name, truth, found in zip(("azimuth", "elevation"), direction, angle(x, radar, RANGE_M, speed), strict=True):
+    for name, truth, found in zip(
+        ("azimuth", "elevation"), direction, angle(x, radar, RANGE_M, speed), strict=True
+    ):
         says = f"a point reads back: {name}, 4 m away, standing and at 3 m/s"
         degrees = float(np.degrees(found))
-        yield judged(case, name, "deg", degrees, TOLERANCE_DEG, reference=truth, key="point", says=says)
+        yield judged(
+            case, name, "deg", degrees, TOLERANCE_DEG, reference=truth, key="point", says=says
+        )
     cloud = spatial_points(spectra_of(preset, x, speed, True, "taylor"), radar, 0.05)
     # Half a range bin and half a degree at 4 m; of several peaks all must lie there.
     off = np.linalg.norm(cloud.points - np.array(radar.position_m) - place, axis=1)
     limit = radar.range_bin_m / 2 + RANGE_M * np.radians(TOLERANCE_DEG)
     says = "a point reads back: farthest point of its spatial cloud"
     farthest = float(off.max()) if len(off) else np.nan
-    yield judged(case, f"cloud: farthest of {len(off)} point(s)", "m", farthest, limit, key="point", says=says)
+    yield judged(
+        case,
+        f"cloud: farthest of {len(off)} point(s)",
+        "m",
+        farthest,
+        limit,
+        key="point",
+        says=says,
+    )
 
 
 def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
     figures = {}
-    cases: tuple[tuple[bool, Taper], ...] = ((True, "uniform"), (False, "uniform"), (True, "taylor"))
+    cases: tuple[tuple[bool, Taper], ...] = (
+        (True, "uniform"),
+        (False, "uniform"),
+        (True, "taylor"),
+    )
     for focus, taper in cases:
         seen = spectra_of(preset, x, 0.0, focus, taper)
         figures[focus, taper] = peak_and_width(*finely(seen))
@@ -149,19 +175,38 @@ def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
         says = "beam at 4 m, 12 GHz, broadside: what the far-field FFT loses to focusing, at least"
         yield judged(case, "far-field FFT against focusing, at most", "dB", ours, -3.5, says=says)
         says = "beam at 4 m, 12 GHz, broadside: width at -3 dB, focused, at most"
-        yield judged(case, "width at -3 dB, focused, at most", "deg", figures[True, "uniform"][1], 2.0, says=says)
+        yield judged(
+            case,
+            "width at -3 dB, focused, at most",
+            "deg",
+            figures[True, "uniform"][1],
+            2.0,
+            says=says,
+        )
     # 0.1 dB, 0.05 deg: the point lies a quarter of a range bin off the middle of its cell.
     says = "what the far-field FFT loses at 4 m against the phases of all 48 paths, summed"
     yield judged(case, "far-field FFT against focusing", "dB", ours, 0.1, reference=loss, says=says)
     for name, focus, expected in (("focused", True, sharp[1]), ("far-field FFT", False, flat[1])):
-        width, says = figures[focus, "uniform"][1], "width of the beam at -3 dB against the phases of all 48 paths, summed"
-        yield judged(case, f"width at -3 dB, {name}", "deg", width, 0.05, reference=expected, says=says)
-    yield reported(case, "width at -3 dB, focused, Taylor taper of the cloud", "deg", figures[True, "taylor"][1])
+        width, says = (
+            figures[focus, "uniform"][1],
+            "width of the beam at -3 dB against the phases of all 48 paths, summed",
+        )
+        yield judged(
+            case, f"width at -3 dB, {name}", "deg", width, 0.05, reference=expected, says=says
+        )
+    yield reported(
+        case,
+        "width at -3 dB, focused, Taylor taper of the cloud",
+        "deg",
+        figures[True, "taylor"][1],
+    )
 
 
 def pair_rows(preset: str, apart_deg: float, taper: Taper) -> Iterator[Row]:
     """Two equal points side by side, for eight phases between them: they are told apart where the power dips between."""
-    first, second = (samples_of(preset, place_of(side * apart_deg / 2, 0.0), 0.0) for side in (-1, 1))
+    first, second = (
+        samples_of(preset, place_of(side * apart_deg / 2, 0.0), 0.0) for side in (-1, 1)
+    )
     radar = Radar.preset(preset)
     dips: list[float] = []
     blurred: list[float] = []

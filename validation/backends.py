@@ -46,7 +46,9 @@ def scenes(quick: bool) -> dict[str, rt.Ellipsoids]:
     parts = 40
     axes = np.exp(rng.uniform(np.log(0.01), np.log(0.3), (parts, 3)))
     centres = rng.uniform(-1, 1, (parts, 3)) + np.array([0.0, 0.0, 1.0])
-    found["40 random ellipsoids, crossing"] = rt.Ellipsoids(centres, Rotation.random(parts, random_state=0).as_matrix(), axes)
+    found["40 random ellipsoids, crossing"] = rt.Ellipsoids(
+        centres, Rotation.random(parts, random_state=0).as_matrix(), axes
+    )
     return found
 
 
@@ -57,7 +59,9 @@ def rays(body: rt.Ellipsoids, n: int, rng: np.random.Generator) -> tuple[Array, 
     part = rng.integers(len(body.centres), size=n)
     local = rng.normal(size=(n, 3))
     local *= (rng.uniform(0.0, 1.3, n) / np.linalg.norm(local, axis=1))[:, None]
-    targets = body.centres[part] + np.einsum("nij,nj->ni", body.frames[part], local * body.semi_axes[part])
+    targets = body.centres[part] + np.einsum(
+        "nij,nj->ni", body.frames[part], local * body.semi_axes[part]
+    )
     return origins, targets
 
 
@@ -90,7 +94,9 @@ def first_of_smooth(body: rt.Ellipsoids, origins: Array, targets: Array) -> NDAr
     """Part first met of the smooth ellipsoids: |A^-1 (o + t d - c)| = 1."""
     directions = targets - origins
     best, part = np.full(len(origins), np.inf), np.full(len(origins), -1)
-    for index, (centre, frame, axes) in enumerate(zip(body.centres, body.frames, body.semi_axes, strict=True)):
+    for index, (centre, frame, axes) in enumerate(
+        zip(body.centres, body.frames, body.semi_axes, strict=True)
+    ):
         o, d = (origins - centre) @ frame / axes, directions @ frame / axes
         square, half, rest = (d * d).sum(1), (o * d).sum(1), (o * o).sum(1) - 1
         root = half * half - square * rest
@@ -105,7 +111,9 @@ def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> N
     """Part first met, every triangle tried in float64 (Moeller and Trumbore, 1997)."""
     vertices, faces = unit_sphere(SUBDIVISIONS)
     part = np.empty(len(origins), dtype=np.int64)
-    _first(origins, targets - origins, body.centres, body.frames, body.semi_axes, vertices, faces, part)
+    _first(
+        origins, targets - origins, body.centres, body.frames, body.semi_axes, vertices, faces, part
+    )
     return part
 
 
@@ -121,7 +129,11 @@ def _first(origins, directions, centres, frames, semi_axes, vertices, faces, fou
             if (o + along * d) @ (o + along * d) > 1.01:
                 continue
             for face in range(len(faces)):
-                a, b, c = vertices[faces[face, 0]], vertices[faces[face, 1]], vertices[faces[face, 2]]
+                a, b, c = (
+                    vertices[faces[face, 0]],
+                    vertices[faces[face, 1]],
+                    vertices[faces[face, 2]],
+                )
                 ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
                 vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
                 px, py, pz = d[1] * vz - d[2] * vy, d[2] * vx - d[0] * vz, d[0] * vy - d[1] * vx
@@ -154,12 +166,17 @@ class Triangles:
         middle = float(depth.mean())
         east = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
         east /= np.linalg.norm(east)
-        seen = np.column_stack([away @ east, away @ np.cross(direction, east)]) * (middle / depth)[:, None]
+        seen = (
+            np.column_stack([away @ east, away @ np.cross(direction, east)])
+            * (middle / depth)[:, None]
+        )
         equations = ConvexHull(seen).equations
         # Inside: the nearest side counts. Outside: the farthest half-plane, which is a lower bound, exact beside a side.
         return float(abs(equations[:, 2].max()))
 
-    def plane(self, part: int, origin: Array, direction: Array) -> tuple[float, Array, float] | None:
+    def plane(
+        self, part: int, origin: Array, direction: Array
+    ) -> tuple[float, Array, float] | None:
         """Where the ray meets the part first, the slope of that distance when the ray is moved across (3,), and how far that is
         from a side of the triangle, seen along the ray [m].
         """
@@ -172,7 +189,9 @@ class Triangles:
         place = origin + distance[:, None] * direction
         inside = facing < 0
         for first, second in ((a, b), (b, c), (c, a)):
-            inside &= np.einsum("ij,ij->i", np.cross(second - first, place - first), normal) >= -1e-15
+            inside &= (
+                np.einsum("ij,ij->i", np.cross(second - first, place - first), normal) >= -1e-15
+            )
         hit = np.flatnonzero(inside & (distance > 0))
         if len(hit) == 0:
             return None
@@ -181,7 +200,10 @@ class Triangles:
         sides = []
         for first, second in ((a, b), (b, c), (c, a)):
             start, side = first[nearest] - place[nearest], second[nearest] - first[nearest]
-            start, side = start - (start @ direction) * direction, side - (side @ direction) * direction
+            start, side = (
+                start - (start @ direction) * direction,
+                side - (side @ direction) * direction,
+            )
             share = np.clip(-(start @ side) / (side @ side), 0, 1)
             sides.append(float(np.linalg.norm(start + share * side)))
         return float(distance[nearest]), -across / facing[nearest], min(sides)
@@ -190,7 +212,9 @@ class Triangles:
         """How far the ray would have to move for its answer to go from one part (or -1, nothing) to the other [m]."""
         named = [part for part in (first, second) if part >= 0]
         found = [self.outline(part, origin, direction) for part in named]
-        planes = [plane for part in named if (plane := self.plane(part, origin, direction)) is not None]
+        planes = [
+            plane for part in named if (plane := self.plane(part, origin, direction)) is not None
+        ]
         found += [side for _, _, side in planes]
         if len(planes) == 2:
             (near, slope, _), (far, other, _) = planes
@@ -215,28 +239,60 @@ def compared(quick: bool) -> Iterator[Row]:
     n = 2000 if quick else 25_000
     for aim, judge in ((rays, True), (grazing, False)):
         queries = {name: aim(body, n, rng) for name, body in bodies.items()}
-        yield from compared_on(kinds, bodies, queries, "rays" if judge else "rays at outlines", judge)
+        yield from compared_on(
+            kinds, bodies, queries, "rays" if judge else "rays at outlines", judge
+        )
 
 
 def compared_on(
-    kinds: tuple[str, ...], bodies: dict[str, rt.Ellipsoids], queries: dict[str, tuple[Array, Array]], what: str, judge: bool
+    kinds: tuple[str, ...],
+    bodies: dict[str, rt.Ellipsoids],
+    queries: dict[str, tuple[Array, Array]],
+    what: str,
+    judge: bool,
 ) -> Iterator[Row]:
     # One backend after the other: scenes belong to theirs.
-    answers = {kind: {name: trace(kind, body, *queries[name]) for name, body in bodies.items()} for kind in kinds}
+    answers = {
+        kind: {name: trace(kind, body, *queries[name]) for name, body in bodies.items()}
+        for kind in kinds
+    }
     total = f"{sum(len(origins) for origins, _ in queries.values())} {what}"
     exact = {name: first_of_triangles(body, *queries[name]) for name, body in bodies.items()}
     for kind in kinds:
         parts = {name: hits.part for name, hits in answers[kind].items()}
         if kind != "scalar":
             claim, scalar = f"{kind} against scalar, {total}", answers["scalar"]
-            yield from differences(claim, bodies, queries, parts, {name: hits.part for name, hits in scalar.items()}, judge)
+            yield from differences(
+                claim,
+                bodies,
+                queries,
+                parts,
+                {name: hits.part for name, hits in scalar.items()},
+                judge,
+            )
             apart = [
-                np.abs(hits.local - scalar[name].local)[hits.part == scalar[name].part] for name, hits in answers[kind].items()
+                np.abs(hits.local - scalar[name].local)[hits.part == scalar[name].part]
+                for name, hits in answers[kind].items()
             ]
-            yield reported(claim, "places met, largest difference", "m", float(np.nanmax(np.concatenate(apart))))
-        yield from differences(f"{kind} against float64, {total}", bodies, queries, parts, exact, judge)
-    smooth = [float(np.mean(first_of_smooth(body, *queries[name]) != exact[name])) for name, body in bodies.items()]
-    yield reported("triangles against smooth ellipsoids", "share of rays that meet another part", "", float(np.mean(smooth)))
+            yield reported(
+                claim,
+                "places met, largest difference",
+                "m",
+                float(np.nanmax(np.concatenate(apart))),
+            )
+        yield from differences(
+            f"{kind} against float64, {total}", bodies, queries, parts, exact, judge
+        )
+    smooth = [
+        float(np.mean(first_of_smooth(body, *queries[name]) != exact[name]))
+        for name, body in bodies.items()
+    ]
+    yield reported(
+        "triangles against smooth ellipsoids",
+        "share of rays that meet another part",
+        "",
+        float(np.mean(smooth)),
+    )
 
 
 def differences(
@@ -256,7 +312,12 @@ def differences(
         for ray in apart:
             origin, target = (points[ray] for points in queries[name])
             direction = (target - origin) / np.linalg.norm(target - origin)
-            worst = max(worst, triangles.clearance(int(ours[name][ray]), int(others[name][ray]), origin, direction))
+            worst = max(
+                worst,
+                triangles.clearance(
+                    int(ours[name][ray]), int(others[name][ray]), origin, direction
+                ),
+            )
     share = different / sum(len(parts) for parts in ours.values())
     # Asked for: one in ten thousand, and those within 10 um of an edge: float32 keeps 0.1 um of a metre, a few times over.
     quantity = "share of rays that meet another part"
@@ -267,7 +328,15 @@ def differences(
     else:
         yield reported(claim, quantity, "", share)
     says = f"{versus}: how far those pass from an edge"
-    yield judged(claim, f"farthest from an edge of these {different}", "m", worst, NEAREST_EDGE_M, says=says, cases=different)
+    yield judged(
+        claim,
+        f"farthest from an edge of these {different}",
+        "m",
+        worst,
+        NEAREST_EDGE_M,
+        says=says,
+        cases=different,
+    )
 
 
 if __name__ == "__main__":

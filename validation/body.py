@@ -62,16 +62,26 @@ def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
         moved = unit + s * east + t * north
         return np.asarray(moved / np.linalg.norm(moved, axis=-1, keepdims=True) * axes)
 
-    unit = axes * (tx / np.linalg.norm(tx, axis=1, keepdims=True) + rx / np.linalg.norm(rx, axis=1, keepdims=True))
+    unit = axes * (
+        tx / np.linalg.norm(tx, axis=1, keepdims=True)
+        + rx / np.linalg.norm(rx, axis=1, keepdims=True)
+    )
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
     for _ in range(40):
-        f = {(i, j): path(on_surface(unit, i * STEP, j * STEP), (tx, rx)) for i in (-1, 0, 1) for j in (-1, 0, 1)}
+        f = {
+            (i, j): path(on_surface(unit, i * STEP, j * STEP), (tx, rx))
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+        }
         slope_s, slope_t = (f[1, 0] - f[-1, 0]) / (2 * STEP), (f[0, 1] - f[0, -1]) / (2 * STEP)
         ss = (f[1, 0] - 2 * f[0, 0] + f[-1, 0]) / STEP**2
         tt = (f[0, 1] - 2 * f[0, 0] + f[0, -1]) / STEP**2
         st = (f[1, 1] - f[1, -1] - f[-1, 1] + f[-1, -1]) / (4 * STEP**2)
         determinant = ss * tt - st * st
-        step = np.stack([st * slope_t - tt * slope_s, st * slope_s - ss * slope_t], axis=-1) / determinant[:, None]
+        step = (
+            np.stack([st * slope_t - tt * slope_s, st * slope_s - ss * slope_t], axis=-1)
+            / determinant[:, None]
+        )
         size = np.linalg.norm(step, axis=1, keepdims=True)
         step *= 0.3 / np.maximum(size, 0.3)
         east, north = tangents(unit)
@@ -101,7 +111,11 @@ def near_and_far(radar: rt.Radar, body: rt.Body, n_chirps: int) -> tuple[Array, 
     times, parts, receivers = len(chirps), len(body.part_names), radar.n_rx
     shape = (times, receivers, parts, 3)
     local = [
-        np.einsum("tpji,trpj->trpi", poses.frames, np.broadcast_to(antenna, shape) - poses.centres[:, None]).reshape(-1, 3)
+        np.einsum(
+            "tpji,trpj->trpi",
+            poses.frames,
+            np.broadcast_to(antenna, shape) - poses.centres[:, None],
+        ).reshape(-1, 3)
         for antenna in (tx[:, None, None], rx[:, :, None])
     ]
     axes = np.broadcast_to(poses.semi_axes, shape).reshape(-1, 3)
@@ -135,7 +149,13 @@ def compared_rows(preset: str) -> Iterator[Row]:
     radar = rt.Radar.preset(preset)
     motion, duration = still(rt.synthetic_motion("jumping_jack", seed=0), 0), 0.15
     with tempfile.TemporaryDirectory() as folder:
-        found = rt.compare(motion, radar, out=Path(folder, "out"), fidelities=("analytic", "specular"), duration_s=duration)
+        found = rt.compare(
+            motion,
+            radar,
+            out=Path(folder, "out"),
+            fidelities=("analytic", "specular"),
+            duration_s=duration,
+        )
     rungs = found.summary["fidelities"]
     body = rt.Body.from_motion(place(motion, duration_s=duration))
     n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
@@ -149,19 +169,39 @@ def compared_rows(preset: str) -> Iterator[Row]:
         expected = float(decibels(factor[part]))
         quantity = f"{part}: specular over analytic, ref. near field"
         says = "`compare` of `analytic` with `specular`, standing: parts fully seen, echo power once near field is counted"
-        yield judged(claim, quantity, "dB", float(decibels(ratio)), TOLERANCE_DB, reference=expected, says=says)
+        yield judged(
+            claim,
+            quantity,
+            "dB",
+            float(decibels(ratio)),
+            TOLERANCE_DB,
+            reference=expected,
+            says=says,
+        )
     says = "`compare` of `analytic` with `specular`, standing: parts that are hidden, of 21"
-    yield judged(claim, "parts that are hidden, of 21", "", len(hidden) - len(seen), len(hidden) - 1, says=says)
+    yield judged(
+        claim,
+        "parts that are hidden, of 21",
+        "",
+        len(hidden) - len(seen),
+        len(hidden) - 1,
+        says=says,
+    )
 
 
 def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row]:
     """Instant by instant: parts that no channel misses, and what the others make of the frame's power."""
     radar = rt.Radar.preset(preset)
-    body = rt.Body.from_motion(place(rt.synthetic_motion(activity, seed=0), start_s=0.5, duration_s=duration_s))
+    body = rt.Body.from_motion(
+        place(rt.synthetic_motion(activity, seed=0), start_s=0.5, duration_s=duration_s)
+    )
     n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
-        found = {rung: survey(build_model(rung, radar, body), radar, body, n_chirps) for rung in ("analytic", "specular")}
+        found = {
+            rung: survey(build_model(rung, radar, body), radar, body, n_chirps)
+            for rung in ("analytic", "specular")
+        }
     near, far = near_and_far(radar, body, n_chirps)
     analytic, specular = (found[rung].power_at for rung in ("analytic", "specular"))
     hidden = found["specular"].hidden_at
@@ -174,8 +214,12 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     worst = float(abs(error).max())
     yield judged(claim, quantity, "dB", worst, TOLERANCE_DB, says=says, cases=int(seen.sum()))
     yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
-    yield reported(claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean()))
-    yield reported(claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min()))
+    yield reported(
+        claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean())
+    )
+    yield reported(
+        claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min())
+    )
     # What the models' frame powers differ by: near field of all parts, then occlusion of some.
     whole = decibels(specular.sum(axis=1) / analytic.sum(axis=1))
     bent = decibels((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
@@ -183,7 +227,9 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     yield reported(claim, "of that near field", "dB", float(bent.mean()))
     yield reported(claim, "of that occlusion", "dB", float((whole - bent).mean()))
     left = decibels(specular.sum(axis=1) / (analytic * near / far * (1 - hidden)).sum(axis=1))
-    yield reported(claim, "left where hidden shares are taken off, rms", "dB", float(np.sqrt(np.mean(left**2))))
+    yield reported(
+        claim, "left where hidden shares are taken off, rms", "dB", float(np.sqrt(np.mean(left**2)))
+    )
 
 
 def measure(quick: bool) -> list[Row]:
@@ -199,4 +245,8 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("`analytic` against `specular` on whole bodies, near-field spreading counted.", measure))
+    sys.exit(
+        main(
+            "`analytic` against `specular` on whole bodies, near-field spreading counted.", measure
+        )
+    )

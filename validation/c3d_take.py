@@ -61,7 +61,12 @@ def folder() -> Path:
     return Path(named) / "cmu"
 
 
-def rigid(points: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64], c: NDArray[np.float64]) -> float:
+def rigid(
+    points: NDArray[np.float64],
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    c: NDArray[np.float64],
+) -> float:
     """Median distance [cm] of points (frame, 3) from their median place in the axes of three markers."""
     x = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
     z = np.cross(x, c - a)
@@ -90,8 +95,18 @@ def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
         rows += [
             judged(node, "median", "cm", float(np.median(distance)), LIMIT_CM, cases=len(distance)),
             reported(node, "99 %", "cm", float(np.quantile(distance, 0.99))),
-            reported(node, f"largest, frame {half + 1 + int(np.argmax(distance))}", "cm", float(distance.max())),
-            reported(node, f"share beyond {LIMIT_CM:g} cm", "%", float((distance > LIMIT_CM).mean()) * 100),
+            reported(
+                node,
+                f"largest, frame {half + 1 + int(np.argmax(distance))}",
+                "cm",
+                float(distance.max()),
+            ),
+            reported(
+                node,
+                f"share beyond {LIMIT_CM:g} cm",
+                "%",
+                float((distance > LIMIT_CM).mean()) * 100,
+            ),
             reported(node, "rigid", "cm", rigid(amc.positions[half:, j], *own)),
         ]
     return rows
@@ -102,17 +117,42 @@ def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     knuckles = read_markers(take, ("LFIN", "RFIN")).positions[half:]
     rows = []
     for side, key in enumerate("lr"):
-        hip, knee, ankle, hand = (amc.positions[half:, NODES.index(f"{key}_{name}")] for name in ("hip", "knee", "ankle", "hand"))
-        thigh, shank = (bone / np.linalg.norm(bone, axis=1, keepdims=True) for bone in (knee - hip, ankle - knee))
+        hip, knee, ankle, hand = (
+            amc.positions[half:, NODES.index(f"{key}_{name}")]
+            for name in ("hip", "knee", "ankle", "hand")
+        )
+        thigh, shank = (
+            bone / np.linalg.norm(bone, axis=1, keepdims=True)
+            for bone in (knee - hip, ankle - knee)
+        )
         bend = np.degrees(np.arccos(np.clip(np.sum(thigh * shank, axis=1), -1, 1)))
-        beyond = np.linalg.norm(c3d.positions[half:, NODES.index(f"{key}_knee")] - knee, axis=1) * 100 > LIMIT_CM
+        beyond = (
+            np.linalg.norm(c3d.positions[half:, NODES.index(f"{key}_knee")] - knee, axis=1) * 100
+            > LIMIT_CM
+        )
         rows.append(reported(f"{key}_knee", "bend, median", "deg", float(np.median(bend))))
         if beyond.any():
-            rows.append(reported(f"{key}_knee", "bend where beyond, median", "deg", float(np.median(bend[beyond]))))
+            rows.append(
+                reported(
+                    f"{key}_knee",
+                    "bend where beyond, median",
+                    "deg",
+                    float(np.median(bend[beyond])),
+                )
+            )
         jumps = [
-            float(np.linalg.norm(np.diff(path, 2, axis=0), axis=1).max()) * c3d.rate_hz**2 for path in (hand, knuckles[:, side])
+            float(np.linalg.norm(np.diff(path, 2, axis=0), axis=1).max()) * c3d.rate_hz**2
+            for path in (hand, knuckles[:, side])
         ]
-        rows.append(reported(f"{key}_hand", "largest acceleration, AMC beside marker", "m/s^2", jumps[0], reference=jumps[1]))
+        rows.append(
+            reported(
+                f"{key}_hand",
+                "largest acceleration, AMC beside marker",
+                "m/s^2",
+                jumps[0],
+                reference=jumps[1],
+            )
+        )
     return rows
 
 
@@ -148,15 +188,27 @@ def clouds(amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     for name, motion, seed in (("AMC", amc, 0), ("C3D", c3d, 0), ("AMC again", amc, 1)):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", rt.ValidityWarning)  # feet that pass 7 m/s
-            found[name] = clouds_of(motion, radar, start_s=11.0, duration_s=1.5, seed=seed)[0].rdt.points
+            found[name] = clouds_of(motion, radar, start_s=11.0, duration_s=1.5, seed=seed)[
+                0
+            ].rdt.points
     rows = [
-        reported("cloud of a kick", f"{name} from AMC", "bins", chamfer(found[name], found["AMC"], bins))
+        reported(
+            "cloud of a kick", f"{name} from AMC", "bins", chamfer(found[name], found["AMC"], bins)
+        )
         for name in ("C3D", "AMC again")
     ]
     for axis, (name, unit) in enumerate((("range", "m"), ("velocity", "m/s")), start=1):
-        ours, other = (np.quantile(found[key][:, axis], [0.05, 0.5, 0.95]) for key in ("C3D", "AMC"))
+        ours, other = (
+            np.quantile(found[key][:, axis], [0.05, 0.5, 0.95]) for key in ("C3D", "AMC")
+        )
         rows += [
-            reported("cloud of a kick", f"{name}, {share} of the points", unit, float(a), reference=float(b))
+            reported(
+                "cloud of a kick",
+                f"{name}, {share} of the points",
+                unit,
+                float(a),
+                reference=float(b),
+            )
             for share, a, b in zip(("5 %", "half", "95 %"), ours, other, strict=True)
         ]
     return rows
@@ -166,7 +218,12 @@ def compare(quick: bool) -> list[Row]:
     take = folder() / "135_02.c3d"
     c3d = rt.load_motion(take)
     amc = to_nodes(rt.load_motion(take.with_suffix(".amc"), skeleton=folder() / "135.asf"))
-    return joints(take, amc, c3d) + reasons(take, amc, c3d) + gaps(take) + ([] if quick else clouds(amc, c3d))
+    return (
+        joints(take, amc, c3d)
+        + reasons(take, amc, c3d)
+        + gaps(take)
+        + ([] if quick else clouds(amc, c3d))
+    )
 
 
 if __name__ == "__main__":

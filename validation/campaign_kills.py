@@ -67,12 +67,20 @@ class Trial:
         self.work, self.samples = work, samples
         (work / "small.toml").write_text(RADAR)
         self.spec = work / "set.toml"
-        self.spec.write_text(SPEC.format(seconds=seconds, radar="small.toml", fidelity=fidelity, half=samples // 2))
+        self.spec.write_text(
+            SPEC.format(seconds=seconds, radar="small.toml", fidelity=fidelity, half=samples // 2)
+        )
         self.undisturbed: dict[str, bytes] = {}
 
     def start(self, out: Path, *options: str) -> subprocess.Popen[str]:
         command = [*RTRADAR, str(self.spec), "--out", str(out), *(options or ("--workers", "2"))]
-        return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
+        return subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+        )
 
     def finish(self, out: Path, *options: str) -> tuple[int, str, dict[str, float]]:
         """A whole build: exit status, what it said on stderr, its report."""
@@ -89,7 +97,9 @@ class Trial:
             if len(there) >= count:
                 return there
             time.sleep(0.01)
-        raise SystemExit(f"the build ended before it could be disturbed: {process.communicate()[1]}")
+        raise SystemExit(
+            f"the build ended before it could be disturbed: {process.communicate()[1]}"
+        )
 
     def rows(self, claim: str, out: Path, stamps: dict[str, int], made: float) -> list[Row]:
         """What a build that was disturbed and built on is worth; ``stamps`` of the samples that were there before."""
@@ -100,9 +110,31 @@ class Trial:
         wrong = abs(made - (self.samples - len(stamps)))
         says = "a data set killed while it is built, and built on: "
         return [
-            judged(claim, "samples lost", "1", len(lost), 0, says=says + "samples lost", cases=self.samples),
-            judged(claim, "files that differ from an undisturbed build", "1", len(differs), 0, says=says + "files that differ"),
-            judged(claim, "whole samples made twice", "1", len(again) + wrong, 0, says=says + "whole samples made twice"),
+            judged(
+                claim,
+                "samples lost",
+                "1",
+                len(lost),
+                0,
+                says=says + "samples lost",
+                cases=self.samples,
+            ),
+            judged(
+                claim,
+                "files that differ from an undisturbed build",
+                "1",
+                len(differs),
+                0,
+                says=says + "files that differ",
+            ),
+            judged(
+                claim,
+                "whole samples made twice",
+                "1",
+                len(again) + wrong,
+                0,
+                says=says + "whole samples made twice",
+            ),
             reported(claim, "samples there when it went on", "1", len(stamps)),
         ]
 
@@ -119,8 +151,23 @@ def whole(out: Path) -> dict[str, int]:
 def one_line(claim: str, said: str, status: int, expected: int) -> list[Row]:
     lines = [line for line in said.splitlines() if line.strip()]
     return [
-        judged(claim, "lines on stderr other than one", "1", abs(len(lines) - 1), 0, says="a build that fails says one line"),
-        judged(claim, "exit status", "1", status, 0, reference=expected, says="a build that fails: exit status"),
+        judged(
+            claim,
+            "lines on stderr other than one",
+            "1",
+            abs(len(lines) - 1),
+            0,
+            says="a build that fails says one line",
+        ),
+        judged(
+            claim,
+            "exit status",
+            "1",
+            status,
+            0,
+            reference=expected,
+            says="a build that fails: exit status",
+        ),
     ]
 
 
@@ -136,7 +183,12 @@ def worker_killed(trial: Trial, out: Path) -> list[Row]:
     process.communicate(timeout=PATIENCE_S)
     claim = "a worker killed by signal 9"
     status = judged(
-        claim, "exit status of the same run", "1", process.returncode, 0, says="a build that loses a worker ends well"
+        claim,
+        "exit status of the same run",
+        "1",
+        process.returncode,
+        0,
+        says="a build that loses a worker ends well",
     )
     stamps = whole(out)
     return [status, *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])]
@@ -151,7 +203,14 @@ def build_killed(trial: Trial, out: Path) -> list[Row]:
     _, alive = psutil.wait_procs(children, timeout=60)
     stamps = whole(out)
     claim = "the build with its scheduler killed by signal 9"
-    orphans = judged(claim, "processes left after a minute", "1", len(alive), 0, says="a build that is killed leaves no process")
+    orphans = judged(
+        claim,
+        "processes left after a minute",
+        "1",
+        len(alive),
+        0,
+        says="a build that is killed leaves no process",
+    )
     return [orphans, *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])]
 
 
@@ -159,10 +218,27 @@ def scheduler_killed(trial: Trial, out: Path) -> list[Row]:
     address = trial.work / "scheduler.json"
     tools = [sys.executable, "-m"]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(address)]
+    options = [
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+        "--scheduler-file",
+        str(address),
+    ]
     scheduler = subprocess.Popen([*tools, "distributed.cli.dask_scheduler", *options], **quiet)
     worker = subprocess.Popen(
-        [*tools, "distributed.cli.dask_worker", "--scheduler-file", str(address), "--nthreads", "1", "--no-dashboard"], **quiet
+        [
+            *tools,
+            "distributed.cli.dask_worker",
+            "--scheduler-file",
+            str(address),
+            "--nthreads",
+            "1",
+            "--no-dashboard",
+        ],
+        **quiet,
     )
     claim = "a scheduler of its own killed by signal 9"
     try:
@@ -180,14 +256,21 @@ def scheduler_killed(trial: Trial, out: Path) -> list[Row]:
             except subprocess.TimeoutExpired:
                 other.kill()
     stamps = whole(out)
-    return [*one_line(claim, said, process.returncode, 1), *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])]
+    return [
+        *one_line(claim, said, process.returncode, 1),
+        *trial.rows(claim, out, stamps, trial.finish(out)[2]["made"]),
+    ]
 
 
 @contextmanager
 def little_room(out: Path, size: int) -> Iterator[tuple[str, Callable[[], None]]]:
     """A folder with room for ``size`` bytes, where it can be had: its kind, and what gives it more."""
     out.mkdir()
-    mounted = subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(out)], capture_output=True, check=False)
+    mounted = subprocess.run(
+        ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(out)],
+        capture_output=True,
+        check=False,
+    )
     if mounted.returncode == 0:
         more = ["mount", "-o", "remount,size=64m", str(out)]
         try:
@@ -196,9 +279,14 @@ def little_room(out: Path, size: int) -> Iterator[tuple[str, Callable[[], None]]
             subprocess.run(["umount", "-l", str(out)], check=True)
     else:
         before = resource.getrlimit(resource.RLIMIT_FSIZE)
-        resource.setrlimit(resource.RLIMIT_FSIZE, (SAMPLE_BYTES, before[1]))  # of this process and those it starts
+        resource.setrlimit(
+            resource.RLIMIT_FSIZE, (SAMPLE_BYTES, before[1])
+        )  # of this process and those it starts
         try:
-            yield "files may not grow (RLIMIT_FSIZE)", lambda: resource.setrlimit(resource.RLIMIT_FSIZE, before)
+            yield (
+                "files may not grow (RLIMIT_FSIZE)",
+                lambda: resource.setrlimit(resource.RLIMIT_FSIZE, before),
+            )
         finally:
             resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
@@ -211,8 +299,19 @@ def disk_full(trial: Trial, out: Path) -> list[Row]:
         spoiled = [path.name for path in out.glob("*.npz") if not is_whole(path)]
         stamps = whole(out)
         give_more()
-        rows = trial.rows(claim, out, stamps, trial.finish(out)[2]["made"]) if not (left or spoiled) else []
-    half = judged(claim, "files half-written", "1", len(left) + len(spoiled), 0, says="a full disk: files half-written")
+        rows = (
+            trial.rows(claim, out, stamps, trial.finish(out)[2]["made"])
+            if not (left or spoiled)
+            else []
+        )
+    half = judged(
+        claim,
+        "files half-written",
+        "1",
+        len(left) + len(spoiled),
+        0,
+        says="a full disk: files half-written",
+    )
     return [half, *one_line(claim, said, status, 2), *rows]
 
 
@@ -226,14 +325,24 @@ def sample_cut(trial: Trial, out: Path) -> list[Row]:
     stamps = whole(out)
     claim = "a sample cut short and one of a flipped bit"
     report = trial.finish(out)[2]
-    found = judged(claim, "damaged samples found", "1", report["damaged"], 0, reference=2, says="damaged samples are found")
+    found = judged(
+        claim,
+        "damaged samples found",
+        "1",
+        report["damaged"],
+        0,
+        reference=2,
+        says="damaged samples are found",
+    )
     return [found, *trial.rows(claim, out, stamps, report["made"])]
 
 
 def throughput(work: Path, samples: int, seconds: float) -> list[Row]:
     """Samples a second once every worker has made its first, at 12 GHz with all channels."""
     spec = work / "speed.toml"
-    spec.write_text(SPEC.format(seconds=seconds, radar="paper-12ghz", fidelity="specular", half=samples // 2))
+    spec.write_text(
+        SPEC.format(seconds=seconds, radar="paper-12ghz", fidelity="specular", half=samples // 2)
+    )
     rates = {}
     for name, workers, threads in (
         ("one worker of one thread", 1, {"RTRADAR_THREADS": "1"}),
@@ -242,14 +351,25 @@ def throughput(work: Path, samples: int, seconds: float) -> list[Row]:
     ):
         out = work / name.replace(" ", "-")
         command = [*RTRADAR, str(spec), "--out", str(out), "--workers", str(workers)]
-        subprocess.run(command, env={**os.environ, **threads}, check=True, stdout=subprocess.DEVNULL)
+        subprocess.run(
+            command, env={**os.environ, **threads}, check=True, stdout=subprocess.DEVNULL
+        )
         times = sorted(path.stat().st_mtime for path in out.glob("*.npz"))
         rates[name] = (len(times) - workers) / (times[-1] - times[workers - 1])
     claim = f"{samples} samples of {seconds:g} s, paper-12ghz, specular"
     rows = [reported(claim, name, "1/s", rate) for name, rate in rates.items()]
     two = rates["two workers of one thread"]
-    rows.append(reported(claim, "two workers over one, one thread each", "1", two / rates["one worker of one thread"]))
-    rows.append(reported(claim, "two workers over one that has all cores", "1", two / rates["one worker"]))
+    rows.append(
+        reported(
+            claim,
+            "two workers over one, one thread each",
+            "1",
+            two / rates["one worker of one thread"],
+        )
+    )
+    rows.append(
+        reported(claim, "two workers over one that has all cores", "1", two / rates["one worker"])
+    )
     return rows
 
 
@@ -267,8 +387,19 @@ def measure(quick: bool) -> list[Row]:
         trial.finish(reference)
         trial.undisturbed = contents(reference)
         kinds = {name.rpartition(".")[2] for name in trial.undisturbed} | {INDEX.rpartition(".")[2]}
-        found.append(judged("an undisturbed build", "files", "1", len(trial.undisturbed), 0, reference=trial.samples + 1))
-        found.append(judged("an undisturbed build", "kinds of files", "1", len(kinds), 0, reference=2))
+        found.append(
+            judged(
+                "an undisturbed build",
+                "files",
+                "1",
+                len(trial.undisturbed),
+                0,
+                reference=trial.samples + 1,
+            )
+        )
+        found.append(
+            judged("an undisturbed build", "kinds of files", "1", len(kinds), 0, reference=2)
+        )
         for disturb in (worker_killed, build_killed, scheduler_killed, disk_full, sample_cut):
             found += disturb(trial, work / disturb.__name__)
         if not quick:

@@ -56,7 +56,11 @@ class Rate(NamedTuple):
 def noise_levels(power, ranks, guard, reach):  # type: ignore[no-untyped-def]
     """Order statistic and mean of the training cells of every cell, by sorting as the text book has it, and their number."""
     n_range, n_velocity = power.shape
-    ordered, averaged, counts = np.empty(power.shape), np.empty(power.shape), np.empty(power.shape, np.int64)
+    ordered, averaged, counts = (
+        np.empty(power.shape),
+        np.empty(power.shape),
+        np.empty(power.shape, np.int64),
+    )
     for i in prange(n_range):
         ring = np.empty((2 * reach + 1) ** 2)
         for j in range(n_velocity):
@@ -89,14 +93,19 @@ def rate(values: list[float]) -> tuple[float, float]:
     return float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values)))
 
 
-def independent_maps(n_maps: int, looks: int, rng: np.random.Generator) -> Iterator[NDArray[np.floating]]:
+def independent_maps(
+    n_maps: int, looks: int, rng: np.random.Generator
+) -> Iterator[NDArray[np.floating]]:
     for _ in range(n_maps):
         yield rng.standard_gamma(looks, size=(256, 133))
 
 
 def noise_power(radar: Radar) -> float:
     """Mean power of a cell of one channel for noise of power 1 per sample."""
-    factors = [np.sum(hann(n) ** 2) / np.sum(hann(n)) ** 2 for n in (radar.samples_per_chirp, radar.cycles_per_frame)]
+    factors = [
+        np.sum(hann(n) ** 2) / np.sum(hann(n)) ** 2
+        for n in (radar.samples_per_chirp, radar.cycles_per_frame)
+    ]
     return float(np.prod(factors))
 
 
@@ -107,8 +116,12 @@ def windowed_maps(
     shape = (radar.chirps_per_frame, radar.n_rx, radar.samples_per_chirp)
     unit = noise_power(radar)
     for _ in range(n_maps):
-        noise = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[..., 0] * np.float32(math.sqrt(0.5))
-        cube = range_spectrum(noise, radar).reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+        noise = rng.standard_normal((*shape, 2), dtype=np.float32).view(np.complex64)[
+            ..., 0
+        ] * np.float32(math.sqrt(0.5))
+        cube = range_spectrum(noise, radar).reshape(
+            -1, radar.n_tx, radar.n_rx, radar.samples_per_chirp
+        )
         yield (
             power_map(cube, radar) / np.float32(unit),
             [power_map(cube, radar, channel=c) / np.float32(unit) for c in (0, 37, 95)],
@@ -118,11 +131,17 @@ def windowed_maps(
 class Tally:
     """Alarms and survival means of one kind of cells, map by map."""
 
-    def __init__(self, cells: str, looks: int, pfas: tuple[float, ...], *, conditional: bool) -> None:
+    def __init__(
+        self, cells: str, looks: int, pfas: tuple[float, ...], *, conditional: bool
+    ) -> None:
         self.cells, self.looks, self.conditional = cells, looks, conditional
         self.scales = {pfa: scale_tables(pfa, looks) for pfa in pfas}
-        self.counted: dict[tuple[str, float], list[float]] = {(d, pfa): [] for d in DETECTORS for pfa in pfas}
-        self.survival: dict[tuple[str, float], list[float]] = {(d, pfa): [] for d in DETECTORS for pfa in pfas}
+        self.counted: dict[tuple[str, float], list[float]] = {
+            (d, pfa): [] for d in DETECTORS for pfa in pfas
+        }
+        self.survival: dict[tuple[str, float], list[float]] = {
+            (d, pfa): [] for d in DETECTORS for pfa in pfas
+        }
         self.alarms = dict.fromkeys(self.counted, 0)
         self.n_cells = 0
 
@@ -133,16 +152,29 @@ class Tally:
             self.alarms[detector, pfa] += alarms
             self.counted[detector, pfa].append(alarms / power.size)
         if self.conditional:
-            ordered, averaged, counts = noise_levels(power.astype(np.float64), RANKS, GUARD, GUARD + TRAIN)
+            ordered, averaged, counts = noise_levels(
+                power.astype(np.float64), RANKS, GUARD, GUARD + TRAIN
+            )
             for (detector, pfa), means in self.survival.items():
                 level = ordered if detector == "os" else averaged
-                means.append(float(gammaincc(self.looks, self.scales[pfa][detector][counts] * level).mean()))
+                means.append(
+                    float(gammaincc(self.looks, self.scales[pfa][detector][counts] * level).mean())
+                )
 
     def rates(self) -> Iterator[Rate]:
         for (detector, pfa), values in self.counted.items():
             conditional = rate(self.survival[detector, pfa]) if self.conditional else (None, None)
             alarms = self.alarms[detector, pfa]
-            yield Rate(self.cells, detector, self.looks, pfa, self.n_cells, alarms, *rate(values), *conditional)
+            yield Rate(
+                self.cells,
+                detector,
+                self.looks,
+                pfa,
+                self.n_cells,
+                alarms,
+                *rate(values),
+                *conditional,
+            )
 
 
 def rates(n_maps: int, seed: int) -> Iterator[Rate]:
@@ -155,7 +187,10 @@ def rates(n_maps: int, seed: int) -> Iterator[Rate]:
         yield from tally.rates()
     radar = Radar.preset("paper-12ghz")
     pfas = (1e-2, 1e-3, 1e-4, 1e-6)
-    one, summed = Tally("windowed", 1, pfas, conditional=True), Tally("windowed", radar.n_channels, pfas, conditional=True)
+    one, summed = (
+        Tally("windowed", 1, pfas, conditional=True),
+        Tally("windowed", radar.n_channels, pfas, conditional=True),
+    )
     for total, singles in windowed_maps(radar, n_maps, rng):
         summed.add(total)
         for single in singles:
@@ -169,13 +204,23 @@ def rate_rows(found: Rate) -> Iterator[Row]:
     counted = found.counted / found.pfa
     if found.cells == "independent":
         says = "false alarms counted over those asked, independent cells, less 1"
-        yield judged(claim, f"counted over asked, {found.n_cells} cells", "", counted, MOST_OFF, reference=1.0, says=says)
+        yield judged(
+            claim,
+            f"counted over asked, {found.n_cells} cells",
+            "",
+            counted,
+            MOST_OFF,
+            reference=1.0,
+            says=says,
+        )
     else:
         yield reported(claim, f"counted over asked, {found.alarms} alarms", "", counted)
     yield reported(claim, "one standard deviation of that", "", found.counted_error / found.pfa)
     if found.conditional is not None and found.conditional_error is not None:
         yield reported(claim, "from the thresholds, over asked", "", found.conditional / found.pfa)
-        yield reported(claim, "one standard deviation of that, too", "", found.conditional_error / found.pfa)
+        yield reported(
+            claim, "one standard deviation of that, too", "", found.conditional_error / found.pfa
+        )
 
 
 def voxel_rows(found: list[Rate]) -> Iterator[Row]:
@@ -188,9 +233,19 @@ def voxel_rows(found: list[Rate]) -> Iterator[Row]:
         windows = len(radar.window_starts(math.floor(CAPTURE_S / radar.chirp_duration_s)))
         cells = radar.samples_per_chirp * radar.cycles_per_frame
         for one in found:
-            if one.cells == "windowed" and one.detector == "os" and one.pfa == 1e-6 and one.conditional is not None:
+            if (
+                one.cells == "windowed"
+                and one.detector == "os"
+                and one.pfa == 1e-6
+                and one.conditional is not None
+            ):
                 claim = f"{name}, {CAPTURE_S:g} s of noise alone, {one.looks} looks"
-                yield reported(claim, f"false voxels expected in {windows} windows", "", windows * cells * one.conditional)
+                yield reported(
+                    claim,
+                    f"false voxels expected in {windows} windows",
+                    "",
+                    windows * cells * one.conditional,
+                )
 
 
 def measure(quick: bool) -> list[Row]:

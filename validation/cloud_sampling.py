@@ -23,9 +23,20 @@ def measure(quick: bool) -> list[Row]:
         clouds = []
         for seed in (0, 1):
             with tempfile.TemporaryDirectory() as folder:
-                clouds.append(rt.run(motion, radar, out=folder, fidelity="analytic", seed=seed).points / bins)
-        there, back = (KDTree(other).query(cloud)[0].mean() for cloud, other in (clouds, clouds[::-1]))
-        rows.append(reported(f"{activity}, two seeds", "Chamfer distance of RDT clouds", "bins", float(there + back) / 2))
+                clouds.append(
+                    rt.run(motion, radar, out=folder, fidelity="analytic", seed=seed).points / bins
+                )
+        there, back = (
+            KDTree(other).query(cloud)[0].mean() for cloud, other in (clouds, clouds[::-1])
+        )
+        rows.append(
+            reported(
+                f"{activity}, two seeds",
+                "Chamfer distance of RDT clouds",
+                "bins",
+                float(there + back) / 2,
+            )
+        )
     return rows
 
 

@@ -30,7 +30,14 @@ from rows import Row, judged, main, reported
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.process import ClutterMap, SlidingWindows, clutter_map_scale, clutter_removal, power_map, range_spectrum
+from rtradar.process import (
+    ClutterMap,
+    SlidingWindows,
+    clutter_map_scale,
+    clutter_removal,
+    power_map,
+    range_spectrum,
+)
 from rtradar.radar import Radar
 
 ROOM_DB = 60.0
@@ -66,20 +73,29 @@ def hann(n: int) -> NDArray[np.float64]:
 # -- removal ---------------------------------------------------------------------------------------------------------------
 
 
-def echo(radar: Radar, n_chirps: int, range_of: Callable[[NDArray[np.float64]], Any]) -> NDArray[np.complex128]:
+def echo(
+    radar: Radar, n_chirps: int, range_of: Callable[[NDArray[np.float64]], Any]
+) -> NDArray[np.complex128]:
     """IF of a point of amplitude 1, (chirp, rx, sample): each Tx and Rx a little farther than the one before."""
     chirps = np.arange(n_chirps)
     extra = 1.3e-3 * (chirps % radar.n_tx)[:, None] + 1.7e-3 * np.arange(radar.n_rx)
     times = (chirps + 0.5) * radar.chirp_duration_s
-    tau = (2 * np.broadcast_to(range_of(times), times.shape)[:, None] + extra)[..., None] / SPEED_OF_LIGHT_MPS
+    tau = (2 * np.broadcast_to(range_of(times), times.shape)[:, None] + extra)[
+        ..., None
+    ] / SPEED_OF_LIGHT_MPS
     fast = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
     slope = radar.slope_hz_per_s
-    return np.exp(2j * np.pi * (radar.start_frequency_hz * tau + slope * tau * fast - slope * tau**2 / 2))
+    return np.exp(
+        2j * np.pi * (radar.start_frequency_hz * tau + slope * tau * fast - slope * tau**2 / 2)
+    )
 
 
 def room(radar: Radar, n_chirps: int) -> NDArray[np.complex128]:
     """Five still reflectors, the strongest of amplitude 1, each tenth as strong as the one before in power."""
-    one = sum(10 ** (-i / 2) * echo(radar, radar.n_tx, lambda _, r=r: r) for i, r in enumerate((4.3, 2.71, 6.05, 1.2, 8.4)))
+    one = sum(
+        10 ** (-i / 2) * echo(radar, radar.n_tx, lambda _, r=r: r)
+        for i, r in enumerate((4.3, 2.71, 6.05, 1.2, 8.4))
+    )
     return np.tile(one, (n_chirps // radar.n_tx, 1, 1))
 
 
@@ -94,7 +110,12 @@ def movers(radar: Radar, n_chirps: int) -> NDArray[np.complex128]:
 
 
 def by_hand(
-    method: str, cycles: NDArray[np.complex128], radar: Radar, *, time_constant_s: float = 1.0, pulses: int = 2
+    method: str,
+    cycles: NDArray[np.complex128],
+    radar: Radar,
+    *,
+    time_constant_s: float = 1.0,
+    pulses: int = 2,
 ) -> NDArray[np.complex128]:
     """The last window after each removal, written out."""
     n = radar.cycles_per_frame
@@ -103,7 +124,10 @@ def by_hand(
     if method == "mti":
         kernel = {2: (1, -1), 3: (1, -2, 1)}[pulses]
         weights = np.array(kernel) / math.sqrt(sum(weight**2 for weight in kernel))
-        return sum(weight * cycles[len(cycles) - n - i : len(cycles) - i] for i, weight in enumerate(weights))
+        return sum(
+            weight * cycles[len(cycles) - n - i : len(cycles) - i]
+            for i, weight in enumerate(weights)
+        )
     share = 1 - math.exp(-radar.cycle_duration_s / time_constant_s)
     background, left = cycles[0], []
     for i, cycle in enumerate(cycles):
@@ -119,9 +143,14 @@ def spectra_of(cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloatin
     return np.fft.fft(cycles.astype(np.complex128) * window[:, None, None, None], axis=0)
 
 
-def by_package(method: str, x: NDArray[np.complex128], radar: Radar, options: dict[str, Any]) -> NDArray[np.complexfloating]:
+def by_package(
+    method: str, x: NDArray[np.complex128], radar: Radar, options: dict[str, Any]
+) -> NDArray[np.complexfloating]:
     """The last window of the stream, in the precision of the pipeline."""
-    removal, shape = clutter_removal(method, radar, **options), (-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+    removal, shape = (
+        clutter_removal(method, radar, **options),
+        (-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp),
+    )
     parts = []
     step = 37 * radar.n_tx
     for first in range(0, len(x), step):
@@ -135,9 +164,13 @@ def room_rows(name: str) -> Iterator[Row]:
     n_chirps = round(2.3 * radar.cycles_per_frame) * radar.n_tx
     still, moving = room(radar, n_chirps), movers(radar, n_chirps)
     weights = hann(radar.samples_per_chirp) / hann(radar.samples_per_chirp).sum()
-    truth = np.fft.fft(moving * weights, axis=2).reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+    truth = np.fft.fft(moving * weights, axis=2).reshape(
+        -1, radar.n_tx, radar.n_rx, radar.samples_per_chirp
+    )
     shape = (-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
-    strongest = abs(spectra_of(np.fft.fft(still * weights, axis=2).reshape(shape)[-radar.cycles_per_frame :])).max()
+    strongest = abs(
+        spectra_of(np.fft.fft(still * weights, axis=2).reshape(shape)[-radar.cycles_per_frame :])
+    ).max()
     for label, (method, options) in SETTINGS.items():
         claim = f"{name}, {label}"
         alone = by_package(method, still, radar, options)
@@ -148,8 +181,12 @@ def room_rows(name: str) -> Iterator[Row]:
         expected = spectra_of(by_hand(method, truth, radar, **options))
         left_db = 20 * math.log10(abs(ours - expected).max() / strongest)
         quantity = f"left of a room {ROOM_DB:g} dB above the movers, of its strongest cell"
-        yield judged(claim, quantity, "dB", left_db, MOST_LEFT_DB, says=f"clutter removal: {quantity}")
-        kept_db = 20 * math.log10(abs(expected).max() / abs(spectra_of(truth[-radar.cycles_per_frame :])).max())
+        yield judged(
+            claim, quantity, "dB", left_db, MOST_LEFT_DB, says=f"clutter removal: {quantity}"
+        )
+        kept_db = 20 * math.log10(
+            abs(expected).max() / abs(spectra_of(truth[-radar.cycles_per_frame :])).max()
+        )
         yield reported(claim, "strongest cell of the movers, after over before", "dB", kept_db)
 
 
@@ -176,12 +213,19 @@ def response_rows(name: str) -> Iterator[Row]:
             worst = max(worst, abs(measured_db - 20 * math.log10(gain)))
         # float32 values of size 1 whose second difference is down to 9e-5 at 77 GHz: 6e-8 / 9e-5 = 0.006 dB at most, rms less.
         quantity = "response from 1 bin to half the pulse rate, largest error"
-        yield judged(f"{name}, {label}", quantity, "dB", worst, 0.006, says=f"clutter removal: {quantity}")
+        yield judged(
+            f"{name}, {label}", quantity, "dB", worst, 0.006, says=f"clutter removal: {quantity}"
+        )
         for speed in (0.5, 1.0, 2.0):
             turn = speed / (2 * radar.max_velocity_mps)
             x = np.exp(2j * np.pi * turn * np.arange(n)).astype(np.complex64)[:, None, None]
             y = clutter_removal(method, radar, **options).block(x, 0)[-radar.cycles_per_frame :]
-            yield reported(f"{name}, {label}", f"gain at {speed:g} m/s", "dB", 10 * math.log10(np.mean(abs(y) ** 2)))
+            yield reported(
+                f"{name}, {label}",
+                f"gain at {speed:g} m/s",
+                "dB",
+                10 * math.log10(np.mean(abs(y) ** 2)),
+            )
 
 
 def mean_rows(name: str) -> Iterator[Row]:
@@ -199,21 +243,33 @@ def mean_rows(name: str) -> Iterator[Row]:
         before, after = powers(bins)
         changed = max(changed, abs(after[outside] - before[outside]).max() / before.max())
     yield judged(
-        f"{name}, mean", "power of movers of 2 to 40 bins outside bins -1 to 1, largest change of their peak", "", changed, 1e-12
+        f"{name}, mean",
+        "power of movers of 2 to 40 bins outside bins -1 to 1, largest change of their peak",
+        "",
+        changed,
+        1e-12,
     )
     slow = np.arange(0.0, 2.0, 0.002)
     kept = np.array([after.max() / before.max() for before, after in map(powers, slow)])
     half = slow[np.flatnonzero(kept < 0.5)[-1]]
-    yield reported(f"{name}, mean", "an echo slower than this loses more than half of its peak", "bins", half)
+    yield reported(
+        f"{name}, mean", "an echo slower than this loses more than half of its peak", "bins", half
+    )
     yield reported(f"{name}, mean", "the same", "m/s", half * radar.velocity_bin_mps)
     for bins in (5.5, 20.5):
         before, after = powers(bins)
 
         def sums(x: float) -> complex:
             """Mean of a tone of x bins over the window."""
-            return np.exp(1j * np.pi * x * (n - 1) / n) * math.sin(math.pi * x) / (n * math.sin(math.pi * x / n))
+            return (
+                np.exp(1j * np.pi * x * (n - 1) / n)
+                * math.sin(math.pi * x)
+                / (n * math.sin(math.pi * x / n))
+            )
 
-        own = sums(bins) - (sums(bins - 1) + sums(bins + 1)) / 2  # the side lobe of its Hann spectrum
+        own = (
+            sums(bins) - (sums(bins - 1) + sums(bins + 1)) / 2
+        )  # the side lobe of its Hann spectrum
         peak = max(abs(sums(x) - (sums(x - 1) + sums(x + 1)) / 2) for x in (-0.5, 0.5))
         ghost_db = 10 * math.log10(after[n // 2] / before.max())
         closed_db = 20 * math.log10(abs(own - sums(bins)) / peak)
@@ -230,13 +286,25 @@ def noise_rows(quick: bool) -> Iterator[Row]:
     x = rng.standard_normal((n, 8, 256, 2), dtype=np.float32).view(np.complex64)[..., 0]
     settings = {**SETTINGS, "exponential, 5 ms": ("exponential", {"time_constant_s": 5e-3})}
     for label, (method, options) in settings.items():
-        y = clutter_removal(method, radar, **options).window(clutter_removal(method, radar, **options).block(x, 0))
+        y = clutter_removal(method, radar, **options).window(
+            clutter_removal(method, radar, **options).block(x, 0)
+        )
         factor = float((abs(y[n // 2 :]) ** 2).mean() / (abs(x[n // 2 :]) ** 2).mean())
         share = 1 - math.exp(-radar.cycle_duration_s / options.get("time_constant_s", 1.0))
         expected = {"mean": 1 - 1 / n, "mti": 1.0, "exponential": 2 / (2 - share)}[method]
-        if method != "exponential" or options["time_constant_s"] < 0.1:  # in the longer one the start has not died away
+        if (
+            method != "exponential" or options["time_constant_s"] < 0.1
+        ):  # in the longer one the start has not died away
             says = "clutter removal: power of white noise, after over before"
-            yield judged(f"white noise, {label}", "power after over before", "", factor, 0.005, reference=expected, says=says)
+            yield judged(
+                f"white noise, {label}",
+                "power after over before",
+                "",
+                factor,
+                0.005,
+                reference=expected,
+                says=says,
+            )
 
 
 # -- clutter map -----------------------------------------------------------------------------------------------------------
@@ -253,7 +321,9 @@ class TextBook:
         self.scale = math.inf
 
     def push(self, power: NDArray[np.floating]) -> NDArray[np.bool_]:
-        found = power > self.scale * self.level if self.weights.size else np.zeros(power.shape, bool)
+        found = (
+            power > self.scale * self.level if self.weights.size else np.zeros(power.shape, bool)
+        )
         self.queue.append(power.astype(np.float64))
         if len(self.queue) > self.wait:
             step = max(self.share, 1 / (self.weights.size + 1))
@@ -278,9 +348,20 @@ def independent_rows(quick: bool) -> Iterator[Row]:
         for pfa, rates in alarms.items():
             claim = f"windows apart, {looks} look{'s' if looks > 1 else ''}, {pfa:g} asked"
             says = "clutter-map CFAR on noise: false alarms counted over those asked"
-            for part, counted in ((f"windows 2 to {old}", rates[1:old]), ("all later", rates[old:])):
+            for part, counted in (
+                (f"windows 2 to {old}", rates[1:old]),
+                ("all later", rates[old:]),
+            ):
                 ratio = float(np.mean(counted)) / pfa
-                yield judged(claim, f"counted over asked, {part}", "", ratio, MOST_OFF, reference=1.0, says=says)
+                yield judged(
+                    claim,
+                    f"counted over asked, {part}",
+                    "",
+                    ratio,
+                    MOST_OFF,
+                    reference=1.0,
+                    says=says,
+                )
 
 
 def noise_maps(radar: Radar, n_windows: int, seed: int) -> Iterator[NDArray[np.floating]]:
@@ -303,8 +384,12 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
     detectors: dict[tuple[str, float], Any] = {}
     for pfa in pfas:
         detectors["ours", pfa] = ClutterMap(radar, pfa=pfa, looks=looks)
-        detectors["newest kept out, taken for independent", pfa] = TextBook(share, pfa, looks, wait=3)
-        detectors["newest taken in, taken for independent", pfa] = TextBook(share, pfa, looks, wait=0)
+        detectors["newest kept out, taken for independent", pfa] = TextBook(
+            share, pfa, looks, wait=3
+        )
+        detectors["newest taken in, taken for independent", pfa] = TextBook(
+            share, pfa, looks, wait=0
+        )
     alarms: dict[tuple[str, float], list[float]] = {key: [] for key in detectors}
     for power in noise_maps(radar, n_windows, seed=4):
         for key, detector in detectors.items():
@@ -315,7 +400,15 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
             ratio = float(np.mean(values)) / pfa
             if kind == "ours":
                 says = "clutter-map CFAR on noise, windows that share 75 %: false alarms counted over those asked"
-                yield judged(claim, f"counted over asked, {part}", "", ratio, MOST_OFF, reference=1.0, says=says)
+                yield judged(
+                    claim,
+                    f"counted over asked, {part}",
+                    "",
+                    ratio,
+                    MOST_OFF,
+                    reference=1.0,
+                    says=says,
+                )
             else:
                 yield reported(claim, f"counted over asked, {part}", "", ratio)
 
@@ -343,18 +436,30 @@ def map_rows(quick: bool) -> Iterator[Row]:
             radar, scene = Radar.preset("paper-12ghz"), rt.Scene.load("living-room")
             rt.run(motion, radar, scene, out=folder, fidelity="analytic", clutter_removal=removal)
             with h5py.File(Path(folder) / "maps.h5") as maps:
-                rest = {name: int(np.abs(maps[name][:]).argmin()) for name in ("velocity", "spectrogram_velocity")}
+                rest = {
+                    name: int(np.abs(maps[name][:]).argmin())
+                    for name in ("velocity", "spectrogram_velocity")
+                }
                 still = {
                     "range-Doppler": maps["range_doppler"][..., rest["velocity"]],
                     "spectrogram": maps["spectrogram"][:, rest["spectrogram_velocity"]],
                     "range over time": maps["range_time"][:],
                 }
-                level[removal] = {name: 10 * math.log10(float(values.mean())) for name, values in still.items()}
+                level[removal] = {
+                    name: 10 * math.log10(float(values.mean())) for name, values in still.items()
+                }
     says = "clutter removal in a living room: what maps still hold where nothing moves, over that without removal"
     for removal in removals:
         for name, value in level[removal].items():
             # The walker himself is 20 to 30 dB below the room; a map that is not cleaned stays at 0 dB.
-            yield judged(f"{removal}, {name}", "level over none", "dB", value - level["none"][name], -20.0, says=says)
+            yield judged(
+                f"{removal}, {name}",
+                "level over none",
+                "dB",
+                value - level["none"][name],
+                -20.0,
+                says=says,
+            )
 
 
 def measure(quick: bool) -> list[Row]:

@@ -68,7 +68,9 @@ class FlyingSphere:
     def at(self, times: Array) -> Poses:
         times = np.asarray(times)
         centres = (times[:, None] - 0.05) * np.array(self.velocity) + [0.0, 0.3, 1.2]
-        return Poses(centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes)
+        return Poses(
+            centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes
+        )
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,9 @@ class TurningEllipsoid:
 
     def at(self, times: Array) -> Poses:
         # Tilted, so that nothing is symmetric about the array.
-        turn = Rotation.from_rotvec(np.outer(self.start + self.rate * np.asarray(times), [0.1, 0.97, 0.2]))
+        turn = Rotation.from_rotvec(
+            np.outer(self.start + self.rate * np.asarray(times), [0.1, 0.97, 0.2])
+        )
         frames = turn.as_matrix()
         centres = np.array([0.0, 0.2, 1.1]) + frames[:, :, 2] * self.axes[2]
         return Poses(centres[:, None], frames[:, None], self.semi_axes)
@@ -115,7 +119,11 @@ def shortest(tx: Array, rx: Array, centre: Array, frame: Array, axes: Array) -> 
         point = place / np.linalg.norm(place) * axes
         return float(np.linalg.norm(local_t - point) + np.linalg.norm(local_r - point))
 
-    return float(minimize(length, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-13}).fun)
+    return float(
+        minimize(
+            length, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-7, "fatol": 1e-13}
+        ).fun
+    )
 
 
 def true_velocities(radar: rt.Radar, body: Moving, tx: int, rx: Array) -> tuple[float, float]:
@@ -123,7 +131,10 @@ def true_velocities(radar: rt.Radar, body: Moving, tx: int, rx: Array) -> tuple[
     times = np.linspace(0, radar.cycles_per_frame * radar.cycle_duration_s, 41)
     poses = body.at(times)
     lengths = np.array(
-        [shortest(radar.tx[tx], rx, c[0], f[0], poses.semi_axes[0]) for c, f in zip(poses.centres, poses.frames, strict=True)]
+        [
+            shortest(radar.tx[tx], rx, c[0], f[0], poses.semi_axes[0])
+            for c, f in zip(poses.centres, poses.frames, strict=True)
+        ]
     )
     rates = np.gradient(lengths, times, edge_order=2) / 2
     return float(rates.min()), float(rates.max())
@@ -147,9 +158,14 @@ class Floor:
     median: float
 
 
-def floor_of(radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, int], tuple[float, float]]) -> Floor:
+def floor_of(
+    radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, int], tuple[float, float]]
+) -> Floor:
     n = radar.cycles_per_frame
-    fast, slow = chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False), chebwin(n, ATTENUATION_DB, sym=False)
+    fast, slow = (
+        chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False),
+        chebwin(n, ATTENUATION_DB, sym=False),
+    )
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
@@ -160,7 +176,15 @@ def floor_of(radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, in
     for (tx, rx), (least, most) in bands.items():
         power = np.abs(spectrum.values[:, :, tx * radar.n_rx + rx]) ** 2
         outside, farther = (
-            power[:, beyond(spectrum.velocity, least - wide * lobe, most + wide * lobe, 2 * radar.max_velocity_mps)]
+            power[
+                :,
+                beyond(
+                    spectrum.velocity,
+                    least - wide * lobe,
+                    most + wide * lobe,
+                    2 * radar.max_velocity_mps,
+                ),
+            ]
             for wide in (1, 2)
         )
         # Doppler cells at their strongest range: the median over all ranges would be that of empty ones.
@@ -168,12 +192,16 @@ def floor_of(radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, in
     return Floor(*(10 * np.log10(np.max(found, axis=0))).tolist())
 
 
-def bands_of(radar: rt.Radar, body: Moving, channels: list[tuple[int, int]]) -> dict[tuple[int, int], tuple[float, float]]:
+def bands_of(
+    radar: rt.Radar, body: Moving, channels: list[tuple[int, int]]
+) -> dict[tuple[int, int], tuple[float, float]]:
     receivers = radar.rx[radar.rx_of_tx]
     return {(tx, rx): true_velocities(radar, body, tx, receivers[tx, rx]) for tx, rx in channels}
 
 
-def optical_rows(radar: rt.Radar, name: str, body: Moving, channels: list[tuple[int, int]]) -> Iterator[Row]:
+def optical_rows(
+    radar: rt.Radar, name: str, body: Moving, channels: list[tuple[int, int]]
+) -> Iterator[Row]:
     bands = bands_of(radar, body, channels)
     claim = f"{radar.name}, {name}"
     # A turning body has another Doppler by the paper's model, which takes the range of its centre.
@@ -184,8 +212,12 @@ def optical_rows(radar: rt.Radar, name: str, body: Moving, channels: list[tuple[
         quantity = f"{rung}: highest cell outside, worst of {len(bands)} channels"
         motion = "sphere in flight" if isinstance(body, FlyingSphere) else "turning ellipsoid"
         says = f"Doppler floor of `{rung}`: {motion}, highest cell"
-        yield judged(claim, quantity, "dB", floor.highest, -80.0, key="doppler", says=says, cases=len(bands))
-        yield reported(claim, f"{rung}: highest cell twice as far outside", "dB", floor.farther, key="doppler")
+        yield judged(
+            claim, quantity, "dB", floor.highest, -80.0, key="doppler", says=says, cases=len(bands)
+        )
+        yield reported(
+            claim, f"{rung}: highest cell twice as far outside", "dB", floor.farther, key="doppler"
+        )
     widths = [(most - least) / radar.velocity_bin_mps for least, most in bands.values()]
     yield reported(claim, "width of the true Doppler", "bins", max(widths), key="doppler")
 
@@ -199,16 +231,36 @@ def faceted_rows(radar: rt.Radar, name: str, body: Moving) -> Iterator[Row]:
         highest[rung] = floor.highest
         if isinstance(body, FlyingSphere):
             says = f"Doppler floor of `{rung}`: sphere in flight, highest cell"
-            yield judged(claim, f"{rung}: highest cell outside", "dB", floor.highest, -80.0, key="doppler", says=says)
+            yield judged(
+                claim,
+                f"{rung}: highest cell outside",
+                "dB",
+                floor.highest,
+                -80.0,
+                key="doppler",
+                says=says,
+            )
         else:
             says = f"Doppler floor of `{rung}`: turning ellipsoid, median"
-            yield judged(claim, f"{rung}: median of the cells outside", "dB", floor.median, -80.0, key="doppler", says=says)
-            yield reported(claim, f"{rung}: highest cell outside", "dB", floor.highest, key="doppler")
+            yield judged(
+                claim,
+                f"{rung}: median of the cells outside",
+                "dB",
+                floor.median,
+                -80.0,
+                key="doppler",
+                says=says,
+            )
+            yield reported(
+                claim, f"{rung}: highest cell outside", "dB", floor.highest, key="doppler"
+            )
             if rung != "reference":
                 over = floor.highest - highest["reference"]
                 quantity = f"{rung}: highest cell outside, over reference"
                 says = f"Doppler floor of `{rung}`: turning ellipsoid, highest cell over that of `reference`"
-                yield judged(claim, quantity, "dB", over, OVER_REFERENCE_DB, key="doppler", says=says)
+                yield judged(
+                    claim, quantity, "dB", over, OVER_REFERENCE_DB, key="doppler", says=says
+                )
 
 
 def beyond(velocity: Array, least: float, most: float, ambiguity: float) -> NDArray[np.bool_]:
@@ -224,7 +276,9 @@ def measure(quick: bool) -> list[Row]:
         whole = rt.Radar.preset(preset)
         ends = (whole.rx_y - 1) * whole.rx_spacing_wavelengths
         radar = dataclasses.replace(whole, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)
-        one = dataclasses.replace(radar, tx_y=1, tx_z=0, rx_z=0, chirp_duration_s=whole.cycle_duration_s)
+        one = dataclasses.replace(
+            radar, tx_y=1, tx_z=0, rx_z=0, chirp_duration_s=whole.cycle_duration_s
+        )
         channels = [(tx, rx) for tx in ((0, 11) if quick else (0, 5, 6, 11)) for rx in (0, 1)]
         for index, (name, body) in enumerate(MOTIONS.items()):
             rows += optical_rows(radar, name, body, channels)

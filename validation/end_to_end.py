@@ -28,8 +28,17 @@ def seconds(motion: rt.Motion, radar: rt.Radar, fidelity: str, folder: str) -> f
     """Of all stages but pictures and files [s]."""
     best = float("inf")
     for _ in range(REPEATS):
-        found = rt.run(motion, radar, out=Path(folder, fidelity), fidelity=fidelity, start_s=START_S, duration_s=0.1)
-        best = min(best, sum(s for stage, s in found.summary["stages"].items() if stage not in LEFT_OUT))
+        found = rt.run(
+            motion,
+            radar,
+            out=Path(folder, fidelity),
+            fidelity=fidelity,
+            start_s=START_S,
+            duration_s=0.1,
+        )
+        best = min(
+            best, sum(s for stage, s in found.summary["stages"].items() if stage not in LEFT_OUT)
+        )
     return best
 
 
@@ -40,15 +49,28 @@ def measure(quick: bool) -> list[Row]:
         for activity in ACTIVITIES[:1] if quick else ACTIVITIES:
             motion = rt.synthetic_motion(activity, seed=0, duration_s=3.0)
             with tempfile.TemporaryDirectory() as folder:
-                analytic, optics = (seconds(motion, radar, rung, folder) for rung in ("analytic", "physical-optics"))
+                analytic, optics = (
+                    seconds(motion, radar, rung, folder) for rung in ("analytic", "physical-optics")
+                )
             claim = f"{name}, {activity}, a frame of 100 ms"
             found.append(reported(claim, "analytic, motion to cloud", "s", analytic))
             found.append(reported(claim, "physical-optics, motion to cloud", "s", optics))
             if name == "paper-12ghz":
                 says = "a frame of 100 ms at 12 GHz, motion to cloud: `physical-optics` over `analytic`"
-                found.append(rows.judged(claim, "physical-optics over analytic", "1", optics / analytic, MOST, says=says))
+                found.append(
+                    rows.judged(
+                        claim,
+                        "physical-optics over analytic",
+                        "1",
+                        optics / analytic,
+                        MOST,
+                        says=says,
+                    )
+                )
             else:
-                found.append(reported(claim, "physical-optics over analytic", "1", optics / analytic))
+                found.append(
+                    reported(claim, "physical-optics over analytic", "1", optics / analytic)
+                )
     return found
 
 

@@ -39,7 +39,9 @@ def collector() -> tuple[list[Case], Callable[..., Any]]:
     """A list of cases, and the decorator that adds a function to it by its name and what is expected of it."""
     cases: list[Case] = []
 
-    def case(name: str, expected: str, *, slow: bool = False) -> Callable[[Callable[[], str]], Callable[[], str]]:
+    def case(
+        name: str, expected: str, *, slow: bool = False
+    ) -> Callable[[Callable[[], str]], Callable[[], str]]:
         def add(run: Callable[[], str]) -> Callable[[], str]:
             cases.append(Case(name, expected, run, slow))
             return run
@@ -76,13 +78,22 @@ def alone(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) 
 
 
 def together(*targets: rt.Ellipsoids) -> rt.Ellipsoids:
-    return rt.Ellipsoids(*(np.concatenate([getattr(t, name) for t in targets]) for name in ("centres", "frames", "semi_axes")))
+    return rt.Ellipsoids(
+        *(
+            np.concatenate([getattr(t, name) for t in targets])
+            for name in ("centres", "frames", "semi_axes")
+        )
+    )
 
 
-def along_axis(half_length: float, radii: tuple[float, float], gap: float, frequency: float) -> complex:
+def along_axis(
+    half_length: float, radii: tuple[float, float], gap: float, frequency: float
+) -> complex:
     """F [m] seen along a symmetry axis from ``gap`` before the surface, whose principal radii there are ``radii``."""
     distance = half_length + gap
-    size = (distance / gap) ** 2 * np.sqrt(np.pi / ((1 / radii[0] + 1 / gap) * (1 / radii[1] + 1 / gap)))
+    size = (distance / gap) ** 2 * np.sqrt(
+        np.pi / ((1 / radii[0] + 1 / gap) * (1 / radii[1] + 1 / gap))
+    )
     return complex(size * np.exp(2j * 2 * np.pi * frequency / C * half_length))
 
 
@@ -133,12 +144,16 @@ def motion() -> rt.Motion:
     return rt.synthetic_motion("kick", seed=1, duration_s=0.6)
 
 
-def chain(radar: rt.Radar | None = None, what: rt.Motion | None = None, **options: Any) -> tuple[rt.Result, list[str]]:
+def chain(
+    radar: rt.Radar | None = None, what: rt.Motion | None = None, **options: Any
+) -> tuple[rt.Result, list[str]]:
     """The whole chain, and its warnings; every number of its summary is finite, or it could not have been written."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         values: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.12}
-        result = rt.run(what or motion(), radar or small_radar(), out=Path(folder, "out"), **(values | options))
+        result = rt.run(
+            what or motion(), radar or small_radar(), out=Path(folder, "out"), **(values | options)
+        )
     assert np.isfinite(result.points).all()
     assert np.isfinite(result.survey.power_at).all()
     return result, [str(warning.message) for warning in caught]
@@ -149,4 +164,6 @@ def spectrum(radar: rt.Radar, body: Ball, rung: str = "analytic") -> Any:
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
     echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
-    return rt.process.range_doppler(rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar)
+    return rt.process.range_doppler(
+        rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar
+    )

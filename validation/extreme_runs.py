@@ -8,7 +8,17 @@ import warnings
 from pathlib import Path
 
 import numpy as np
-from extreme_cases import TRACED, Ball, chain, collector, motion, refused, small_radar, spectrum, warned
+from extreme_cases import (
+    TRACED,
+    Ball,
+    chain,
+    collector,
+    motion,
+    refused,
+    small_radar,
+    spectrum,
+    warned,
+)
 
 import rtradar as rt
 import rtradar.body
@@ -31,20 +41,26 @@ def _() -> str:
 @case("100 m/s", "a warning of motion inside a chirp; finite")
 def _() -> str:
     body = Ball(speed=100.0)
-    found, said = warned(lambda: spectrum(small_radar(chirp_duration_s=500e-6), body, "specular"), "inside one chirp")
+    found, said = warned(
+        lambda: spectrum(small_radar(chirp_duration_s=500e-6), body, "specular"), "inside one chirp"
+    )
     assert np.isfinite(found.values).all()
     return f"warned: {said}"
 
 
 @case("100 m/s, chirps of 12.5 us", "the known alias, to a bin")
 def _() -> str:
-    radar = small_radar(chirp_duration_s=12.5e-6, tx_y=1, frame_duration_s=0.01, samples_per_chirp=256)
+    radar = small_radar(
+        chirp_duration_s=12.5e-6, tx_y=1, frame_duration_s=0.01, samples_per_chirp=256
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
         found = spectrum(radar, Ball(speed=100.0, place=(-0.5, 1.0, 1.0)))
     power = (np.abs(found.values) ** 2).sum(axis=(0, 2))
     read = float(np.sum(found.velocity * power) / power.sum())
-    expected = (100.0 + radar.max_velocity_mps) % (2 * radar.max_velocity_mps) - radar.max_velocity_mps
+    expected = (100.0 + radar.max_velocity_mps) % (
+        2 * radar.max_velocity_mps
+    ) - radar.max_velocity_mps
     assert abs(read - expected) < radar.velocity_bin_mps, (read, expected)
     return f"{read:.2f} m/s, the alias is {expected:.2f} m/s"
 
@@ -53,7 +69,11 @@ def _() -> str:
 def _() -> str:
     whole = motion()
     one = dataclasses.replace(
-        whole, root_positions=whole.root_positions[:1], rotations=whole.rotations[:1], first_frame_s=0.0, length_s=None
+        whole,
+        root_positions=whole.root_positions[:1],
+        rotations=whole.rotations[:1],
+        first_frame_s=0.0,
+        length_s=None,
     )
     assert np.isfinite(rt.Body.from_motion(one).at([0.0]).centres).all()
     return refused(lambda: chain(what=one, duration_s=None), "no whole frame")
@@ -68,7 +88,9 @@ def _() -> str:
 
 @case("rotations that are none", "refused")
 def _() -> str:
-    return refused(lambda: dataclasses.replace(motion(), rotations=motion().rotations * 0), "unit quaternions")
+    return refused(
+        lambda: dataclasses.replace(motion(), rotations=motion().rotations * 0), "unit quaternions"
+    )
 
 
 @case("one time asked for twice, and times out of order", "the same poses")
@@ -129,7 +151,9 @@ def _() -> str:
 def _() -> str:
     radar = small_radar(tx_y=1, chirp_duration_s=20e-3, frame_duration_s=20e-3)
     result, said = chain(radar)
-    return f"{result.summary['windows']} windows, {result.summary['detections']} detections" + (f"; {said[0]}" if said else "")
+    return f"{result.summary['windows']} windows, {result.summary['detections']} detections" + (
+        f"; {said[0]}" if said else ""
+    )
 
 
 @case("one sample a chirp", "the person is beyond the range of one bin: refused")
@@ -140,10 +164,14 @@ def _() -> str:
 @case("one sample a chirp, bins of 15 m", "finite: one range bin")
 def _() -> str:
     result, said = chain(small_radar(samples_per_chirp=1, bandwidth_hz=10e6))
-    return f"{result.summary['windows']} windows, {result.summary['detections']} detections" + (f"; {said[0]}" if said else "")
+    return f"{result.summary['windows']} windows, {result.summary['detections']} detections" + (
+        f"; {said[0]}" if said else ""
+    )
 
 
-@case("every rung: one Tx, one Rx, one chirp, one sample, 0 and 100 m/s", "finite echoes and spectrum")
+@case(
+    "every rung: one Tx, one Rx, one chirp, one sample, 0 and 100 m/s", "finite echoes and spectrum"
+)
 def _() -> str:
     radars = [
         small_radar(tx_y=1, rx_y=1, samples_per_chirp=1, bandwidth_hz=10e6),
@@ -155,7 +183,9 @@ def _() -> str:
             for speed in (0.0, 100.0):
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", rt.ValidityWarning)
-                    values = spectrum(radar, Ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), rung).values
+                    values = spectrum(
+                        radar, Ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), rung
+                    ).values
                 assert np.isfinite(values).all(), (rung, radar, speed)
                 assert np.abs(values).max() > 0, (rung, radar, speed)
     return "finite, and not empty"

@@ -44,15 +44,28 @@ def _() -> str:
     pairs = []
     for frequency in (1e9, 12e9, 77e9, 300e9):
         reference = along_axis(0.5, (0.5, 0.5), 4.0, frequency)
-        pairs.append((complex(rt.scattering_length(alone(0.5, 0.5, 0.5), [4.5, 0, 0], [4.5, 0, 0], frequency)[0]), reference))
-        far = rt.scattering_length(alone(0.5, 0.5, 0.5), [1e6, 0, 0], [1e6, 0, 0], frequency, "analytic")[0]
+        pairs.append(
+            (
+                complex(
+                    rt.scattering_length(alone(0.5, 0.5, 0.5), [4.5, 0, 0], [4.5, 0, 0], frequency)[
+                        0
+                    ]
+                ),
+                reference,
+            )
+        )
+        far = rt.scattering_length(
+            alone(0.5, 0.5, 0.5), [1e6, 0, 0], [1e6, 0, 0], frequency, "analytic"
+        )[0]
         pairs.append((complex(far), along_axis(0.5, (0.5, 0.5), 1e6, frequency)))
     return worst_error(pairs, 1e-5)  # the analytic model has no near field: 0.5 m in 1000 km
 
 
 @case("whole chain at 1 and 300 GHz", "finite; 1 GHz warns of radii below a wavelength")
 def _() -> str:
-    low, said = chain(small_radar(start_frequency_hz=1e9, bandwidth_hz=0.5e9, rx_spacing_wavelengths=0.5))
+    low, said = chain(
+        small_radar(start_frequency_hz=1e9, bandwidth_hz=0.5e9, rx_spacing_wavelengths=0.5)
+    )
     assert any("radius of curvature" in message for message in said), said
     high, _ = chain(small_radar(start_frequency_hz=300e9, chirp_duration_s=20e-6))
     return f"{low.summary['detections']} and {high.summary['detections']} detections; 1 GHz: {said[0][:60]}..."
@@ -63,7 +76,11 @@ def _() -> str:
     return worst_error(
         [
             (
-                complex(rt.scattering_length(alone(0.1, 0.1, 0.1), [gap + 0.1, 0, 0], [gap + 0.1, 0, 0], 77e9)[0]),
+                complex(
+                    rt.scattering_length(
+                        alone(0.1, 0.1, 0.1), [gap + 0.1, 0, 0], [gap + 0.1, 0, 0], 77e9
+                    )[0]
+                ),
                 along_axis(0.1, (0.1, 0.1), gap, 77e9),
             )
             for gap in (0.1, 4.0, 1e3, 1e4)
@@ -74,12 +91,16 @@ def _() -> str:
 
 @case("a person 0.1 m from the radar", "refused: 0.3 m at least")
 def _() -> str:
-    return refused(lambda: chain(small_radar(position_m=(-0.35, 0.0, 1.0))), r"at least 0\.3 m is allowed")
+    return refused(
+        lambda: chain(small_radar(position_m=(-0.35, 0.0, 1.0))), r"at least 0\.3 m is allowed"
+    )
 
 
 @case("a person 10 km from the radar", "refused: beyond its range")
 def _() -> str:
-    return refused(lambda: chain(small_radar(position_m=(-1e4, 0.0, 1.0))), "never within the range")
+    return refused(
+        lambda: chain(small_radar(position_m=(-1e4, 0.0, 1.0))), "never within the range"
+    )
 
 
 @case("a person 10 km from a radar that reaches so far", "finite, at the right range")
@@ -92,13 +113,19 @@ def _() -> str:
     return f"{read:.0f} m of 9000 m, bins of {radar.range_bin_m:.0f} m"
 
 
-@case("ka 0.01 to 10 000: sphere, GO, PO, Mie", "finite; Rayleigh's 9 pi a^2 (ka)^4 at 0.01, GO at 10 000")
+@case(
+    "ka 0.01 to 10 000: sphere, GO, PO, Mie",
+    "finite; Rayleigh's 9 pi a^2 (ka)^4 at 0.01, GO at 10 000",
+)
 def _() -> str:
     k = 2 * np.pi * 12e9 / C
     ka = np.geomspace(0.01, 1e4, 31)
     for method in ("go", "po", "mie"):
         assert np.isfinite(rt.rcs.sphere(ka / k, 12e9, method)).all()  # type: ignore[arg-type]
-    small, large = (abs(complex(rt.rcs.sphere(x / k, 12e9, "mie"))) ** 2 / (np.pi * (x / k) ** 2) for x in (0.01, 1e4))
+    small, large = (
+        abs(complex(rt.rcs.sphere(x / k, 12e9, "mie"))) ** 2 / (np.pi * (x / k) ** 2)
+        for x in (0.01, 1e4)
+    )
     assert abs(small / (9 * 0.01**4) - 1) < 1e-3, small
     assert abs(large - 1) < 1e-3, large
     return f"Rayleigh to {abs(small / (9 * 0.01**4) - 1):.0e}, GO to {abs(large - 1):.0e}"
@@ -109,14 +136,18 @@ def _() -> str:
     said = ""
     for rung in MODELS:
         field, said = warned(
-            lambda rung=rung: rt.scattering_length(alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, rung),  # type: ignore[misc]
+            lambda rung=rung: rt.scattering_length(
+                alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, rung
+            ),  # type: ignore[misc]
             "radius of curvature",
         )
         assert np.isfinite(field).all()
     return f"warned: {said}"
 
 
-@case("needles and discs, 1000:1, along each axis, both rungs", "closed form, finite everywhere else")
+@case(
+    "needles and discs, 1000:1, along each axis, both rungs", "closed form, finite everywhere else"
+)
 def _() -> str:
     pairs = []
     rng = np.random.default_rng(0)
@@ -126,7 +157,9 @@ def _() -> str:
         for rung in MODELS:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", rt.ValidityWarning)
-                assert np.isfinite(rt.scattering_length(alone(*axes), sight, sight + BESIDE, 77e9, rung)).all()
+                assert np.isfinite(
+                    rt.scattering_length(alone(*axes), sight, sight + BESIDE, 77e9, rung)
+                ).all()
         for axis in range(3):
             others = [axes[i] ** 2 / axes[axis] for i in range(3) if i != axis]
             antenna = np.zeros(3)
@@ -138,7 +171,10 @@ def _() -> str:
     return worst_error(pairs, 1e-6)
 
 
-@case("physical optics and rays: 1 to 300 GHz, ka 5 to 400", "the closed form of physical optics, 0.1 dB")
+@case(
+    "physical optics and rays: 1 to 300 GHz, ka 5 to 400",
+    "the closed form of physical optics, 0.1 dB",
+)
 def _() -> str:
     worst = 0.0
     for frequency in (1e9, 12e9, 77e9, 300e9):
@@ -156,17 +192,27 @@ def _() -> str:
 @case("physical optics above ka = 400, without a say on facets", "refused")
 def _() -> str:
     return refused(
-        lambda: rt.scattering_length(alone(1.0, 1.0, 1.0), [1e3, 0, 0], [1e3, 0, 0], 77e9, "physical-optics"), "facets"
+        lambda: rt.scattering_length(
+            alone(1.0, 1.0, 1.0), [1e3, 0, 0], [1e3, 0, 0], 77e9, "physical-optics"
+        ),
+        "facets",
     )
 
 
-@case("physical optics, rays and fresnel at 0.1 m and 10 km", "finite; at 10 km the closed form, phase and all, 2 %")
+@case(
+    "physical optics, rays and fresnel at 0.1 m and 10 km",
+    "finite; at 10 km the closed form, phase and all, 2 %",
+)
 def _() -> str:
     for rung in ("physical-optics", "rays", "fresnel"):
         fields = []
         for gap in (0.1, 1e4):
             antenna = [gap + 0.05, 0.0, 0.0]
-            fields.append(complex(rt.scattering_length(alone(0.05, 0.05, 0.05), antenna, antenna, 24e9, rung)[0]))
+            fields.append(
+                complex(
+                    rt.scattering_length(alone(0.05, 0.05, 0.05), antenna, antenna, 24e9, rung)[0]
+                )
+            )
         assert np.isfinite(fields).all(), (rung, fields)
         expected = rt.rcs.sphere(0.05, 24e9, "go" if rung == "fresnel" else "po")
         # 0.02: facets; their phase at 10 km, where float32 would know it to 0.5 rad.
@@ -191,14 +237,21 @@ def _() -> str:
     return f"finite; {said[0]}" if said else "finite"
 
 
-@case("a mesh of 1.3 million triangles, physical optics", "the sphere's closed form, 0.1 dB", slow=True)
+@case(
+    "a mesh of 1.3 million triangles, physical optics",
+    "the sphere's closed form, 0.1 dB",
+    slow=True,
+)
 def _() -> str:
     import trimesh
 
     vertices, faces = rt.body.unit_sphere(8)
     mesh = trimesh.Trimesh(0.1 * vertices, faces, process=False)
     reference = complex(rt.rcs.sphere(0.1, 12e9, "po"))
-    ratio = complex(rt.scattering_length(mesh, [1e4, 0, 0], [1e4, 0, 0], 12e9, "physical-optics")[0]) / reference
+    ratio = (
+        complex(rt.scattering_length(mesh, [1e4, 0, 0], [1e4, 0, 0], 12e9, "physical-optics")[0])
+        / reference
+    )
     assert abs(20 * np.log10(abs(ratio))) < 0.1, ratio
     return f"{len(faces)} triangles, {20 * np.log10(abs(ratio)):+.4f} dB"
 
@@ -212,7 +265,10 @@ def _() -> str:
     offsets = whole.offsets.copy()
     joint = next(index for index, name in enumerate(whole.joints) if "knee" in name)
     offsets[joint] = 0.0
-    return refused(lambda: rt.Body.from_motion(dataclasses.replace(whole, offsets=offsets)), "(thigh|shank).*length")
+    return refused(
+        lambda: rt.Body.from_motion(dataclasses.replace(whole, offsets=offsets)),
+        "(thigh|shank).*length",
+    )
 
 
 @case("an ellipsoid of no thickness", "refused")
@@ -228,9 +284,12 @@ def _() -> str:
     for rung in TRACED:
         for antenna in ([4.0, 0, 0], [-3.0, 2.0, 1.0], [0, 0, -5.0]):
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", rt.ValidityWarning)  # the inner one alone would be small for 3 GHz
+                warnings.simplefilter(
+                    "ignore", rt.ValidityWarning
+                )  # the inner one alone would be small for 3 GHz
                 whole, one = (
-                    rt.scattering_length(target, antenna, antenna, 3e9, rung)[0] for target in (together(outer, inner), outer)
+                    rt.scattering_length(target, antenna, antenna, 3e9, rung)[0]
+                    for target in (together(outer, inner), outer)
                 )
             worst = max(worst, abs(whole / one - 1))
     assert worst < 1e-12, worst
@@ -256,7 +315,10 @@ def _() -> str:
 @case("Tx at Rx, and a nanometre from it", "the same, and the closed form")
 def _() -> str:
     tx = np.array([4.1, 0.0, 0.0])
-    there, beside = (rt.scattering_length(alone(0.1, 0.1, 0.1), tx, tx + d * BESIDE, 77e9)[0] for d in (0.0, 1e-8))
+    there, beside = (
+        rt.scattering_length(alone(0.1, 0.1, 0.1), tx, tx + d * BESIDE, 77e9)[0]
+        for d in (0.0, 1e-8)
+    )
     reference = along_axis(0.1, (0.1, 0.1), 4.0, 77e9)
     return worst_error([(complex(there), reference), (complex(beside), reference)], 1e-6)
 
@@ -271,7 +333,9 @@ def _() -> str:
 
 @case("nobody there: no ellipsoids, no frames", "refused")
 def _() -> str:
-    said = refused(lambda: rt.Ellipsoids(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3))), "at least 1")
+    said = refused(
+        lambda: rt.Ellipsoids(np.empty((0, 3)), np.empty((0, 3, 3)), np.empty((0, 3))), "at least 1"
+    )
     empty = {"root_positions": motion().root_positions[:0], "rotations": motion().rotations[:0]}
     refused(lambda: dataclasses.replace(motion(), **empty), "shape")
     return said
@@ -295,29 +359,44 @@ def _() -> str:
     return f"warned: {said}"
 
 
-@case("radar and person 10 km from the origin of coordinates", "as at the origin, on each of analytic, specular, fresnel")
+@case(
+    "radar and person 10 km from the origin of coordinates",
+    "as at the origin, on each of analytic, specular, fresnel",
+)
 def _() -> str:
     far = np.array([1e4, -3e3, 50.0])
     body = rt.Body.from_motion(place(motion(), duration_s=0.12))
     moved = rt.Body.from_motion(place(motion(), duration_s=0.12).shifted(far))
     radar = rt.Radar.preset("paper-77ghz")
-    there = dataclasses.replace(radar, position_m=tuple((np.asarray(radar.position_m) + far).tolist()))
+    there = dataclasses.replace(
+        radar, position_m=tuple((np.asarray(radar.position_m) + far).tolist())
+    )
     chirps = np.arange(0, 4000, 401)
     worst_length = worst_amplitude = 0.0
     for rung in (*MODELS, "fresnel"):
-        here, away = (build_model(rung, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved)))
+        here, away = (
+            build_model(rung, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved))
+        )
         worst_length = max(worst_length, float(np.abs(here.length - away.length).max()))
         largest = float(np.abs(here.amplitude).max())
-        worst_amplitude = max(worst_amplitude, float(np.abs(here.amplitude - away.amplitude).max()) / largest)
+        worst_amplitude = max(
+            worst_amplitude, float(np.abs(here.amplitude - away.amplitude).max()) / largest
+        )
     # 10 km has rounding of 2e-12 m; a part that is just hidden in one place must be hidden in the other.
     assert worst_length < 1e-10, worst_length
     assert worst_amplitude < 1e-6, worst_amplitude
     return f"lengths within {worst_length:.0e} m, amplitudes within {worst_amplitude:.0e}"
 
 
-@case("a recording made 10 km from its own origin", "placed before the radar, as one made at the origin")
+@case(
+    "a recording made 10 km from its own origin",
+    "placed before the radar, as one made at the origin",
+)
 def _() -> str:
-    poses = [rt.Body.from_motion(place(m, duration_s=0.12)).at([0.06]) for m in (motion(), motion().shifted([1e4, -3e3, 0.0]))]
+    poses = [
+        rt.Body.from_motion(place(m, duration_s=0.12)).at([0.06])
+        for m in (motion(), motion().shifted([1e4, -3e3, 0.0]))
+    ]
     error = float(np.abs(poses[0].centres - poses[1].centres).max())
     assert error < 1e-10, error
     return f"within {error:.0e} m"

@@ -30,7 +30,9 @@ SPEED_OF_LIGHT = 299_792_458.0
 FAR_M = 1e6
 
 
-def field(target: object, tx: Array, rx: Array, frequency: float, facets: int | None = None) -> NDArray[np.complex128]:
+def field(
+    target: object, tx: Array, rx: Array, frequency: float, facets: int | None = None
+) -> NDArray[np.complex128]:
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
     return facet_scattering(target, tx, rx, np.full(len(tx), frequency), facets=facets)  # type: ignore[arg-type]
 
@@ -57,19 +59,40 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
     for index, ka in enumerate(kas):
         frequency = ka * SPEED_OF_LIGHT / (2 * np.pi * 0.1)
         tx = FAR_M * directions(1 if quick or ka > 200 else 4, index)
-        ratio = field(alone(np.full(3, 0.1)), tx, tx, frequency) / rt.rcs.sphere(0.1, frequency, "po")
+        ratio = field(alone(np.full(3, 0.1)), tx, tx, frequency) / rt.rcs.sphere(
+            0.1, frequency, "po"
+        )
         worst = max(worst, float(np.abs(20 * np.log10(np.abs(ratio))).max()))
         complex_errors += list(ratio - 1)
     claim = "sphere of facets, ka 5 to 400"
-    cases, says = len(complex_errors), "a sphere of traced facets against physical optics' closed form, ka 5 to 400"
-    yield judged(claim, f"worst |dB| to PO's closed form, {cases} cases", "dB", worst, 0.1, key="sphere", says=says, cases=cases)
+    cases, says = (
+        len(complex_errors),
+        "a sphere of traced facets against physical optics' closed form, ka 5 to 400",
+    )
+    yield judged(
+        claim,
+        f"worst |dB| to PO's closed form, {cases} cases",
+        "dB",
+        worst,
+        0.1,
+        key="sphere",
+        says=says,
+        cases=cases,
+    )
     yield reported(claim, "rms complex error", "", rms(np.array(complex_errors)), key="sphere")
     try:
-        field(alone(np.full(3, 0.1)), FAR_M * directions(1, 0), FAR_M * directions(1, 0), 401 * SPEED_OF_LIGHT / (0.2 * np.pi))
+        field(
+            alone(np.full(3, 0.1)),
+            FAR_M * directions(1, 0),
+            FAR_M * directions(1, 0),
+            401 * SPEED_OF_LIGHT / (0.2 * np.pi),
+        )
         accepted = 1.0
     except InputError:
         accepted = 0.0
-    says = "beyond ka 400 a sphere of facets is refused unless their number is given (1: it was not)"
+    says = (
+        "beyond ka 400 a sphere of facets is refused unless their number is given (1: it was not)"
+    )
     quantity = "accepted without asking for its facets"
     yield judged("sphere of facets, ka 401", quantity, "", accepted, 0.0, key="sphere", says=says)
 
@@ -85,13 +108,37 @@ def plate_rows() -> Iterator[Row]:
         expected = float(10 * np.log10(4 * np.pi * 25.0**2 / wavelength**2))
         # The waves bend over it by 2 pi 2.5^2 / (lambda 1e6 m).
         says = "square plate of 5 m at 1 and 3 GHz by facets against 4 pi A² / λ²"
-        yield judged(claim, "cross-section to 4 pi A^2 / lambda^2", "dB", ours, 0.01, reference=expected, key="plate", says=says)
+        yield judged(
+            claim,
+            "cross-section to 4 pi A^2 / lambda^2",
+            "dB",
+            ours,
+            0.01,
+            reference=expected,
+            key="plate",
+            says=says,
+        )
         angle = np.radians(np.linspace(0.5, 30, 60))
         aslant = FAR_M * np.stack([np.cos(angle), np.sin(angle), np.zeros_like(angle)], axis=1)
-        lobes = 50 * np.sqrt(np.pi) / wavelength * np.cos(angle) * np.sinc(10 / wavelength * np.sin(angle))
+        lobes = (
+            50
+            * np.sqrt(np.pi)
+            / wavelength
+            * np.cos(angle)
+            * np.sinc(10 / wavelength * np.sin(angle))
+        )
         error = rms(np.abs(field(plate, aslant, aslant, frequency)) - np.abs(lobes)) / rms(lobes)
         says = "square plate of 5 m by facets, lobes to 30 degrees against sinc: rms over rms"
-        yield judged(claim, "lobes to 30 degrees, rms over rms", "", error, 1e-3, key="plate", says=says, cases=len(angle))
+        yield judged(
+            claim,
+            "lobes to 30 degrees, rms over rms",
+            "",
+            error,
+            1e-3,
+            key="plate",
+            says=says,
+            cases=len(angle),
+        )
 
 
 # -- quadrature -------------------------------------------------------------------------------------------------------
@@ -111,7 +158,9 @@ def ellipsoid_rows(quick: bool) -> Iterator[Row]:
                 side = rng.normal(size=3) * [0, 1, 1]
                 side *= apart / 2 / max(float(np.linalg.norm(side)), 1e-12)
                 tx, rx = (antenna + sign * side for sign in (1, -1))
-                expected = lit_points(tx @ frame, rx @ frame, axes, frequency).scattering_length(frequency)
+                expected = lit_points(tx @ frame, rx @ frame, axes, frequency).scattering_length(
+                    frequency
+                )
                 errors.append(field(alone(axes, frame), tx, rx, frequency, facets)[0] - expected)
                 fields.append(expected)
             claim = f"ellipsoids of the body at 4 m, {frequency / 1e9:g} GHz, {name}"
@@ -119,7 +168,9 @@ def ellipsoid_rows(quick: bool) -> Iterator[Row]:
             error = rms(np.array(errors)) / rms(np.array(fields))
             says = "parts of the body by facets at 4 m, 12 to 79 GHz, against physical optics by quadrature: rms complex error"
             quantity = f"{facets} facets: rms complex error to quadrature"
-            yield judged(claim, quantity, "", error, 0.02, key="ellipsoid", says=says, cases=len(errors))
+            yield judged(
+                claim, quantity, "", error, 0.02, key="ellipsoid", says=says, cases=len(errors)
+            )
 
 
 def shadow_rows(quick: bool) -> Iterator[Row]:
@@ -130,14 +181,28 @@ def shadow_rows(quick: bool) -> Iterator[Row]:
         errors = []
         for shift in radius + reach * np.linspace(-1.15, 1.15, 7 if quick else 25):
             occluder = np.array([-BEFORE_M, shift, 0.0])
-            both = rt.Ellipsoids([np.zeros(3), occluder], np.tile(np.eye(3), (2, 1, 1)), [TARGET, np.full(3, radius)])
+            both = rt.Ellipsoids(
+                [np.zeros(3), occluder], np.tile(np.eye(3), (2, 1, 1)), [TARGET, np.full(3, radius)]
+            )
             before = rt.Ellipsoids([occluder], [np.eye(3)], [np.full(3, radius)])
-            whole, front, free = (field(each, ANTENNA, ANTENNA, frequency, facets)[0] for each in (both, before, alone(TARGET)))
+            whole, front, free = (
+                field(each, ANTENNA, ANTENNA, frequency, facets)[0]
+                for each in (both, before, alone(TARGET))
+            )
             errors.append((whole - front) / free - target.field(occluder, radius))
         claim = "thigh behind the edge of a sphere, 14 GHz"
         quantity = f"{facets} facets: rms error of the field over the free one"
         says = "a thigh behind an edge by facets against a geometric shadow: rms error over the free field"
-        yield judged(claim, quantity, "", rms(np.array(errors)), 0.02, key="edge", says=says, cases=len(errors))
+        yield judged(
+            claim,
+            quantity,
+            "",
+            rms(np.array(errors)),
+            0.02,
+            key="edge",
+            says=says,
+            cases=len(errors),
+        )
 
 
 # -- laws -------------------------------------------------------------------------------------------------------------
@@ -147,12 +212,27 @@ def law_rows() -> Iterator[Row]:
     rng = np.random.default_rng(6)
     turn = Rotation.from_euler("z", 1.0).as_matrix()
     frames = Rotation.random(2, random_state=1).as_matrix()
-    centres, axes = np.array([[0.0, 0.4, 0.0], [0.1, -0.4, 0.1]]), np.array([[0.05, 0.07, 0.2], [0.1, 0.1, 0.1]])
-    target, turned = rt.Ellipsoids(centres, frames, axes), rt.Ellipsoids(centres @ turn.T, turn @ frames, axes)
+    centres, axes = (
+        np.array([[0.0, 0.4, 0.0], [0.1, -0.4, 0.1]]),
+        np.array([[0.05, 0.07, 0.2], [0.1, 0.1, 0.1]]),
+    )
+    target, turned = (
+        rt.Ellipsoids(centres, frames, axes),
+        rt.Ellipsoids(centres @ turn.T, turn @ frames, axes),
+    )
     tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.2, (20, 3))
     rx = tx + rng.normal(0, 0.2, (20, 3))
     here = field(target, tx, rx, 14e9, 5120)
-    parts = [field(rt.Ellipsoids(centres[i : i + 1], frames[i : i + 1], axes[i : i + 1]), tx, rx, 14e9, 5120) for i in (0, 1)]
+    parts = [
+        field(
+            rt.Ellipsoids(centres[i : i + 1], frames[i : i + 1], axes[i : i + 1]),
+            tx,
+            rx,
+            14e9,
+            5120,
+        )
+        for i in (0, 1)
+    ]
     others = {
         "Tx and Rx swapped": field(target, rx, tx, 14e9, 5120),
         "everything turned about the vertical": field(turned, tx @ turn.T, rx @ turn.T, 14e9, 5120),
@@ -162,11 +242,26 @@ def law_rows() -> Iterator[Row]:
         # Float64 all through; where shadows are asked for in float32 none of these has any.
         change = float(np.abs(there - here).max()) / rms(here)
         says = "facets: Tx and Rx swapped, all turned, parts added up: largest change"
-        yield judged("laws", f"{name}: largest change over rms", "", change, 1e-8, key="ellipsoid", says=says, cases=len(tx))
+        yield judged(
+            "laws",
+            f"{name}: largest change over rms",
+            "",
+            change,
+            1e-8,
+            key="ellipsoid",
+            says=says,
+            cases=len(tx),
+        )
 
 
 def measure(quick: bool) -> list[Row]:
-    return [*sphere_rows(quick), *plate_rows(), *ellipsoid_rows(quick), *shadow_rows(quick), *law_rows()]
+    return [
+        *sphere_rows(quick),
+        *plate_rows(),
+        *ellipsoid_rows(quick),
+        *shadow_rows(quick),
+        *law_rows(),
+    ]
 
 
 if __name__ == "__main__":

@@ -19,7 +19,19 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from occlusion import ANTENNA, BANDS, OCCLUDER_RADIUS_M, TARGET, Band, Passing, Target, beside_db, db_mean, one, rms
+from occlusion import (
+    ANTENNA,
+    BANDS,
+    OCCLUDER_RADIUS_M,
+    TARGET,
+    Band,
+    Passing,
+    Target,
+    beside_db,
+    db_mean,
+    one,
+    rms,
+)
 from physical_optics import lit_points, wave_number
 from rows import Row, judged, main, reported
 from scipy.spatial.transform import Rotation
@@ -30,7 +42,11 @@ from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-TARGETS = {"thigh": TARGET, "head": np.array([0.06, 0.06, 0.1]), "torso": np.array([0.1, 0.12, 0.25])}
+TARGETS = {
+    "thigh": TARGET,
+    "head": np.array([0.06, 0.06, 0.1]),
+    "torso": np.array([0.1, 0.12, 0.25]),
+}
 OCCLUDERS = {
     "plate": np.array([0.005, 0.8, 0.8]),
     "torso": np.array([0.1, 0.14, 0.3]),
@@ -43,7 +59,9 @@ SHADOW_RAYS = (16, 64, 256)
 # -- the reference --------------------------------------------------------------------------------------------------
 
 
-def hidden(points: Array, antenna: Array, centre: Array, frame: Array, axes: Array) -> NDArray[np.bool_]:
+def hidden(
+    points: Array, antenna: Array, centre: Array, frame: Array, axes: Array
+) -> NDArray[np.bool_]:
     """Whether the way from the antenna to each point (n, 3) goes through an ellipsoid."""
     a, p = (antenna - centre) @ frame / axes, (points - centre) @ frame / axes
     d = p - a
@@ -63,7 +81,15 @@ class Lit:
     contribution: Complex  # (frequency, point)
 
     @classmethod
-    def of(cls, pair: tuple[Array, Array], centre: Array, frame: Array, axes: Array, frequencies: Array, density: float) -> Lit:
+    def of(
+        cls,
+        pair: tuple[Array, Array],
+        centre: Array,
+        frame: Array,
+        axes: Array,
+        frequencies: Array,
+        density: float,
+    ) -> Lit:
         tx, rx = ((antenna - centre) @ frame for antenna in pair)
         quadrature = lit_points(tx, rx, axes, float(frequencies.max()), density=density)
         k = np.array([wave_number(float(frequency)) for frequency in frequencies])
@@ -113,14 +139,27 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                     reach = 0.875 * float(np.linalg.norm(target * across))
                     alone = one(scene(target, occluder, np.zeros(3), turn), 0)
                     free = ours(alone, frequencies)
-                    lit = Lit.of((ANTENNA, ANTENNA), np.zeros(3), alone.frames[0], target, frequencies, density)
-                    for shift in extent + reach * (np.linspace(-1.1, 1.1, 9 if quick else 21) + rng.uniform(-0.05, 0.05)):
-                        ellipsoids = scene(target, occluder, np.array([-0.5, 0.0, 0.0]) + shift * across, turn)
+                    lit = Lit.of(
+                        (ANTENNA, ANTENNA),
+                        np.zeros(3),
+                        alone.frames[0],
+                        target,
+                        frequencies,
+                        density,
+                    )
+                    for shift in extent + reach * (
+                        np.linspace(-1.1, 1.1, 9 if quick else 21) + rng.uniform(-0.05, 0.05)
+                    ):
+                        ellipsoids = scene(
+                            target, occluder, np.array([-0.5, 0.0, 0.0]) + shift * across, turn
+                        )
                         optics = lit.share(one(ellipsoids, 1))
                         partly = (np.abs(optics) > 1e-9) & (np.abs(optics - 1) > 1e-9)
                         before = ours(one(ellipsoids, 1), frequencies)
                         for rays in counts:
-                            wrong = np.abs((ours(ellipsoids, frequencies, rays) - before) / free - optics)
+                            wrong = np.abs(
+                                (ours(ellipsoids, frequencies, rays) - before) / free - optics
+                            )
                             everything[rays].append(wrong)
                             if rays == 64:
                                 errors.append(wrong[partly])
@@ -128,15 +167,27 @@ def edge_rows(quick: bool) -> Iterator[Row]:
             claim = f"{band.name}, edge of a {name}"
             wrong = np.concatenate(errors)
             quantity = f"rms complex error, {len(wrong)} cases partly covered"
-            says = "knife edge and limbs across a glint by `fresnel`, 12 and 77 GHz: rms complex error"
-            yield judged(claim, quantity, "", rms(wrong), EDGE_ERROR, key="edge", says=says, cases=len(wrong))
+            says = (
+                "knife edge and limbs across a glint by `fresnel`, 12 and 77 GHz: rms complex error"
+            )
+            yield judged(
+                claim, quantity, "", rms(wrong), EDGE_ERROR, key="edge", says=says, cases=len(wrong)
+            )
             yield reported(claim, "worst of them", "", float(wrong.max()), key="edge")
             yield reported(
-                claim, "rms complex error of the better of all and nothing", "", rms(np.concatenate(rough)), key="edge"
+                claim,
+                "rms complex error of the better of all and nothing",
+                "",
+                rms(np.concatenate(rough)),
+                key="edge",
             )
         for rays, found in everything.items():
             yield reported(
-                f"{band.name}, edges", f"{rays} shadow rays: rms complex error", "", rms(np.concatenate(found)), key="edge"
+                f"{band.name}, edges",
+                f"{rays} shadow rays: rms complex error",
+                "",
+                rms(np.concatenate(found)),
+                key="edge",
             )
 
 
@@ -171,7 +222,9 @@ def array_rows(quick: bool) -> Iterator[Row]:
                 place[1] += OCCLUDERS["torso"][1] * rng.choice([-1.0, 1.0])
                 pose = scene(target, OCCLUDERS["torso"], place, rng.uniform(-0.3, 0.3, 3))
                 # Straight before the radar.
-                pose = rt.Ellipsoids(pose.centres + np.array([0.0, 1.0, 1.0]), pose.frames, pose.semi_axes)
+                pose = rt.Ellipsoids(
+                    pose.centres + np.array([0.0, 1.0, 1.0]), pose.frames, pose.semi_axes
+                )
                 echoes = Fresnel(radar, Standing(pose)).echoes(np.arange(radar.n_tx))  # type: ignore[arg-type]
                 alone = Standing(one(pose, 0), part_names=("target",))
                 free = Fresnel(radar, alone).echoes(np.arange(radar.n_tx))  # type: ignore[arg-type]
@@ -181,13 +234,23 @@ def array_rows(quick: bool) -> Iterator[Row]:
                 for tx in (0, 5, 11) if quick else (0, 2, 5, 6, 11):
                     for rx in (0, 7) if quick else (0, 3, 7):
                         pair = (radar.tx[tx], radar.rx[radar.rx_of_tx[tx, rx]])
-                        lit = Lit.of(pair, pose.centres[0], pose.frames[0], target, middle_hz, density)
+                        lit = Lit.of(
+                            pair, pose.centres[0], pose.frames[0], target, middle_hz, density
+                        )
                         errors.append(got[tx, rx] - lit.share(one(pose, 1))[0])
         claim = f"{preset}, edge of a torso before the array"
         quantity, error = f"rms complex error, {len(errors)} channels", rms(np.array(errors))
         says = "an edge before the array by `fresnel`, channel by channel: rms complex error"
-        yield judged(claim, quantity, "", error, EDGE_ERROR, key="edge", says=says, cases=len(errors))
-        yield reported(claim, "rms difference of channels from their mean", "", rms(np.concatenate(spreads)), key="edge")
+        yield judged(
+            claim, quantity, "", error, EDGE_ERROR, key="edge", says=says, cases=len(errors)
+        )
+        yield reported(
+            claim,
+            "rms difference of channels from their mean",
+            "",
+            rms(np.concatenate(spreads)),
+            key="edge",
+        )
 
 
 # -- in time --------------------------------------------------------------------------------------------------------
@@ -202,7 +265,9 @@ def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
     # Instants over one interval between anchors.
     for late in np.linspace(0, 10e-3, 3 if quick else 6)[:-1]:
         passing = Passing(speed, middle.instant + late)
-        optics = np.array([target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)])
+        optics = np.array(
+            [target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)]
+        )
         echoes = Fresnel(band.radar, passing).echoes(np.arange(band.cycles))  # type: ignore[arg-type]
         amplitude = echoes.amplitude[len(echoes.frequency) // 2, :, 0, 0].conj()
         free = Fresnel(band.radar, Passing(speed, -1.0)).echoes(np.arange(1))  # type: ignore[arg-type]
@@ -217,8 +282,20 @@ def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
     says = "power beside the Doppler line while an edge passes, over that of physical optics"
     yield judged(claim, quantity, "dB", above, 3.0, key="edge", says=says, cases=len(floors))
     yield reported(claim, "worst instant: power beside the line", "dB", max(floors), key="edge")
-    error, says = rms(np.array(errors)), "an edge passing by `fresnel`, over a frame: rms complex error"
-    yield judged(claim, "rms complex error over the frame", "", error, EDGE_ERROR, key="edge", says=says, cases=len(errors))
+    error, says = (
+        rms(np.array(errors)),
+        "an edge passing by `fresnel`, over a frame: rms complex error",
+    )
+    yield judged(
+        claim,
+        "rms complex error over the frame",
+        "",
+        error,
+        EDGE_ERROR,
+        key="edge",
+        says=says,
+        cases=len(errors),
+    )
 
 
 def measure(quick: bool) -> list[Row]:
@@ -230,4 +307,9 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Partly covered parts on `fresnel` against physical optics with a geometric shadow.", measure))
+    sys.exit(
+        main(
+            "Partly covered parts on `fresnel` against physical optics with a geometric shadow.",
+            measure,
+        )
+    )

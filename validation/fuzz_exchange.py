@@ -44,7 +44,13 @@ def _zarrs() -> list[bytes]:
         folder = Path(name) / "if.zarr"
         zarr.create_array(folder, data=IF.reshape(2, 2, 4), chunks=(2, 2, 4), compressors=None)
         return [
-            b"CUT".join((json.dumps(SUMMARY).encode(), (folder / "zarr.json").read_bytes(), (folder / "c/0/0/0").read_bytes()))
+            b"CUT".join(
+                (
+                    json.dumps(SUMMARY).encode(),
+                    (folder / "zarr.json").read_bytes(),
+                    (folder / "c/0/0/0").read_bytes(),
+                )
+            )
         ]
 
 
@@ -67,7 +73,9 @@ def _netcdf(folder: Path, data: bytes) -> None:
     read_if(hdf5(folder / "x.nc", NETCDF, data))
 
 
-def _cloud(ending: str, make: Callable[[Path, bytes], Path] = written) -> Callable[[Path, bytes], None]:
+def _cloud(
+    ending: str, make: Callable[[Path, bytes], Path] = written
+) -> Callable[[Path, bytes], None]:
     def read(folder: Path, data: bytes) -> None:
         cloud = read_cloud(make(folder / f"x{ending}", data))
         assert cloud.values.shape[1] == len(cloud.names) == len(cloud.units)
@@ -78,25 +86,42 @@ def _cloud(ending: str, make: Callable[[Path, bytes], Path] = written) -> Callab
 def _clouds(ending: str) -> list[bytes]:
     with tempfile.TemporaryDirectory() as name:
         source, out = Path(name) / "x.npz", Path(name) / f"y{ending}"
-        np.savez(source, points=POINTS, axes=np.array(["x", "y", "z"]), units=np.array(["m"] * 3), **COLUMNS)
+        np.savez(
+            source,
+            points=POINTS,
+            axes=np.array(["x", "y", "z"]),
+            units=np.array(["m"] * 3),
+            **COLUMNS,
+        )
         export(source, out)
         return [out.read_bytes()]
 
 
 TARGETS = {
     "if.zarr": Target(
-        _zarr, _zarrs, JSON + " CUT complex64 float32 shape chunk_shape bytes gzip zstd crc32c blosc sharding_indexed"
+        _zarr,
+        _zarrs,
+        JSON
+        + " CUT complex64 float32 shape chunk_shape bytes gzip zstd crc32c blosc sharding_indexed",
     ),
     "int16": Target(_int16, _int16s, JSON + " CUT shape scale radar " + RADAR_WORDS),
     "mat": Target(_mat, lambda: [as_text(MAT)], ARRAYS, most_bytes=8192),
-    "netcdf": Target(_netcdf, lambda: [as_text({name: NETCDF[name] for name in ("if_real", "if_imag")})], ARRAYS),
-    "cloud npz": Target(_cloud(".npz", lambda path, data: npz(path, SPATIAL, data)), lambda: [as_text(SPATIAL)], ARRAYS),
+    "netcdf": Target(
+        _netcdf, lambda: [as_text({name: NETCDF[name] for name in ("if_real", "if_imag")})], ARRAYS
+    ),
+    "cloud npz": Target(
+        _cloud(".npz", lambda path, data: npz(path, SPATIAL, data)),
+        lambda: [as_text(SPATIAL)],
+        ARRAYS,
+    ),
     "cloud ply": Target(
         _cloud(".ply"),
         lambda: _clouds(".ply"),
         "element vertex face property double float uchar list end_header comment x = y [m]",
     ),
     "cloud pcd": Target(
-        _cloud(".pcd"), lambda: _clouds(".pcd"), "FIELDS SIZE TYPE COUNT POINTS WIDTH DATA binary F I U 4 8 1 # x = y [m]"
+        _cloud(".pcd"),
+        lambda: _clouds(".pcd"),
+        "FIELDS SIZE TYPE COUNT POINTS WIDTH DATA binary F I U 4 8 1 # x = y [m]",
     ),
 }

@@ -63,7 +63,11 @@ class Piece:
         if not self.is_claim:
             return npy(self.array)
         buffer = io.BytesIO()
-        head = {"descr": np.lib.format.dtype_to_descr(self.kind), "fortran_order": False, "shape": self.shape}
+        head = {
+            "descr": np.lib.format.dtype_to_descr(self.kind),
+            "fortran_order": False,
+            "shape": self.shape,
+        }
         np.lib.format.write_array_header_1_0(buffer, head)
         return buffer.getvalue() + self.values.tobytes()
 
@@ -76,7 +80,9 @@ def pieces(text: bytes, good: Arrays) -> dict[str, Piece]:
     """
     found = {name: Piece(array.dtype, array.shape, array.ravel()) for name, array in good.items()}
     for line in text.split(b"\n"):
-        with suppress(ValueError, TypeError, AttributeError, OverflowError, RecursionError, RuntimeWarning):
+        with suppress(
+            ValueError, TypeError, AttributeError, OverflowError, RecursionError, RuntimeWarning
+        ):
             name, *told = json.loads(line)
             if told:
                 found |= {name: _piece(*told)} if name.isprintable() else {}
@@ -90,14 +96,22 @@ def _piece(kind: str, shape: list[int], values: list[Any]) -> Piece:
         made = np.dtype(kind)
     except SyntaxError:  # NumPy reads words with commas as Python
         raise ValueError from None
-    if made.hasobject or made.itemsize > 4096 or len(shape) > 6 or not all(0 <= length < 2**40 for length in shape):
+    if (
+        made.hasobject
+        or made.itemsize > 4096
+        or len(shape) > 6
+        or not all(0 <= length < 2**40 for length in shape)
+    ):
         raise ValueError
     return Piece(made, tuple(map(int, shape)), np.array(values).astype(made).ravel()[:MOST_VALUES])
 
 
 def as_text(arrays: Arrays) -> bytes:
     """What `pieces` reads."""
-    told = ((name, _name(array.dtype), array.shape, array.ravel().tolist()) for name, array in arrays.items())
+    told = (
+        (name, _name(array.dtype), array.shape, array.ravel().tolist())
+        for name, array in arrays.items()
+    )
     return b"\n".join(json.dumps(one).encode() for one in told)
 
 
@@ -115,7 +129,9 @@ def npz(path: Path, good: Arrays, text: bytes = b"") -> Path:
 def hdf5(path: Path, good: Arrays, text: bytes = b"") -> Path:
     with h5py.File(path, "w") as file:
         for name, piece in pieces(text, good).items():
-            with suppress(TypeError, ValueError, KeyError, OSError, RuntimeError):  # not of a kind or name that HDF5 knows
+            with suppress(
+                TypeError, ValueError, KeyError, OSError, RuntimeError
+            ):  # not of a kind or name that HDF5 knows
                 if piece.kind.kind == "U" and not piece.shape:
                     file.attrs[name] = str(piece.array)
                 elif piece.is_claim:

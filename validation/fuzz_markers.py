@@ -35,7 +35,12 @@ def _standing() -> np.ndarray:
 
 def _parameter(group: int, name: str, kind: int, sizes: tuple[int, ...], data: bytes) -> bytes:
     body = struct.pack("<bB", kind, len(sizes)) + bytes(sizes) + data + b"\0"
-    return struct.pack("<bb", len(name), group) + name.encode() + struct.pack("<h", len(body) + 2) + body
+    return (
+        struct.pack("<bb", len(name), group)
+        + name.encode()
+        + struct.pack("<h", len(body) + 2)
+        + body
+    )
 
 
 def c3d(in_floats: bool, up: str = "+Z") -> bytes:
@@ -54,8 +59,12 @@ def c3d(in_floats: bool, up: str = "+Z") -> bytes:
         ("LABELS", -1, (4, count), b"".join(name.ljust(4).encode() for name in NEEDED)),
     ):
         parameters += _parameter(1, name, kind, sizes, data)
-    parameters = (struct.pack("<BBBB", 1, 80, 2, 84) + parameters + bytes(2)).ljust(2 * BLOCK, b"\0")
-    head = struct.pack("<BBHHHHHfHHf", 2, 80, count, 0, 1, FRAMES, 10, scale, 4, 0, RATE_HZ).ljust(BLOCK, b"\0")
+    parameters = (struct.pack("<BBBB", 1, 80, 2, 84) + parameters + bytes(2)).ljust(
+        2 * BLOCK, b"\0"
+    )
+    head = struct.pack("<BBHHHHHfHHf", 2, 80, count, 0, 1, FRAMES, 10, scale, 4, 0, RATE_HZ).ljust(
+        BLOCK, b"\0"
+    )
     points = np.zeros((FRAMES, count, 4), dtype="<f4" if in_floats else "<i2")
     points[..., :3] = _standing() if in_floats else np.rint(_standing() / scale)
     return head + parameters + points.tobytes()

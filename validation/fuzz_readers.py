@@ -27,7 +27,12 @@ from typing import Any, NoReturn
 
 LIMIT_S = 4.0
 LIMIT_BYTES = 2 << 30
-PARTS = ("fuzz_exchange", "fuzz_markers", "fuzz_runs", "fuzz_targets")  # where targets are; each is imported only for its own
+PARTS = (
+    "fuzz_exchange",
+    "fuzz_markers",
+    "fuzz_runs",
+    "fuzz_targets",
+)  # where targets are; each is imported only for its own
 EVERY = 200  # inputs between two reports of a process, which ends without a word
 
 
@@ -65,14 +70,19 @@ def fuzz(name: str, part: str, seconds: int, corpus: Path, report: Path) -> NoRe
     for number, seed in enumerate(target.seeds()):
         (folder / f"seed-{number}").write_bytes(seed)
     words = corpus / f"{folder.name}.dict"
-    words.write_text("# words\n" + "".join(f'"{_escaped(word)}"\n' for word in dict.fromkeys(target.words.split())))
+    words.write_text(
+        "# words\n"
+        + "".join(f'"{_escaped(word)}"\n' for word in dict.fromkeys(target.words.split()))
+    )
     work = Path(tempfile.mkdtemp(prefix="rtradar-fuzz-"))
     found: dict[str, dict[str, str]] = {}
     state = {"inputs": 0, "taken": 0, "slowest_s": 0.0}
     began = time.monotonic()
 
     def tell() -> None:
-        report.write_text(json.dumps({**state, "seconds": time.monotonic() - began, "found": found}))
+        report.write_text(
+            json.dumps({**state, "seconds": time.monotonic() - began, "found": found})
+        )
 
     def one(data: bytes) -> None:
         state["inputs"] += 1
@@ -98,21 +108,42 @@ def fuzz(name: str, part: str, seconds: int, corpus: Path, report: Path) -> NoRe
     warnings.simplefilter("ignore", ValidityWarning)
     used = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
     resource.setrlimit(resource.RLIMIT_AS, (used + LIMIT_BYTES, resource.RLIM_INFINITY))
-    options = [f"-max_total_time={seconds}", f"-max_len={target.most_bytes}", f"-dict={words}", "-timeout=120", "-rss_limit_mb=0"]
-    atheris.Setup([sys.argv[0], *options, "-verbosity=0", f"-artifact_prefix={folder}-end-", str(folder)], one)
+    options = [
+        f"-max_total_time={seconds}",
+        f"-max_len={target.most_bytes}",
+        f"-dict={words}",
+        "-timeout=120",
+        "-rss_limit_mb=0",
+    ]
+    atheris.Setup(
+        [sys.argv[0], *options, "-verbosity=0", f"-artifact_prefix={folder}-end-", str(folder)], one
+    )
     tell()
     atheris.Fuzz()
     raise SystemExit(0)
 
 
 def _escaped(word: str) -> str:
-    return "".join(letter if letter.isascii() and letter.isalnum() else f"\\x{ord(letter):02x}" for letter in word)
+    return "".join(
+        letter if letter.isascii() and letter.isalnum() else f"\\x{ord(letter):02x}"
+        for letter in word
+    )
 
 
-def _keep(found: dict[str, dict[str, str]], folder: Path, error: BaseException, data: bytes) -> None:
+def _keep(
+    found: dict[str, dict[str, str]], folder: Path, error: BaseException, data: bytes
+) -> None:
     """One of each kind: by its type and the last line of rtradar that it went through."""
-    frames = [frame for frame in traceback.extract_tb(error.__traceback__) if "/rtradar/" in frame.filename]
-    where = f"{frames[-1].filename.split('/rtradar/')[-1]}:{frames[-1].lineno}" if frames else "the target"
+    frames = [
+        frame
+        for frame in traceback.extract_tb(error.__traceback__)
+        if "/rtradar/" in frame.filename
+    ]
+    where = (
+        f"{frames[-1].filename.split('/rtradar/')[-1]}:{frames[-1].lineno}"
+        if frames
+        else "the target"
+    )
     key = f"{type(error).__name__} at {where}"
     if key not in found:
         file = folder.parent / f"found-{folder.name}-{len(found)}"
@@ -122,9 +153,16 @@ def _keep(found: dict[str, dict[str, str]], folder: Path, error: BaseException, 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--minutes", type=float, default=18.0, help="of all readers together (default: 18)")
+    parser.add_argument(
+        "--minutes", type=float, default=18.0, help="of all readers together (default: 18)"
+    )
     parser.add_argument("--only", metavar="A,B,...", help="these readers")
-    parser.add_argument("--corpus", type=Path, metavar="DIR", help="what was learned, and what was found (default: a new folder)")
+    parser.add_argument(
+        "--corpus",
+        type=Path,
+        metavar="DIR",
+        help="what was learned, and what was found (default: a new folder)",
+    )
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the findings there")
     parser.add_argument("--reader", help=argparse.SUPPRESS)
     parser.add_argument("--part", help=argparse.SUPPRESS)
@@ -148,13 +186,21 @@ def main() -> int:
             sys.exit(f"{name}: {done.stderr.strip() or done.stdout.strip()}")
         result = results[name] = json.loads(report.read_text())
         if done.returncode:
-            result["found"][f"the process ended with {done.returncode}"] = {"message": done.stderr[-300:], "file": ""}
+            result["found"][f"the process ended with {done.returncode}"] = {
+                "message": done.stderr[-300:],
+                "file": "",
+            }
         minutes, slowest = result["seconds"] / 60, result["slowest_s"]
-        print(f"{name:18} {result['inputs']:9d} {result['taken']:8d} {minutes:8.2f} {slowest:6.2f} s  {len(result['found'])}")
+        print(
+            f"{name:18} {result['inputs']:9d} {result['taken']:8d} {minutes:8.2f} {slowest:6.2f} s  {len(result['found'])}"
+        )
         for what, told in result["found"].items():
             print(f"    {what}: {told['message']}  {told['file']}")
         sys.stdout.flush()
-    inputs, hours = sum(one["inputs"] for one in results.values()), sum(one["seconds"] for one in results.values()) / 3600
+    inputs, hours = (
+        sum(one["inputs"] for one in results.values()),
+        sum(one["seconds"] for one in results.values()) / 3600,
+    )
     found = sum(len(one["found"]) for one in results.values())
     print(f"{inputs} inputs in {hours:.2f} h: {found} found; see {corpus}")
     if options.json:

@@ -82,7 +82,17 @@ TARGETS = {
         lambda: [json.dumps(SUMMARY).encode()],
         JSON + RADAR_WORDS,
     ),
-    "view.npz": Target(_look(lambda folder, data: npz(folder / "view.npz", MOMENTS, data)), lambda: [as_text(MOMENTS)], ARRAYS),
-    "maps.h5": Target(_look(lambda folder, data: hdf5(folder / "maps.h5", MAPS, data)), lambda: [as_text(MAPS)], ARRAYS),
-    "view clouds": Target(_look(_both_clouds), lambda: [as_text(RDT) + b"CUT" + as_text(SPATIAL)], ARRAYS),
+    "view.npz": Target(
+        _look(lambda folder, data: npz(folder / "view.npz", MOMENTS, data)),
+        lambda: [as_text(MOMENTS)],
+        ARRAYS,
+    ),
+    "maps.h5": Target(
+        _look(lambda folder, data: hdf5(folder / "maps.h5", MAPS, data)),
+        lambda: [as_text(MAPS)],
+        ARRAYS,
+    ),
+    "view clouds": Target(
+        _look(_both_clouds), lambda: [as_text(RDT) + b"CUT" + as_text(SPATIAL)], ARRAYS
+    ),
 }

@@ -189,7 +189,10 @@ WORDS = {
     "bvh": "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION Frames: Frame Time: Xposition Yposition Zposition Zrotation "
     "Xrotation Yrotation { } 1e308 1e-320 1e-300 1e20 1e-9 \xb2",
     "toml": 'true false inf nan -inf = [ ] [[ ]] { } """ 1e308 0xffffffffffffffffffff 1979-05-27T07:32:00Z '
-    + " ".join(line.split(" = ")[0].strip("[]{ ") for line in (RADAR + ANTENNAS + DIVISION + SCENE + SPEC).splitlines())
+    + " ".join(
+        line.split(" = ")[0].strip("[]{ ")
+        for line in (RADAR + ANTENNAS + DIVISION + SCENE + SPEC).splitlines()
+    )
     + " tdm cosine dipole isotropic pairs v",
     "json": 'null true false NaN Infinity 1e999 -1 {} [] "" 99999999999999999999 "../x" [[[[ : ,',
     "ply": "ply format ascii 1.0 binary_little_endian binary_big_endian element vertex face edge property list uchar int float "
@@ -232,7 +235,14 @@ def _bvh(folder: Path, data: bytes) -> None:
 def _radar(folder: Path, data: bytes) -> None:
     radar = Radar.load(written(folder / "x.toml", data))
     assert np.isfinite(radar.tx_offset_hz).all()
-    assert np.isfinite([radar.receiver_rate_hz, radar.occupied_bandwidth_hz, radar.max_velocity_mps, radar.max_angle_deg]).all()
+    assert np.isfinite(
+        [
+            radar.receiver_rate_hz,
+            radar.occupied_bandwidth_hz,
+            radar.max_velocity_mps,
+            radar.max_angle_deg,
+        ]
+    ).all()
     with suppress(InputError):  # not stated
         assert radar.watts_per_m2 + radar.noise_power_w > 0
     for antenna in filter(None, (radar.tx_antenna, radar.rx_antenna)):
@@ -278,7 +288,10 @@ def _array(folder: Path, data: bytes) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         for name, content in zip(("points.npy", "spatial.npy", "about.npy"), parts, strict=False):
-            archive.writestr(name, content if name != "about.npy" else npy(np.frombuffer(content, dtype=np.uint8)))
+            archive.writestr(
+                name,
+                content if name != "about.npy" else npy(np.frombuffer(content, dtype=np.uint8)),
+            )
         archive.comment = b"0" * 64
     body = buffer.getvalue()[:-64]
     _cloud(folder, body + hashlib.sha256(body).hexdigest().encode())
@@ -293,7 +306,12 @@ def _pickled(folder: Path, data: bytes) -> None:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr("x/data.pkl", data)
-        for name, content in (("version", b"3\n"), ("byteorder", b"little"), ("data/0", bytes(4)), ("data/1", bytes(4))):
+        for name, content in (
+            ("version", b"3\n"),
+            ("byteorder", b"little"),
+            ("data/0", bytes(4)),
+            ("data/1", bytes(4)),
+        ):
             archive.writestr(f"x/{name}", content)
     _checkpoint(folder, buffer.getvalue())
 
@@ -324,7 +342,9 @@ def _mesh(ending: str) -> Callable[[Path, bytes], None]:
 
 
 def _sample() -> tuple[Sample, np.ndarray]:
-    return Sample(np.arange(6.0).reshape(2, 3), "walk", {"subject": "she", "seed": 3}), np.zeros((1, 3))
+    return Sample(np.arange(6.0).reshape(2, 3), "walk", {"subject": "she", "seed": 3}), np.zeros(
+        (1, 3)
+    )
 
 
 def _samples() -> list[bytes]:
@@ -334,14 +354,21 @@ def _samples() -> list[bytes]:
 
 
 def _arrays() -> list[bytes]:
-    about = json.dumps({"format": 1, "label": "walk", "provenance": {"subject": "she", "seed": 3}}).encode()
+    about = json.dumps(
+        {"format": 1, "label": "walk", "provenance": {"subject": "she", "seed": 3}}
+    ).encode()
     return [b"CUT".join((npy(np.arange(6.0).reshape(2, 3)), npy(np.zeros((0, 3))), about))]
 
 
 def _checkpoints(only_pickle: bool = False) -> list[bytes]:
     weights = torch.nn.Linear(1, 1)
     optimiser = torch.optim.AdamW(weights.parameters())
-    content = {"network": weights.state_dict(), "optimiser": optimiser.state_dict(), "epochs": 1, "history": [{"rate": 1.0}]}
+    content = {
+        "network": weights.state_dict(),
+        "optimiser": optimiser.state_dict(),
+        "epochs": 1,
+        "history": [{"rate": 1.0}],
+    }
     buffer = io.BytesIO()
     torch.save(content, buffer)
     if not only_pickle:
@@ -351,14 +378,37 @@ def _checkpoints(only_pickle: bool = False) -> list[bytes]:
 
 
 def _outcomes() -> list[bytes]:
-    rows = {"rate": 1.0, "train_loss": 1.0, "train_accuracy": 1.0, "test_loss": 1.0, "test_accuracy": 1.0, "seconds": 1.0}
-    lists = {"indices": [0, 1], "truth": [0, 1], "predicted": [0, 0], "tested_on": ["", ""], "recordings": ["a", "b"]}
+    rows = {
+        "rate": 1.0,
+        "train_loss": 1.0,
+        "train_accuracy": 1.0,
+        "test_loss": 1.0,
+        "test_accuracy": 1.0,
+        "seconds": 1.0,
+    }
+    lists = {
+        "indices": [0, 1],
+        "truth": [0, 1],
+        "predicted": [0, 0],
+        "tested_on": ["", ""],
+        "recordings": ["a", "b"],
+    }
     return [json.dumps({"name": "fold 1", "trained_on": "", **lists, "history": [rows]}).encode()]
 
 
 def _plans() -> list[bytes]:
-    plan = {"data": "", "clouds": 2, "fingerprint": "0", "classes": ["a", "b"], "recipe": LEAN.as_dict()}
-    return [json.dumps({**plan, "split": "folds", "folds": None, "seed": 0, "trainings": ["fold 1"]}).encode()]
+    plan = {
+        "data": "",
+        "clouds": 2,
+        "fingerprint": "0",
+        "classes": ["a", "b"],
+        "recipe": LEAN.as_dict(),
+    }
+    return [
+        json.dumps(
+            {**plan, "split": "folds", "folds": None, "seed": 0, "trainings": ["fold 1"]}
+        ).encode()
+    ]
 
 
 def _meshes(ending: str) -> list[bytes]:
@@ -382,7 +432,10 @@ def _people() -> list[bytes]:
     found = [(ASF + "\0" + AMC).encode()]
     for asf in sorted(Path(root).rglob("*.asf"))[:4] if root else []:
         takes = sorted(asf.parent.glob(f"{asf.stem.split('_')[0]}_*.amc"))[:1]
-        found += [asf.read_bytes() + b"\0" + b"\n".join(amc.read_bytes().split(b"\n")[:64]) + b"\n" for amc in takes]
+        found += [
+            asf.read_bytes() + b"\0" + b"\n".join(amc.read_bytes().split(b"\n")[:64]) + b"\n"
+            for amc in takes
+        ]
     return found
 
 
@@ -391,7 +444,12 @@ def _short_bvh() -> list[bytes]:
     found = []
     for data in recorded(".bvh", 10**6):
         head, _, rest = data.partition(b"Frame Time:")
-        found.append(head[: head.rindex(b"Frames:")] + b"Frames: 3\nFrame Time:" + b"\n".join(rest.split(b"\n")[:4]) + b"\n")
+        found.append(
+            head[: head.rindex(b"Frames:")]
+            + b"Frames: 3\nFrame Time:"
+            + b"\n".join(rest.split(b"\n")[:4])
+            + b"\n"
+        )
     return [BVH.encode(), *found]
 
 
@@ -400,12 +458,16 @@ TARGETS = {
     "amc": Target(_amc, lambda: [AMC.encode()], WORDS["amc"]),
     "asf+amc": Target(_person, _people, WORDS["asf"] + " " + WORDS["amc"], 40_000),
     "bvh": Target(_bvh, _short_bvh, WORDS["bvh"], 20_000),
-    "radar": Target(_radar, lambda: [RADAR.encode(), ANTENNAS.encode(), DIVISION.encode()], WORDS["toml"]),
+    "radar": Target(
+        _radar, lambda: [RADAR.encode(), ANTENNAS.encode(), DIVISION.encode()], WORDS["toml"]
+    ),
     "scene": Target(_scene, lambda: [SCENE.encode()], WORDS["toml"]),
     "spec": Target(_spec, lambda: [SPEC.encode()], WORDS["toml"]),
     "collection.json": Target(_index, lambda: [b'{"format": 1, "samples": ["a"]}'], WORDS["json"]),
     "cloud": Target(_cloud, _samples),
-    "cloud arrays": Target(_array, _arrays, WORDS["json"] + " CUT '<f8' '|O' '<U9' fortran_order descr shape"),
+    "cloud arrays": Target(
+        _array, _arrays, WORDS["json"] + " CUT '<f8' '|O' '<U9' fortran_order descr shape"
+    ),
     "checkpoint": Target(_checkpoint, _checkpoints, most_bytes=8192),
     "checkpoint pickle": Target(_pickled, lambda: _checkpoints(only_pickle=True), WORDS["json"]),
     "plan.json": Target(_plan, _plans, WORDS["json"]),

@@ -37,7 +37,9 @@ COMPARED = slice(None, None, 16)
 REPEATS = 3
 
 
-def block(radar: Radar, chirps: int, nodes: int, constant: int, count: int, rng: np.random.Generator) -> Echoes:
+def block(
+    radar: Radar, chirps: int, nodes: int, constant: int, count: int, rng: np.random.Generator
+) -> Echoes:
     """Echoes that stand still, so that nothing but the sum is looked at, anywhere in the band; so many of them constant."""
     shape = (chirps, radar.n_rx, count)
     way = rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m
@@ -55,7 +57,11 @@ def block(radar: Radar, chirps: int, nodes: int, constant: int, count: int, rng:
 
 def plain_sum(echoes: Echoes, radar: Radar, kind: type[np.floating]) -> Complex:
     """IF samples (chirp, rx, sample), the turns of the phase in this precision; chirp by chirp, which spares memory."""
-    t = np.arange(radar.samples_per_chirp, dtype=kind) * kind(radar.chirp_duration_s) / radar.samples_per_chirp
+    t = (
+        np.arange(radar.samples_per_chirp, dtype=kind)
+        * kind(radar.chirp_duration_s)
+        / radar.samples_per_chirp
+    )
     slope = kind(radar.bandwidth_hz) / kind(radar.chirp_duration_s)
     f = radar.start_frequency_hz + slope * t
     weights = np.ones((len(echoes.frequency), len(t)))  # Lagrange's polynomials through the nodes
@@ -87,7 +93,9 @@ def case_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) 
     radar = Radar.preset(preset)
     chirps = Radar.preset("paper-12ghz").chirps_per_frame
     claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}{f', {constant} echoes constant' if constant else ''}"
-    yield from compared(claim, block(radar, chirps, nodes, constant, PARTS, rng), radar, np.complex128)
+    yield from compared(
+        claim, block(radar, chirps, nodes, constant, PARTS, rng), radar, np.complex128
+    )
 
 
 def crowd_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
@@ -97,7 +105,9 @@ def crowd_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator)
     yield from compared(claim, block(radar, 192, nodes, constant, CROWD, rng), radar, np.complex64)
 
 
-def crossing_rows(preset: str, nodes: int, counts: tuple[int, ...], rng: np.random.Generator) -> Iterator[Row]:
+def crossing_rows(
+    preset: str, nodes: int, counts: tuple[int, ...], rng: np.random.Generator
+) -> Iterator[Row]:
     """Where spreading begins to pay, which `synthesize` has as constants: both ways of the same echoes in turn."""
     radar = Radar.preset(preset)
     claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}, complex64"
@@ -108,21 +118,37 @@ def crossing_rows(preset: str, nodes: int, counts: tuple[int, ...], rng: np.rand
         for _ in range(1 + 3 * REPEATS):  # compiled before it is timed
             for many in (1, count + 1):
                 with mock.patch.multiple(synthesis, MANY_ECHOES=many, MANY_VARYING_ECHOES=many):
-                    took = timed(lambda echoes=echoes: synthesize(echoes, radar, times, dtype=np.complex64))  # type: ignore[misc]
+                    took = timed(
+                        lambda echoes=echoes: synthesize(echoes, radar, times, dtype=np.complex64)
+                    )  # type: ignore[misc]
                 seconds.setdefault(many, []).append(took)
         spread, one_by_one = (float(np.median(own[1:])) for own in seconds.values())
-        yield reported(claim, f"{count} echoes: one by one over spread, time", "", one_by_one / spread, key="if-sum")
+        yield reported(
+            claim,
+            f"{count} echoes: one by one over spread, time",
+            "",
+            one_by_one / spread,
+            key="if-sum",
+        )
 
 
-def compared(claim: str, echoes: Echoes, radar: Radar, dtype: type[np.complexfloating]) -> Iterator[Row]:
+def compared(
+    claim: str, echoes: Echoes, radar: Radar, dtype: type[np.complexfloating]
+) -> Iterator[Row]:
     chirps, _, count = echoes.length.shape
     times = radar.chirp_times(chirps)
     fast = synthesize(echoes, radar, times, dtype=dtype)  # compiled before it is timed
-    fast_s = min(timed(lambda: synthesize(echoes, radar, times, dtype=dtype)) for _ in range(REPEATS))
+    fast_s = min(
+        timed(lambda: synthesize(echoes, radar, times, dtype=dtype)) for _ in range(REPEATS)
+    )
     plain_s = timed(lambda: plain_sum(echoes, radar, np.float64))
     reference = plain_sum(every_sixteenth(echoes), radar, np.longdouble)
-    error = float(np.abs(fast[COMPARED] - reference).max() / np.sqrt(np.mean(np.abs(reference) ** 2)))
-    yield judged(claim, "largest relative error to the plain sum", "", error, TOLERANCE, key="if-sum")
+    error = float(
+        np.abs(fast[COMPARED] - reference).max() / np.sqrt(np.mean(np.abs(reference) ** 2))
+    )
+    yield judged(
+        claim, "largest relative error to the plain sum", "", error, TOLERANCE, key="if-sum"
+    )
     yield reported(claim, f"plain sum, {chirps} chirps, {count} echoes", "s", plain_s, key="if-sum")
     yield reported(claim, "fast", "s", fast_s, key="if-sum")
     yield reported(claim, "times faster", "", plain_s / fast_s, key="if-sum")
@@ -138,7 +164,13 @@ def measure(quick: bool) -> list[Row]:
     rng = np.random.default_rng(0)
     presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
     kinds = ((CASES, case_rows), (CROWD_CASES, crowd_rows), (CROSSINGS, crossing_rows))
-    return [row for preset in presets for cases, rows in kinds for case in cases for row in rows(preset, *case, rng)]
+    return [
+        row
+        for preset in presets
+        for cases, rows in kinds
+        for case in cases
+        for row in rows(preset, *case, rng)
+    ]
 
 
 if __name__ == "__main__":

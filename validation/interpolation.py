@@ -36,12 +36,20 @@ Array = NDArray[np.float64]
 Method = Callable[[Array, Array, Array], Array]
 
 CASES = {
-    "HDM05 kicks": [("hdm05", f"HDM_bd_kickLFront1Reps_{k:03d}_120.amc", "HDM_bd.asf") for k in (1, 4, 5)]
+    "HDM05 kicks": [
+        ("hdm05", f"HDM_bd_kickLFront1Reps_{k:03d}_120.amc", "HDM_bd.asf") for k in (1, 4, 5)
+    ]
     + [("hdm05", "HDM_bk_kickLFront1Reps_011_120.amc", "HDM_bk.asf")],
     "CMU walks": [("cmu", "02_01.amc", "02.asf"), ("cmu", "07_05.amc", "07.asf")],
-    "CMU jacks, punches": [("cmu", "14_14.amc", "14_reconstructed.asf"), ("cmu", "143_23.amc", "143_reconstructed.asf")],
+    "CMU jacks, punches": [
+        ("cmu", "14_14.amc", "14_reconstructed.asf"),
+        ("cmu", "143_23.amc", "143_reconstructed.asf"),
+    ],
     "CMU 135_02 (spikes)": [("cmu", "135_02.amc", "135.asf")],
-    "BVH 30 Hz": [("bandai_namco_CC-BY-NC", f"dataset-1_{name}_normal_001.bvh", None) for name in ("kick", "punch", "walk")],
+    "BVH 30 Hz": [
+        ("bandai_namco_CC-BY-NC", f"dataset-1_{name}_normal_001.bvh", None)
+        for name in ("kick", "punch", "walk")
+    ],
 }
 
 
@@ -56,7 +64,10 @@ def _components(spline: Callable[[Array, Array], Callable[[Array], Array]]) -> M
 def _per_joint(kind: type[Slerp] | type[RotationSpline]) -> Method:
     def method(times: Array, quaternions: Array, at: Array) -> Array:
         joints = range(quaternions.shape[1])
-        return np.stack([kind(times, Rotation.from_quat(quaternions[:, j]))(at).as_quat() for j in joints], axis=1)
+        return np.stack(
+            [kind(times, Rotation.from_quat(quaternions[:, j]))(at).as_quat() for j in joints],
+            axis=1,
+        )
 
     return method
 
@@ -72,7 +83,9 @@ METHODS: dict[str, Method] = {
 
 def angle_deg(first: Array, second: Array) -> Array:
     """Angle between rotations (..., 4) [deg]; through the chord, exact for small angles."""
-    chord = np.minimum(np.linalg.norm(first - second, axis=-1), np.linalg.norm(first + second, axis=-1))
+    chord = np.minimum(
+        np.linalg.norm(first - second, axis=-1), np.linalg.norm(first + second, axis=-1)
+    )
     return np.asarray(np.degrees(4 * np.arcsin(np.minimum(chord / 2, 1.0))))
 
 
@@ -92,7 +105,9 @@ def held_out(motion: Motion, method: Method) -> tuple[Array, Array]:
     at = np.arange(1.0, times[-1], 2.0)
     truth = motion.rotations[1 : 2 * len(at) : 2]
     guess = method(times, keep, at)
-    return angle_deg(guess, truth), 1e3 * np.linalg.norm(place(motion, guess) - place(motion, truth), axis=-1)
+    return angle_deg(guess, truth), 1e3 * np.linalg.norm(
+        place(motion, guess) - place(motion, truth), axis=-1
+    )
 
 
 def velocity_step(motion: Motion, method: Method) -> float:
@@ -102,7 +117,10 @@ def velocity_step(motion: Motion, method: Method) -> float:
     d = 1e-4
     samples = [method(times, motion.rotations, inner + k * d) for k in (-2, -1, 0, 1, 2)]
     speeds = [
-        (Rotation.from_quat(b.reshape(-1, 4)) * Rotation.from_quat(a.reshape(-1, 4)).inv()).as_rotvec() / d
+        (
+            Rotation.from_quat(b.reshape(-1, 4)) * Rotation.from_quat(a.reshape(-1, 4)).inv()
+        ).as_rotvec()
+        / d
         for a, b in itertools.pairwise(samples)
     ]
     step = speeds[2] - speeds[1] - (speeds[1] - speeds[0] + speeds[3] - speeds[2]) / 2
@@ -136,13 +154,17 @@ def smooth_limb(method: Method) -> float:
         return Rotation.from_euler("y", (0.75 * np.sin(4 * np.pi * t))[:, None]).as_quat()[:, None]
 
     limb = np.array([0.0, 0.0, -0.8])
-    return error_db((rotate(method(times, swing(times), at), limb) - rotate(swing(at), limb))[..., 0])
+    return error_db(
+        (rotate(method(times, swing(times), at), limb) - rotate(swing(at), limb))[..., 0]
+    )
 
 
 def smooth_root(spline: Callable[[Array, Array], Callable[[Array], Array]]) -> float:
     """False Doppler power [dB] of a bobbing root seen from above."""
     times, at = np.arange(241) / 120, np.linspace(0.1, 1.9, 20001)
-    return error_db(spline(times, 0.01 * np.sin(4 * np.pi * times))(at) - 0.01 * np.sin(4 * np.pi * at))
+    return error_db(
+        spline(times, 0.01 * np.sin(4 * np.pi * times))(at) - 0.01 * np.sin(4 * np.pi * at)
+    )
 
 
 def rms(values: Array) -> float:
@@ -151,7 +173,10 @@ def rms(values: Array) -> float:
 
 def recorded_rows(folder: Path, quick: bool) -> Iterator[Row]:
     for case, files in CASES.items():
-        motions = [load_motion(folder / d / f, folder / d / s if s else None) for d, f, s in (files[:1] if quick else files)]
+        motions = [
+            load_motion(folder / d / f, folder / d / s if s else None)
+            for d, f, s in (files[:1] if quick else files)
+        ]
         for name, method in METHODS.items():
             errors = [held_out(motion, method) for motion in motions]
             turn, shift = (np.concatenate([pair[k].ravel() for pair in errors]) for k in (0, 1))
@@ -159,19 +184,37 @@ def recorded_rows(folder: Path, quick: bool) -> Iterator[Row]:
             yield reported(f"{case}, {name}", "rotations, largest", "deg", float(turn.max()))
             yield reported(f"{case}, {name}", "places, rms", "mm", rms(shift))
             yield reported(f"{case}, {name}", "places, largest", "mm", float(shift.max()))
-    kick = load_motion(folder / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", folder / "hdm05/HDM_bd.asf")
+    kick = load_motion(
+        folder / "hdm05/HDM_bd_kickLFront1Reps_001_120.amc", folder / "hdm05/HDM_bd.asf"
+    )
     for name, method in METHODS.items():
-        yield reported(f"kick, {name}", "step of angular velocity at a frame, relative", "", velocity_step(kick, method))
+        yield reported(
+            f"kick, {name}",
+            "step of angular velocity at a frame, relative",
+            "",
+            velocity_step(kick, method),
+        )
 
 
 def measure(quick: bool) -> list[Row]:
     rows: list[Row] = []
     for name, method in METHODS.items():
         for interval, reach in enumerate(spike_reach(method), start=1):
-            rows.append(reported(f"spike of 60 deg, {name}", f"left in interval {interval} beside it", "deg", float(reach)))
-        rows.append(reported(f"smooth limb, 77 GHz, {name}", "false Doppler", "dB", smooth_limb(method)))
+            rows.append(
+                reported(
+                    f"spike of 60 deg, {name}",
+                    f"left in interval {interval} beside it",
+                    "deg",
+                    float(reach),
+                )
+            )
+        rows.append(
+            reported(f"smooth limb, 77 GHz, {name}", "false Doppler", "dB", smooth_limb(method))
+        )
     for name, spline in (("pchip", PchipInterpolator), ("cubic", CubicSpline)):
-        rows.append(reported(f"bobbing root, 77 GHz, {name}", "false Doppler", "dB", smooth_root(spline)))
+        rows.append(
+            reported(f"bobbing root, 77 GHz, {name}", "false Doppler", "dB", smooth_root(spline))
+        )
     folder = os.environ.get("RTRADAR_MOCAP")
     if folder:
         rows += recorded_rows(Path(folder), quick)
@@ -179,4 +222,6 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("How well interpolation of rotations meets frames that it was not shown.", measure))
+    sys.exit(
+        main("How well interpolation of rotations meets frames that it was not shown.", measure)
+    )

@@ -81,18 +81,34 @@ def cases(work: Path, quick: bool) -> list[Case]:
     compiles = Case(
         "run, nothing compiled yet",
         (*walk, "--fidelity", "fresnel"),
-        (Stage("compiling", "compiles numba/**/*.nbc"), Stage("compiling on", "compiles numba/**/*.nbc", 5.0)),
+        (
+            Stage("compiling", "compiles numba/**/*.nbc"),
+            Stage("compiling on", "compiles numba/**/*.nbc", 5.0),
+        ),
         cold=True,
     )
     traces = Case(
         "run in a room",
         (*walk, "--scene", "living-room"),
-        (Stage("loading", "loads mitsuba"), Stage("tracing", "compiles drjit/*"), Stage("tracing on", "compiles drjit/*", 2.0)),
+        (
+            Stage("loading", "loads mitsuba"),
+            Stage("tracing", "compiles drjit/*"),
+            Stage("tracing on", "compiles drjit/*", 2.0),
+        ),
         cold=True,
     )
     compare = Case(
         "compare",
-        ("compare", "synthetic:kick", "--duration", "0.5", "--fidelities", "analytic,specular", "--out", "{out}"),
+        (
+            "compare",
+            "synthetic:kick",
+            "--duration",
+            "0.5",
+            "--fidelities",
+            "analytic,specular",
+            "--out",
+            "{out}",
+        ),
         (
             Stage("first rung", "writes .rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
             Stage("second rung", "writes .rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
@@ -102,13 +118,30 @@ def cases(work: Path, quick: bool) -> list[Case]:
     build = Case(
         "dataset build",
         ("dataset", "build", str(work / "set.toml"), "--workers", "2", "--out", "{out}"),
-        (Stage("cluster starts", "writes collection.json", 0.8), Stage("samples", "writes [!.]*.npz", 0.1)),
+        (
+            Stage("cluster starts", "writes collection.json", 0.8),
+            Stage("samples", "writes [!.]*.npz", 0.1),
+        ),
         single=True,
     )
     train = Case(
         "train",
-        ("train", str(work / "clouds"), "--points", "64", "--folds", "2", "--epochs", "4000", "--out", "{out}"),
-        (Stage("first epochs", "writes plan.json", 2.0), Stage("past a checkpoint", "writes training-01/checkpoint.pt", 0.5)),
+        (
+            "train",
+            str(work / "clouds"),
+            "--points",
+            "64",
+            "--folds",
+            "2",
+            "--epochs",
+            "4000",
+            "--out",
+            "{out}",
+        ),
+        (
+            Stage("first epochs", "writes plan.json", 2.0),
+            Stage("past a checkpoint", "writes training-01/checkpoint.pt", 0.5),
+        ),
         single=True,
     )
     export = Case(
@@ -120,8 +153,19 @@ def cases(work: Path, quick: bool) -> list[Case]:
     )
     view = Case(
         "view",
-        ("view", str(work / "before-run"), "--out", "{out}/view.html", "--still", "{out}/still.png"),
-        (Stage("loading", "hears", 0.5), Stage("page", "writes .view.html.*"), Stage("still", "writes view.html")),
+        (
+            "view",
+            str(work / "before-run"),
+            "--out",
+            "{out}/view.html",
+            "--still",
+            "{out}/still.png",
+        ),
+        (
+            Stage("loading", "hears", 0.5),
+            Stage("page", "writes .view.html.*"),
+            Stage("still", "writes view.html"),
+        ),
         single=True,
         anew=False,
     )
@@ -132,7 +176,9 @@ def start(case: Case, out: Path, work: Path) -> subprocess.Popen[str]:
     environment = dict(os.environ)
     if case.cold:
         shutil.rmtree(work / "cold", ignore_errors=True)
-        environment |= {f"{name.upper()}_CACHE_DIR": str(work / "cold" / name) for name in ("numba", "drjit")}
+        environment |= {
+            f"{name.upper()}_CACHE_DIR": str(work / "cold" / name) for name in ("numba", "drjit")
+        }
     out.mkdir(exist_ok=True)
     command = [sys.executable, "-m", "rtradar", *(word.format(out=out) for word in case.words)]
     pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
@@ -141,10 +187,16 @@ def start(case: Case, out: Path, work: Path) -> subprocess.Popen[str]:
 
 def contents(folder: Path) -> dict[str, int]:
     """Every file, and when it was written."""
-    return {str(path.relative_to(folder)): path.stat().st_mtime_ns for path in sorted(folder.rglob("*")) if path.is_file()}
+    return {
+        str(path.relative_to(folder)): path.stat().st_mtime_ns
+        for path in sorted(folder.rglob("*"))
+        if path.is_file()
+    }
 
 
-def wait_for(sign: str, out: Path, work: Path, since: float, process: subprocess.Popen[str]) -> bool:
+def wait_for(
+    sign: str, out: Path, work: Path, since: float, process: subprocess.Popen[str]
+) -> bool:
     """Until the sign is seen; whether the process still runs."""
     kind, _, name = sign.partition(" ")
     running = psutil.Process(process.pid)
@@ -156,7 +208,9 @@ def wait_for(sign: str, out: Path, work: Path, since: float, process: subprocess
             if kind == "loads" and any(name in part.path for part in running.memory_maps()):
                 return True
             folder = {"compiles": work / "cold", "writes": out}.get(kind)
-            if folder is not None and any(path.stat().st_mtime >= since for path in folder.glob(name)):
+            if folder is not None and any(
+                path.stat().st_mtime >= since for path in folder.glob(name)
+            ):
                 return True
         time.sleep(0.005)
     return False
@@ -195,9 +249,23 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
     hidden, lost, changed, new = compared(old, after)
     touched, refused = 0, False
     if name == "SIGKILL" and not case.single:
-        look = [sys.executable, "-m", "rtradar", "export", str(out), "--out", str(work / "samples.mat")]
-        looked = subprocess.run(look, capture_output=True, check=False, timeout=PATIENCE_S, text=True)
-        refused = looked.returncode == 2 and "holds files of two runs" in looked.stderr and looked.stderr.count("\n") == 1
+        look = [
+            sys.executable,
+            "-m",
+            "rtradar",
+            "export",
+            str(out),
+            "--out",
+            str(work / "samples.mat"),
+        ]
+        looked = subprocess.run(
+            look, capture_output=True, check=False, timeout=PATIENCE_S, text=True
+        )
+        refused = (
+            looked.returncode == 2
+            and "holds files of two runs" in looked.stderr
+            and looked.stderr.count("\n") == 1
+        )
         touched = len(set((contents(out) if out.exists() else {}).items()) ^ set(after.items()))
         _, said_again = start(case, out, work).communicate(timeout=PATIENCE_S)
         if said_again:
@@ -213,22 +281,62 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
     ]
     if not case.single:
         mixed = len(changed) + len(new) if len(changed) < len(old) and not refused else 0
-        found.append(judged(claim, "old and new files mixed", "1", mixed, 0, says=SAYS + "old and new files mixed, not refused"))
+        found.append(
+            judged(
+                claim,
+                "old and new files mixed",
+                "1",
+                mixed,
+                0,
+                says=SAYS + "old and new files mixed, not refused",
+            )
+        )
     if name == "SIGKILL" and not case.single:
-        found.append(judged(claim, "files that a reader changed", "1", touched, 0, says=SAYS + "files that a reader changed"))
+        found.append(
+            judged(
+                claim,
+                "files that a reader changed",
+                "1",
+                touched,
+                0,
+                says=SAYS + "files that a reader changed",
+            )
+        )
     if name != "SIGKILL":
         found += [
             judged(claim, "end", "s", seconds, 2.0, says=SAYS + "seconds until it has ended"),
-            judged(claim, "exit status", "1", process.returncode, 0, reference=1, says=SAYS + "exit status (error against 1)"),
-            judged(claim, "lines said, but one", "1", len(lines), 0, reference=1, says=SAYS + "lines other than one"),
+            judged(
+                claim,
+                "exit status",
+                "1",
+                process.returncode,
+                0,
+                reference=1,
+                says=SAYS + "exit status (error against 1)",
+            ),
+            judged(
+                claim,
+                "lines said, but one",
+                "1",
+                len(lines),
+                0,
+                reference=1,
+                says=SAYS + "lines other than one",
+            ),
             judged(claim, "tracebacks", "1", said.count("Traceback"), 0, says=SAYS + "tracebacks"),
         ]
     if not (name == "SIGKILL" and case.single):
-        found.append(judged(claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"))
+        found.append(
+            judged(
+                claim, "unfinished files", "1", len(hidden), 0, says=SAYS + "unfinished files left"
+            )
+        )
     return row, found
 
 
-def compared(old: dict[str, int], after: dict[str, int]) -> tuple[list[str], list[str], list[str], list[str]]:
+def compared(
+    old: dict[str, int], after: dict[str, int]
+) -> tuple[list[str], list[str], list[str], list[str]]:
     """Files that are unfinished, and of the others those that are gone, written anew, and new."""
     hidden = [path for path in after if any(part.startswith(".") for part in Path(path).parts)]
     lost = [path for path in old if path not in after]
@@ -245,12 +353,23 @@ def tally(old: dict[str, int], after: dict[str, int]) -> str:
 
 def measure(quick: bool) -> list[Row]:
     found: list[Row] = []
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # else what is started with "&" would pass on that it is ignored
+    signal.signal(
+        signal.SIGINT, signal.default_int_handler
+    )  # else what is started with "&" would pass on that it is ignored
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         (work / "small.toml").write_text(RADAR)
         (work / "set.toml").write_text(SPEC.format(half=6))
-        build = [sys.executable, "-m", "rtradar", "dataset", "build", str(work / "set.toml"), "--workers", "1"]
+        build = [
+            sys.executable,
+            "-m",
+            "rtradar",
+            "dataset",
+            "build",
+            str(work / "set.toml"),
+            "--workers",
+            "1",
+        ]
         subprocess.run([*build, "--out", str(work / "clouds")], check=True, capture_output=True)
         (work / "set.toml").write_text(SPEC.format(half=200))
         for case in cases(work, quick):

@@ -67,7 +67,13 @@ class Scene:
     def chirps(self) -> NDArray[np.int64]:
         """Of the first and last Tx of the y-line."""
         cycles = np.arange(0, self.radar.cycles_per_frame, self.every)
-        return np.asarray((self.first_chirp + cycles[:, None] * self.radar.n_tx + np.array([0, self.radar.tx_y - 1])).ravel())
+        return np.asarray(
+            (
+                self.first_chirp
+                + cycles[:, None] * self.radar.n_tx
+                + np.array([0, self.radar.tx_y - 1])
+            ).ravel()
+        )
 
     @cached_property
     def corner_radar(self) -> rt.Radar:
@@ -103,20 +109,31 @@ def spectrum(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> NDA
             weights[:, n] *= (frequencies - other) / (node - other)
     ends = [0, echoes.length.shape[1] - 1]
     amplitude = np.einsum("fn,ncre->fcre", weights, np.conj(echoes.amplitude[:, :, ends]))
-    phase = -2j * np.pi * frequencies[:, None, None, None] * echoes.length[:, ends] / SPEED_OF_LIGHT_MPS
+    phase = (
+        -2j * np.pi * frequencies[:, None, None, None] * echoes.length[:, ends] / SPEED_OF_LIGHT_MPS
+    )
     return np.asarray((amplitude * np.exp(phase)).sum(axis=-1))
 
 
 def scene_rows(scene: Scene) -> Iterator[Row]:
     case = f"{scene.preset}, {scene.activity}"
     hidden = build_model("specular", scene.radar, scene.body).echoes(scene.chirps).amplitude == 0
-    yield reported(case, "share of part, time and channel whose mirror point is hidden", "", float(hidden.mean()))
+    yield reported(
+        case,
+        "share of part, time and channel whose mirror point is hidden",
+        "",
+        float(hidden.mean()),
+    )
     for fidelity in MODELS:
         if fidelity == "reference":
             continue
         found = scene.spectrum(fidelity)
         error, decibels = scene.compared(found)
-        limit = MOST_ERROR.get((scene.preset, scene.activity)) if fidelity == "physical-optics" else None
+        limit = (
+            MOST_ERROR.get((scene.preset, scene.activity))
+            if fidelity == "physical-optics"
+            else None
+        )
         claim, quantity = f"{case}, {fidelity}", "complex error of H(f, t), rms over rms"
         if limit is None:
             yield reported(claim, quantity, "", error)
@@ -124,7 +141,10 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
             says = f"a walking body by `{fidelity}` against `reference`, {scene.preset[6:8]} GHz, with occlusion: complex error"
             yield judged(claim, quantity, "", error, limit, says=says, cases=found.size)
         if fidelity in MOST_DECIBELS:
-            most, says = MOST_DECIBELS[fidelity], f"frame power by `{fidelity}` against `reference`, four activities"
+            most, says = (
+                MOST_DECIBELS[fidelity],
+                f"frame power by `{fidelity}` against `reference`, four activities",
+            )
             yield judged(claim, "frame power", "dB", decibels, most, reference=0.0, says=says)
         else:
             yield reported(claim, "frame power", "dB", decibels)

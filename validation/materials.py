@@ -37,7 +37,9 @@ def _fields(
     return electric, np.cross(wave, electric)
 
 
-def _boundary(eta: complex, depth: float, cosine: float, polarization: str) -> tuple[complex, complex]:
+def _boundary(
+    eta: complex, depth: float, cosine: float, polarization: str
+) -> tuple[complex, complex]:
     """Reflection and transmission of a slab of k0 d = ``depth`` by continuity of the tangential fields at z = 0 and d."""
     sine = np.sqrt(1 - cosine**2)
     inner = np.sqrt(complex(eta - sine**2))
@@ -67,7 +69,9 @@ def _boundary(eta: complex, depth: float, cosine: float, polarization: str) -> t
 
 def _slabs(frequency_hz: float, quick: bool) -> list[Row]:
     cosines = np.cos(np.radians(np.linspace(0, 88, 9 if quick else 45)))
-    names = [name for name, held in MATERIALS.items() if held.holds(frequency_hz) and not held.conducts]
+    names = [
+        name for name, held in MATERIALS.items() if held.holds(frequency_hz) and not held.conducts
+    ]
     off, excess, half_space = 0.0, 0.0, 0.0
     for name in names:
         eta = complex(material(name).eta(frequency_hz))
@@ -75,19 +79,37 @@ def _slabs(frequency_hz: float, quick: bool) -> list[Row]:
             for thickness in THICKNESSES_M:
                 ours = slab(eta, thickness, frequency_hz, cosines, polarization)
                 depth = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS * thickness
-                theirs = np.array([_boundary(eta, depth, cosine, polarization) for cosine in cosines]).T
+                theirs = np.array(
+                    [_boundary(eta, depth, cosine, polarization) for cosine in cosines]
+                ).T
                 off = max(off, float(np.abs(np.array(ours) - theirs).max()))
                 excess = max(excess, float((np.abs(ours[0]) ** 2 + np.abs(ours[1]) ** 2).max() - 1))
             deep = -complex(np.sqrt(eta)).imag * 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
             if deep > 0:
                 # Thick enough for the far face to be 40 nepers away.
                 thick = slab(eta, 40 / deep, frequency_hz, cosines, polarization)[0]
-                half_space = max(half_space, float(np.abs(thick - reflection(eta, cosines, polarization)).max()))
+                half_space = max(
+                    half_space, float(np.abs(thick - reflection(eta, cosines, polarization)).max())
+                )
     claim = f"slabs of {len(names)} materials, {frequency_hz / 1e9:g} GHz"
     return [
-        judged(claim, "slabs of all materials: reflection and transmission against Maxwell at both faces", "", off, 1e-9),
-        judged(claim, "slabs of all materials: reflected and transmitted power beyond the incident one", "", excess, 1e-12),
-        judged(claim, "slabs of all materials: thick slab against half-space", "", half_space, 1e-12),
+        judged(
+            claim,
+            "slabs of all materials: reflection and transmission against Maxwell at both faces",
+            "",
+            off,
+            1e-9,
+        ),
+        judged(
+            claim,
+            "slabs of all materials: reflected and transmitted power beyond the incident one",
+            "",
+            excess,
+            1e-12,
+        ),
+        judged(
+            claim, "slabs of all materials: thick slab against half-space", "", half_space, 1e-12
+        ),
     ]
 
 
@@ -100,21 +122,65 @@ def measure(quick: bool) -> list[Row]:
     for frequency, permittivity in SLOW_SKIN:
         slow = float(material("skin").bands[0].eta(np.array(frequency)).real)
         # The table is rounded to 0.1.
-        rows.append(judged(f"skin at {frequency / 1e3:g} kHz", "permittivity", "", slow, 0.06, reference=permittivity, says=SAYS))
+        rows.append(
+            judged(
+                f"skin at {frequency / 1e3:g} kHz",
+                "permittivity",
+                "",
+                slow,
+                0.06,
+                reference=permittivity,
+                says=SAYS,
+            )
+        )
     for frequency, permittivity, conductivity in SKIN:
         eta = complex(material("skin").eta(frequency))
         sigma = -eta.imag * 2 * np.pi * frequency * 8.8541878188e-12
         claim = f"skin at {frequency / 1e9:g} GHz"
         # The tables are rounded to three or four digits.
-        rows.append(judged(claim, "permittivity", "", eta.real, 1e-3 * permittivity, reference=permittivity, says=SAYS))
-        rows.append(judged(claim, "conductivity", "S/m", sigma, 1e-3 * conductivity, reference=conductivity, says=SAYS))
+        rows.append(
+            judged(
+                claim,
+                "permittivity",
+                "",
+                eta.real,
+                1e-3 * permittivity,
+                reference=permittivity,
+                says=SAYS,
+            )
+        )
+        rows.append(
+            judged(
+                claim,
+                "conductivity",
+                "S/m",
+                sigma,
+                1e-3 * conductivity,
+                reference=conductivity,
+                says=SAYS,
+            )
+        )
     for frequency in (12e9, 77e9):
         back = 20 * np.log10(abs(complex(reflection(material("skin").eta(frequency), 1.0, "te"))))
-        rows.append(reported(f"skin at {frequency / 1e9:g} GHz", "normal reflection below a conductor", "dB", back))
+        rows.append(
+            reported(
+                f"skin at {frequency / 1e9:g} GHz",
+                "normal reflection below a conductor",
+                "dB",
+                back,
+            )
+        )
         for name, thickness in (("plasterboard", 0.0125), ("concrete", 0.2), ("glass", 0.006)):
             passed = slab(material(name).eta(frequency), thickness, frequency, 1.0, "te")
             loss = -20 * np.log10(abs(complex(passed[1])))
-            rows.append(reported(f"{name}, {thickness * 1e3:g} mm, {frequency / 1e9:g} GHz", "one-way loss", "dB", loss))
+            rows.append(
+                reported(
+                    f"{name}, {thickness * 1e3:g} mm, {frequency / 1e9:g} GHz",
+                    "one-way loss",
+                    "dB",
+                    loss,
+                )
+            )
     return rows
 
 

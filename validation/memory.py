@@ -27,7 +27,9 @@ RUNS = 3
 
 # Ten times as long: held twice, the recording alone would add 45 MB to some 330, its survey 9. What may grow is the heap.
 LONG_GROWTH = 1.03
-SMALL_RADAR = "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nsamples_per_chirp = 128\nchirp_duration_s = 500e-6\n"
+SMALL_RADAR = (
+    "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nsamples_per_chirp = 128\nchirp_duration_s = 500e-6\n"
+)
 
 # What waits for a thread is to hold nothing: the blocks of the whole capture would else be there in the end.
 STARVED_GROWTH = 1.02
@@ -39,8 +41,20 @@ JOINTS, RATE_HZ = 30, 120
 
 def summary(folder: str, radar: str, fidelity: str, duration_s: float) -> dict[str, Any]:
     out = Path(folder, f"{radar}-{fidelity}-{duration_s:g}")
-    command = [sys.executable, "-m", "rtradar", "run", "synthetic:walk", "--duration", str(duration_s), "--radar", radar]
-    subprocess.run([*command, "--fidelity", fidelity, "--out", str(out)], check=True, stdout=subprocess.DEVNULL)
+    command = [
+        sys.executable,
+        "-m",
+        "rtradar",
+        "run",
+        "synthetic:walk",
+        "--duration",
+        str(duration_s),
+        "--radar",
+        radar,
+    ]
+    subprocess.run(
+        [*command, "--fidelity", fidelity, "--out", str(out)], check=True, stdout=subprocess.DEVNULL
+    )
     found: dict[str, Any] = json.loads((out / "summary.json").read_text())
     return found
 
@@ -50,14 +64,27 @@ def long_runs(short_s: float, long_s: float) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         radar = Path(folder, "small.toml")
         radar.write_text(SMALL_RADAR)
-        found = {duration_s: summary(folder, str(radar), "analytic", duration_s) for duration_s in (short_s, long_s)}
+        found = {
+            duration_s: summary(folder, str(radar), "analytic", duration_s)
+            for duration_s in (short_s, long_s)
+        }
     growth = f"peak memory, {long_s:g} s over {short_s:g} s"
     ratio = found[long_s]["peak_memory_mb"] / found[short_s]["peak_memory_mb"]
     return [
-        judged("2 x 4 channels, analytic", growth, "1", ratio, LONG_GROWTH, says=f"a whole run: {growth}"),
+        judged(
+            "2 x 4 channels, analytic",
+            growth,
+            "1",
+            ratio,
+            LONG_GROWTH,
+            says=f"a whole run: {growth}",
+        ),
         *(
             reported(
-                "2 x 4 channels, analytic", f"wall a second of radar, {seconds:g} s", "s/s", one["wall_s"] / one["capture_s"]
+                "2 x 4 channels, analytic",
+                f"wall a second of radar, {seconds:g} s",
+                "s/s",
+                one["wall_s"] / one["capture_s"],
             )
             for seconds, one in found.items()
         ),
@@ -69,11 +96,31 @@ def starved(duration_s: float) -> list[Row]:
     peak = {}
     for awake in (True, False):
         with tempfile.TemporaryDirectory() as folder:
-            command = [sys.executable, "-W", "ignore", "-c", STARVED, str(int(awake)), str(duration_s), folder]
-            peak[awake] = float(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
+            command = [
+                sys.executable,
+                "-W",
+                "ignore",
+                "-c",
+                STARVED,
+                str(int(awake)),
+                str(duration_s),
+                folder,
+            ]
+            peak[awake] = float(
+                subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout
+            )
     claim = f"paper-12ghz, analytic, {duration_s:g} s"
     growth = "peak memory, one thread awake over all"
-    return [judged(claim, growth, "1", peak[False] / peak[True], STARVED_GROWTH, says=f"a whole run: {growth}")]
+    return [
+        judged(
+            claim,
+            growth,
+            "1",
+            peak[False] / peak[True],
+            STARVED_GROWTH,
+            says=f"a whole run: {growth}",
+        )
+    ]
 
 
 STARVED = """
@@ -104,15 +151,30 @@ def reading(short_s: float, long_s: float) -> list[Row]:
             path = Path(folder, "long.bvh")
             write_bvh(path, round(duration_s * RATE_HZ))
             began = time.perf_counter()
-            done = subprocess.run([sys.executable, "-c", READ, str(path)], check=True, capture_output=True, text=True)
+            done = subprocess.run(
+                [sys.executable, "-c", READ, str(path)], check=True, capture_output=True, text=True
+            )
             seconds[duration_s] = time.perf_counter() - began
         peak[duration_s] = float(done.stdout)
     growth = f"peak memory, {long_s:g} s over {short_s:g} s"
     ratio = peak[long_s] / peak[short_s]
     return [
-        judged("reading BVH of 30 joints", growth, "1", ratio, READING_GROWTH, says=f"reading a recording: {growth}"),
-        *(reported("reading BVH of 30 joints", f"peak memory, {one:g} s", "MB", peak[one]) for one in peak),
-        *(reported("reading BVH of 30 joints", f"seconds, {one:g} s", "s", seconds[one]) for one in seconds),
+        judged(
+            "reading BVH of 30 joints",
+            growth,
+            "1",
+            ratio,
+            READING_GROWTH,
+            says=f"reading a recording: {growth}",
+        ),
+        *(
+            reported("reading BVH of 30 joints", f"peak memory, {one:g} s", "MB", peak[one])
+            for one in peak
+        ),
+        *(
+            reported("reading BVH of 30 joints", f"seconds, {one:g} s", "s", seconds[one])
+            for one in seconds
+        ),
     ]
 
 
@@ -131,11 +193,17 @@ def write_bvh(path: Path, frames: int) -> None:
     with path.open("w", encoding="ascii") as file:
         file.write("HIERARCHY\n")
         for joint in range(JOINTS):
-            file.write(f"{'JOINT' if joint else 'ROOT'} j{joint}\n{{\nOFFSET 0 {-5 * bool(joint)} 0\n")
+            file.write(
+                f"{'JOINT' if joint else 'ROOT'} j{joint}\n{{\nOFFSET 0 {-5 * bool(joint)} 0\n"
+            )
             file.write(f"CHANNELS {3 if joint else 6} {'' if joint else places}{turns}\n")
         file.write("End Site\n{\nOFFSET 0 -5 0\n}\n" + "}\n" * JOINTS)
         file.write(f"MOTION\nFrames: {frames}\nFrame Time: {1 / RATE_HZ}\n")
-        frame = "0.0 100.0 0.0 " + " ".join(f"{joint}.25 -{joint}.5 {joint}.75" for joint in range(JOINTS)) + "\n"
+        frame = (
+            "0.0 100.0 0.0 "
+            + " ".join(f"{joint}.25 -{joint}.5 {joint}.75" for joint in range(JOINTS))
+            + "\n"
+        )
         for _ in range(frames):
             file.write(frame)
 
@@ -151,14 +219,32 @@ def measure(quick: bool) -> list[Row]:
                     found = summary(folder, radar, fidelity, duration_s)
                 peaks[duration_s].append(found["peak_memory_mb"])
                 claim = f"{radar}, {fidelity}, {duration_s:g} s, run {len(peaks[duration_s])}"
-                rows.append(judged(claim, "peak memory", "MB", peaks[duration_s][-1], LIMIT_MB, says="a whole run: peak memory"))
+                rows.append(
+                    judged(
+                        claim,
+                        "peak memory",
+                        "MB",
+                        peaks[duration_s][-1],
+                        LIMIT_MB,
+                        says="a whole run: peak memory",
+                    )
+                )
                 rows.append(reported(claim, "wall", "s", found["wall_s"]))
                 rows.append(reported(claim, "real-time factor", "1", found["real_time_factor"]))
                 for stage, seconds in found["stages"].items():
                     rows.append(reported(claim, f"stage {stage}", "s", seconds))
             growth = f"peak memory, {long_s:g} s over {short_s:g} s"
             says, ratio = f"a whole run: {growth}", min(peaks[long_s]) / min(peaks[short_s])
-            rows.append(judged(f"{radar}, {fidelity}", f"{growth}, the least of each", "1", ratio, GROWTH, says=says))
+            rows.append(
+                judged(
+                    f"{radar}, {fidelity}",
+                    f"{growth}, the least of each",
+                    "1",
+                    ratio,
+                    GROWTH,
+                    says=says,
+                )
+            )
     rows += long_runs(*((6.0, 30.0) if quick else (30.0, 300.0)))
     rows += starved(1.5 if quick else 3.0)
     rows += reading(60.0, 600.0 if quick else 3600.0)

@@ -42,7 +42,12 @@ from rtradar.signal import synthesize
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="multipath") for kind in (rows.judged, rows.reported))
 LEAST_K_RHO = 10.0  # as in specular.py
-SHAPES = {"torso": (0.12, 0.17, 0.25), "thigh": (0.08, 0.08, 0.24), "forearm": (0.05, 0.05, 0.14), "head": (0.1, 0.1, 0.12)}
+SHAPES = {
+    "torso": (0.12, 0.17, 0.25),
+    "thigh": (0.08, 0.08, 0.24),
+    "forearm": (0.05, 0.05, 0.14),
+    "head": (0.1, 0.1, 0.12),
+}
 
 
 @dataclass(frozen=True)
@@ -68,10 +73,21 @@ class Mover:
 def box() -> tuple[Wall, ...]:
     """x from -4.5 to 2.5 m, y from -2.2 to 3 m, z to 2.6 m: of a conductor."""
     surface = Surface(material=material("perfect-conductor"), thickness_m=0.1)
-    return room_walls((7.0, 5.2, 2.6), (-4.5, -2.2), dict.fromkeys(("near", "far", "right", "left", "floor", "ceiling"), surface))
+    return room_walls(
+        (7.0, 5.2, 2.6),
+        (-4.5, -2.2),
+        dict.fromkeys(("near", "far", "right", "left", "floor", "ceiling"), surface),
+    )
 
 
-PLANES = {"near": (0, -4.5), "far": (0, 2.5), "right": (1, -2.2), "left": (1, 3.0), "floor": (2, 0.0), "ceiling": (2, 2.6)}
+PLANES = {
+    "near": (0, -4.5),
+    "far": (0, 2.5),
+    "right": (1, -2.2),
+    "left": (1, 3.0),
+    "floor": (2, 0.0),
+    "ceiling": (2, 2.6),
+}
 
 
 def mirrored(points: Array, leg: tuple[str, ...]) -> Array:
@@ -88,19 +104,40 @@ def walls_of(path: WallPath) -> tuple[tuple[str, ...], tuple[str, ...]]:
     return out, back
 
 
-def shortest(tx: Array, rx: Array, pose: tuple[Array, Array, Array], legs: tuple[tuple[str, ...], tuple[str, ...]]) -> float:
+def shortest(
+    tx: Array,
+    rx: Array,
+    pose: tuple[Array, Array, Array],
+    legs: tuple[tuple[str, ...], tuple[str, ...]],
+) -> float:
     """Least way from Tx over one mirrored body, and from the same point of the other, to Rx [m]."""
     centre, frame, axes = pose
 
     def way(angles: Array) -> float:
         theta, phi = angles
-        local = axes * np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+        local = axes * np.array(
+            [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
+        )
         point = centre + frame @ local
-        return float(np.linalg.norm(mirrored(point, legs[0]) - tx) + np.linalg.norm(mirrored(point, legs[1]) - rx))
+        return float(
+            np.linalg.norm(mirrored(point, legs[0]) - tx)
+            + np.linalg.norm(mirrored(point, legs[1]) - rx)
+        )
 
-    grid = [np.array([theta, phi]) for theta in np.linspace(0.2, 2.9, 9) for phi in np.linspace(0, 6.1, 16)]
+    grid = [
+        np.array([theta, phi])
+        for theta in np.linspace(0.2, 2.9, 9)
+        for phi in np.linspace(0, 6.1, 16)
+    ]
     start = min(grid, key=way)
-    return float(minimize(way, start, method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 2000}).fun)
+    return float(
+        minimize(
+            way,
+            start,
+            method="Nelder-Mead",
+            options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 2000},
+        ).fun
+    )
 
 
 # -- lengths ----------------------------------------------------------------------------------------------------------
@@ -112,7 +149,12 @@ def length_rows(quick: bool) -> Iterator[Row]:
         radar = rt.Radar.preset(preset)
         worst, count = {1: 0.0, 2: 0.0}, {1: 0, 2: 0}
         for seed, axes in enumerate(SHAPES.values()):
-            body = Mover((0.0, 0.4, 1.2), axes, Rotation.random(random_state=seed).as_matrix(), (-1.2, 0.6, 0.1))
+            body = Mover(
+                (0.0, 0.4, 1.2),
+                axes,
+                Rotation.random(random_state=seed).as_matrix(),
+                (-1.2, 0.6, 0.1),
+            )
             rung = Multipath(radar, body, Scene(walls=box()), order=2)  # type: ignore[arg-type]
             # Between two anchors, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
@@ -125,14 +167,30 @@ def length_rows(quick: bool) -> Iterator[Row]:
                     receiver = int(rng.integers(radar.n_rx))
                     if echoes.amplitude[0, i, receiver, number] == 0:
                         continue
-                    tx, rx = radar.tx[chirp % radar.n_tx], radar.rx[radar.rx_of_tx[chirp % radar.n_tx, receiver]]
+                    tx, rx = (
+                        radar.tx[chirp % radar.n_tx],
+                        radar.rx[radar.rx_of_tx[chirp % radar.n_tx, receiver]],
+                    )
                     pose = (poses.centres[i, 0], poses.frames[i, 0], np.array(axes))
-                    error = abs(echoes.length[i, receiver, number] - shortest(tx, rx, pose, walls_of(path)))
-                    worst[path.order], count[path.order] = max(worst[path.order], error), count[path.order] + 1
+                    error = abs(
+                        echoes.length[i, receiver, number] - shortest(tx, rx, pose, walls_of(path))
+                    )
+                    worst[path.order], count[path.order] = (
+                        max(worst[path.order], error),
+                        count[path.order] + 1,
+                    )
         for order, error in worst.items():
             says = "Lengths of the person's paths over one and two walls, to the mirrored body"
             quantity = f"worst length, order {order}, {count[order]} paths"
-            yield judged(f"box room, {preset}", quantity, "um", error * 1e6, 1.0, says=says, cases=count[order])
+            yield judged(
+                f"box room, {preset}",
+                quantity,
+                "um",
+                error * 1e6,
+                1.0,
+                says=says,
+                cases=count[order],
+            )
 
 
 # -- returns ----------------------------------------------------------------------------------------------------------
@@ -159,12 +217,21 @@ def sent(ways: Array, polarization: str) -> Array:
     return np.asarray(field / np.linalg.norm(field, axis=1, keepdims=True))
 
 
-def vector_optics(plane: Plane, over: tuple[bool, bool], antenna: Array, body: Mover, polarization: str, sweep: Array) -> Array:
+def vector_optics(
+    plane: Plane,
+    over: tuple[bool, bool],
+    antenna: Array,
+    body: Mover,
+    polarization: str,
+    sweep: Array,
+) -> Array:
     """Co-polar scattering length over R1 R2, with its phase, by the currents 2 n x H on what both antennas light (frequency,)."""
     pose = body.at(np.zeros(1))
     centre, frame, axes = pose.centres[0, 0], pose.frames[0, 0], np.array(body.axes)
     tx, rx = (plane.image(antenna) if image else antenna for image in over)
-    quadrature = lit_points(frame.T @ (tx - centre), frame.T @ (rx - centre), axes, float(sweep.max()))
+    quadrature = lit_points(
+        frame.T @ (tx - centre), frame.T @ (rx - centre), axes, float(sweep.max())
+    )
     points = centre + quadrature.points @ frame.T
     normal = quadrature.points / axes**2 @ frame.T
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
@@ -174,7 +241,14 @@ def vector_optics(plane: Plane, over: tuple[bool, bool], antenna: Array, body: M
         ranges.append(np.linalg.norm(ways, axis=1))
         ways = ways / ranges[-1][:, None]
         # The image of a source: its field mirrored, and turned round, so that nothing is left along the plane.
-        fields.append((ways, -sent(ways @ plane.turn, polarization) @ plane.turn if image else sent(ways, polarization)))
+        fields.append(
+            (
+                ways,
+                -sent(ways @ plane.turn, polarization) @ plane.turn
+                if image
+                else sent(ways, polarization),
+            )
+        )
         facing = facing - np.sum(normal * ways, axis=1) / 2
     (way, field), (_, heard) = fields
     current = np.cross(normal, np.cross(way, field))
@@ -182,15 +256,35 @@ def vector_optics(plane: Plane, over: tuple[bool, bool], antenna: Array, body: M
     area = quadrature.weight / facing / (np.linalg.norm(tx - centre) * np.linalg.norm(rx - centre))
     share = np.sum(heard * current, axis=1)
     k = np.array([wave_number(f) for f in sweep])[:, None]
-    return np.asarray(1j * k[:, 0] / np.sqrt(np.pi) * np.sum(area * share * np.exp(-1j * k * (ranges[0] + ranges[1])), axis=1))
+    return np.asarray(
+        1j
+        * k[:, 0]
+        / np.sqrt(np.pi)
+        * np.sum(area * share * np.exp(-1j * k * (ranges[0] + ranges[1])), axis=1)
+    )
 
 
-def ours(plane: Plane, antenna: Array, body: Mover, polarization: str, sweep: Array) -> dict[tuple[bool, bool], Array]:
+def ours(
+    plane: Plane, antenna: Array, body: Mover, polarization: str, sweep: Array
+) -> dict[tuple[bool, bool], Array]:
     """The same of `Multipath`, path by path."""
-    u, v = ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0)) if plane is FLOOR else ((20.0, 0.0, 0.0), (0.0, 0.0, 20.0))
+    u, v = (
+        ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0))
+        if plane is FLOOR
+        else ((20.0, 0.0, 0.0), (0.0, 0.0, 20.0))
+    )
     corner = (-10.0, -10.0, 0.0) if plane is FLOOR else (-10.0, 3.0, -10.0)
-    wall = Wall(name=plane.name, corner_m=corner, edge_u_m=u, edge_v_m=v, material=material("perfect-conductor"), thickness_m=0.1)
-    radar = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=tuple(antenna), polarization=polarization)  # type: ignore[arg-type]
+    wall = Wall(
+        name=plane.name,
+        corner_m=corner,
+        edge_u_m=u,
+        edge_v_m=v,
+        material=material("perfect-conductor"),
+        thickness_m=0.1,
+    )
+    radar = rt.Radar(
+        tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=tuple(antenna), polarization=polarization
+    )  # type: ignore[arg-type]
     rung = Multipath(radar, body, Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
     # Chirp 0 is 31 us late, in which nobody gets far.
     echoes = rung.echoes(np.zeros(1, dtype=np.int64))
@@ -206,7 +300,9 @@ def k_rho(plane: Plane, antenna: Array, body: Mover, sweep: Array) -> float:
     ways = [place - np.array(body.centre) for place in (antenna, plane.image(antenna))]
     normal = body.frame.T @ sum(way / np.linalg.norm(way) for way in ways)
     normal /= np.linalg.norm(normal)
-    smaller, _ = rt.rcs.ellipsoid_radii(*body.axes, np.arccos(normal[2]), np.arctan2(normal[1], normal[0]))
+    smaller, _ = rt.rcs.ellipsoid_radii(
+        *body.axes, np.arccos(normal[2]), np.arctan2(normal[1], normal[0])
+    )
     return wave_number(float(sweep.mean())) * float(smaller)
 
 
@@ -217,16 +313,29 @@ def decibel(ratio: Array | float) -> float:
 def optics_rows(quick: bool) -> Iterator[Row]:
     sweep = np.linspace(12e9, 16e9, 9 if quick else 33)
     antenna = np.array([-4.0, 1.0, 1.0])
-    ghosts: dict[str, list[float]] = {"one way over the plane": [], "both ways over the plane": [], "all four together": []}
+    ghosts: dict[str, list[float]] = {
+        "one way over the plane": [],
+        "both ways over the plane": [],
+        "all four together": [],
+    }
     tight: list[float] = []
     places = ((0.0, 0.0, 1.1),) if quick else ((0.0, 0.0, 1.1), (-1.0, 1.6, 0.8), (1.0, -0.5, 1.5))
-    for plane, polarization, (seed, axes), place in product((FLOOR, LEFT), "vh", enumerate(SHAPES.values()), places):
-        body = Mover(place, axes, Rotation.random(random_state=10 + seed).as_matrix(), (0.0, 0.0, 0.0))
+    for plane, polarization, (seed, axes), place in product(
+        (FLOOR, LEFT), "vh", enumerate(SHAPES.values()), places
+    ):
+        body = Mover(
+            place, axes, Rotation.random(random_state=10 + seed).as_matrix(), (0.0, 0.0, 0.0)
+        )
         mine = ours(plane, antenna, body, polarization, sweep)
         if any((values == 0).all() for values in mine.values()):
             continue
-        optics = {over: vector_optics(plane, over, antenna, body, polarization, sweep) for over in mine}
-        power = {over: (np.mean(np.abs(mine[over]) ** 2), np.mean(np.abs(optics[over]) ** 2)) for over in mine}
+        optics = {
+            over: vector_optics(plane, over, antenna, body, polarization, sweep) for over in mine
+        }
+        power = {
+            over: (np.mean(np.abs(mine[over]) ** 2), np.mean(np.abs(optics[over]) ** 2))
+            for over in mine
+        }
         one_way = [decibel(np.divide(*power[over])) for over in ((True, False), (False, True))]
         if k_rho(plane, antenna, body, sweep) < LEAST_K_RHO:
             tight += one_way
@@ -240,7 +349,15 @@ def optics_rows(quick: bool) -> Iterator[Row]:
         says = "Image method against bistatic vector PO, an ellipsoid beside a conducting plane"
         worst = float(np.abs(errors).max())
         claim = "beside a conducting plane"
-        yield judged(claim, f"{name}: worst |dB|, {len(errors)} cases", "dB", worst, 0.4, says=says, cases=len(errors))
+        yield judged(
+            claim,
+            f"{name}: worst |dB|, {len(errors)} cases",
+            "dB",
+            worst,
+            0.4,
+            says=says,
+            cases=len(errors),
+        )
         yield reported(claim, f"{name}: rms", "dB", float(np.sqrt(np.mean(np.square(errors)))))
     if tight:
         # Tighter than what `specular` itself is judged for; physical optics is not reciprocal there, v and h differ by 0.2 dB.
@@ -254,19 +371,36 @@ def optics_rows(quick: bool) -> Iterator[Row]:
 def map_rows(quick: bool) -> Iterator[Row]:
     radar = rt.Radar.preset("paper-12ghz")
     found: dict[str, list[float]] = {"range": [], "velocity": [], "azimuth": [], "elevation": []}
-    starts = (((0.2, -0.4, 1.2), (-1.5, 0.6, 0.0)), ((0.8, 0.9, 1.0), (-1.0, -1.2, 0.3)), ((-0.8, 0.2, 1.5), (1.3, 1.0, -0.3)))
+    starts = (
+        ((0.2, -0.4, 1.2), (-1.5, 0.6, 0.0)),
+        ((0.8, 0.9, 1.0), (-1.0, -1.2, 0.3)),
+        ((-0.8, 0.2, 1.5), (1.3, 1.0, -0.3)),
+    )
     # All walls once, and twice the same.
     rooms = [(box(), 1), *(((wall,), 2) for wall in box() if wall.name not in ("near", "far"))]
     for (walls, order), (start, velocity) in product(rooms, starts[: 1 if quick else 3]):
         mover = Mover(start, (0.12,) * 3, np.eye(3), velocity)
         for name, errors in ghosts_of(radar, mover, walls, order).items():
             found[name] += errors
-    limits = {"range": ("range bin", 1.0), "velocity": ("Doppler bin", 1.0), "azimuth": ("beam", 1.0), "elevation": ("beam", 1.0)}
+    limits = {
+        "range": ("range bin", 1.0),
+        "velocity": ("Doppler bin", 1.0),
+        "azimuth": ("beam", 1.0),
+        "elevation": ("beam", 1.0),
+    }
     for name, errors in found.items():
         unit, limit = limits[name]
         says = "Ghosts of a moving sphere in a box room, at their predicted places"
         quantity = f"worst {name}, {len(errors)} ghosts"
-        yield judged("box room, 12 GHz", quantity, unit, float(np.max(errors)), limit, says=says, cases=len(errors))
+        yield judged(
+            "box room, 12 GHz",
+            quantity,
+            unit,
+            float(np.max(errors)),
+            limit,
+            says=says,
+            cases=len(errors),
+        )
 
 
 class Ghost(NamedTuple):
@@ -279,7 +413,9 @@ class Ghost(NamedTuple):
     strength: float
 
 
-def ghosts_of(radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int) -> dict[str, list[float]]:
+def ghosts_of(
+    radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int
+) -> dict[str, list[float]]:
     rung = Multipath(radar, body, Scene(walls=walls), order=order)  # type: ignore[arg-type]
     chirps = np.arange(radar.chirps_per_frame)
     echoes = rung.echoes(chirps)
@@ -299,13 +435,17 @@ def ghosts_of(radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int)
     for ghost in ghosts:
         if ghost.legs == ((), ()) or not alone(ghost, ghosts, radar):
             continue
-        row, column = round(ghost.range_m / radar.range_bin_m), int(np.abs(axis - ghost.velocity).argmin())
+        row, column = (
+            round(ghost.range_m / radar.range_bin_m),
+            int(np.abs(axis - ghost.velocity).argmin()),
+        )
         rows_, columns = slice(row - 3, row + 4), slice(column - 3, column + 4)
         near = power[rows_, columns]
         # Its centroid, for in 0.1 s a ghost may cross more than a bin.
         weight = near * (near > near.max() / 10)
         found["range"].append(
-            abs(float((weight.sum(axis=1) @ radar.range_m[rows_]) / weight.sum()) - ghost.range_m) / radar.range_bin_m
+            abs(float((weight.sum(axis=1) @ radar.range_m[rows_]) / weight.sum()) - ghost.range_m)
+            / radar.range_bin_m
         )
         seen = float((weight.sum(axis=0) @ axis[columns]) / weight.sum())
         found["velocity"].append(abs(seen - ghost.velocity) / radar.velocity_bin_mps)
@@ -324,7 +464,11 @@ def ghosts_of(radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int)
 
 
 def predicted(
-    radar: rt.Radar, body: Mover, legs: tuple[tuple[str, ...], tuple[str, ...]], middle: float, strength: float
+    radar: rt.Radar,
+    body: Mover,
+    legs: tuple[tuple[str, ...], tuple[str, ...]],
+    middle: float,
+    strength: float,
 ) -> Ghost:
     place = np.asarray(radar.position_m)
     step = 0.02
@@ -335,13 +479,20 @@ def predicted(
         ways.append(shortest(place, place, local, legs))
     centre = body.at(np.array([middle])).centres[0, 0]
     # Of a sphere, but for its radius and a little; over (two, tx, rx), there and back.
-    lengths = np.array([ways_over(radar, *(mirrored(centre, leg) for leg in order)) for order in (legs, legs[::-1])])
+    lengths = np.array(
+        [
+            ways_over(radar, *(mirrored(centre, leg) for leg in order))
+            for order in (legs, legs[::-1])
+        ]
+    )
     return Ghost(legs, ways[1] / 2, (ways[2] - ways[0]) / (4 * step), lengths, strength)
 
 
 def ways_over(radar: rt.Radar, out: Array, back: Array) -> Array:
     heard = radar.rx[radar.rx_of_tx]
-    return np.asarray(np.linalg.norm(radar.tx - out, axis=1)[:, None] + np.linalg.norm(heard - back, axis=2))
+    return np.asarray(
+        np.linalg.norm(radar.tx - out, axis=1)[:, None] + np.linalg.norm(heard - back, axis=2)
+    )
 
 
 def alone(ghost: Ghost, others: list[Ghost], radar: rt.Radar) -> bool:
@@ -350,7 +501,8 @@ def alone(ghost: Ghost, others: list[Ghost], radar: rt.Radar) -> bool:
         if other is ghost:
             continue
         apart = max(
-            abs(ghost.range_m - other.range_m) / radar.range_bin_m, abs(ghost.velocity - other.velocity) / radar.velocity_bin_mps
+            abs(ghost.range_m - other.range_m) / radar.range_bin_m,
+            abs(ghost.velocity - other.velocity) / radar.velocity_bin_mps,
         )
         if apart < 5 and other.strength > ghost.strength * 1e-3:
             return False
@@ -366,14 +518,24 @@ def apparent(radar: rt.Radar, ghost: Ghost) -> tuple[Array, Array]:
     sines = np.linspace(-0.9, 0.9, 7201)
     found = []
     for axis, line in ((1, slice(0, radar.tx_y)), (2, slice(radar.tx_y, None))):
-        across = [antennas[..., axis] - radar.position_m[axis] for antennas in (radar.tx[line], radar.rx[radar.rx_of_tx[line]])]
+        across = [
+            antennas[..., axis] - radar.position_m[axis]
+            for antennas in (radar.tx[line], radar.rx[radar.rx_of_tx[line]])
+        ]
         # |place - antenna| for a place at that range in a plane with the line.
         r = ghost.range_m
-        ways = [np.sqrt(r * r - 2 * r * sines * offset[..., None] + offset[..., None] ** 2) for offset in across]
+        ways = [
+            np.sqrt(r * r - 2 * r * sines * offset[..., None] + offset[..., None] ** 2)
+            for offset in across
+        ]
         steered = ways[0][:, None] + ways[1]
         turns = (ghost.lengths[:, line, :, None] - steered) / radar.wavelength_m
         power = np.abs(np.exp(2j * np.pi * turns).sum(axis=(0, 1, 2))) ** 2
-        peak = (power[1:-1] >= power[:-2]) & (power[1:-1] >= power[2:]) & (power[1:-1] > power.max() / 2)
+        peak = (
+            (power[1:-1] >= power[:-2])
+            & (power[1:-1] >= power[2:])
+            & (power[1:-1] > power.max() / 2)
+        )
         found.append(sines[1:-1][peak])
     return found[0], found[1]
 
@@ -382,7 +544,9 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
     """What is lost between the instants at which ghosts are looked at, for a person who walks in a living room."""
     scene = Scene.load("living-room")
     radar = scene.place(rt.Radar.preset("paper-12ghz"))
-    motion = rt.motion.place(rt.synthetic_motion("walk", seed=0, duration_s=3.0), heading_deg=scene.heading_deg)
+    motion = rt.motion.place(
+        rt.synthetic_motion("walk", seed=0, duration_s=3.0), heading_deg=scene.heading_deg
+    )
     body = rt.Body.from_motion(motion.shifted([*scene.person_position_m, 0.0]))
     # From the middle of the capture on, a tenth of a second of it.
     chirps = np.arange(radar.chirps_per_frame) + 20_000 // radar.n_tx * radar.n_tx
@@ -395,16 +559,25 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
         field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
         # What slabs delay comes in several echoes of one path and part.
         owned = list(zip(rung.path_names, echoes.part.tolist(), strict=True))
-        paths = sorted({own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1})
+        paths = sorted(
+            {own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1}
+        )
         of_path = np.array([[own == path for path in paths] for own in owned], dtype=np.float64)
         fields[apart_s] = field @ of_path
     first, last = fields.values()
     yield from shadow_rows(radar, scene, body, chirps)
     error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
-    yield reported("living room, walk", f"ghosts at anchors {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms", "dB", error)
+    yield reported(
+        "living room, walk",
+        f"ghosts at anchors {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms",
+        "dB",
+        error,
+    )
 
 
-def shadow_rows(radar: rt.Radar, scene: Scene, body: rt.Body, chirps: NDArray[np.int64]) -> Iterator[Row]:
+def shadow_rows(
+    radar: rt.Radar, scene: Scene, body: rt.Body, chirps: NDArray[np.int64]
+) -> Iterator[Row]:
     """The same for the moving shadow in the clutter, over what of it changes in that time."""
     clutter = Clutter(radar, scene, order=1)
     shadows = []

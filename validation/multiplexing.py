@@ -54,9 +54,20 @@ def limit_rows() -> Iterator[Row]:
     for kind in KINDS:
         repetition = CHIRP_S * (TX if kind == "tdm" else 1)
         own = radar(kind).max_velocity_mps
-        says = "the unambiguous velocity under TDM, FDM and Doppler division, against lambda / (4 T)"
+        says = (
+            "the unambiguous velocity under TDM, FDM and Doppler division, against lambda / (4 T)"
+        )
         limit = WAVELENGTH / (4 * repetition)
-        yield judged("limits", f"velocity, {NAMES[kind]}", "m/s", own, 1e-9, reference=limit, says=says, cases=3)
+        yield judged(
+            "limits",
+            f"velocity, {NAMES[kind]}",
+            "m/s",
+            own,
+            1e-9,
+            reference=limit,
+            says=says,
+            cases=3,
+        )
     fdm = radar("fdm")
     rate = 256 / CHIRP_S
     yield judged(
@@ -67,7 +78,14 @@ def limit_rows() -> Iterator[Row]:
         1e-6,
         reference=11 * rate / 1e6,
     )
-    yield judged("limits", "FDM: rate of a receiver", "MHz", fdm.receiver_rate_hz / 1e6, 1e-6, reference=12 * rate / 1e6)
+    yield judged(
+        "limits",
+        "FDM: rate of a receiver",
+        "MHz",
+        fdm.receiver_rate_hz / 1e6,
+        1e-6,
+        reference=12 * rate / 1e6,
+    )
 
 
 def point_rows() -> Iterator[Row]:
@@ -85,12 +103,28 @@ def point_rows() -> Iterator[Row]:
         )
         one = np.zeros(1, np.int64)
         amplitude = np.ones((1, *length.shape, 1), dtype=np.complex128)
-        echoes = rt.Echoes(length=length[..., None], amplitude=amplitude, frequency=[14e9], tx=tx, part=one, bounces=one + 1)  # type: ignore[arg-type]
+        echoes = rt.Echoes(
+            length=length[..., None],
+            amplitude=amplitude,
+            frequency=[14e9],
+            tx=tx,
+            part=one,
+            bounces=one + 1,
+        )  # type: ignore[arg-type]
         power = maps(echoes, made, 0.0)
         found = made.velocity_mps(power.shape[1])[int(power.max(axis=0).argmax())]
         expected = folded(true) if kind == "tdm" else true
         says = "a point at 11 m/s in the map: folded under TDM, where it is under FDM and Doppler division"
-        yield judged("point", NAMES[kind], "m/s", found, made.velocity_bin_mps, reference=expected, says=says, cases=3)
+        yield judged(
+            "point",
+            NAMES[kind],
+            "m/s",
+            found,
+            made.velocity_bin_mps,
+            reference=expected,
+            says=says,
+            cases=3,
+        )
 
 
 def folded(velocity: float) -> float:
@@ -125,7 +159,10 @@ def body_of(activity: str) -> rt.Body:
     motion = rt.synthetic_motion(activity, seed=0, duration_s=3.0)
     if activity == "kick":
         assert motion.length_s is not None
-        times = {"first_frame_s": motion.first_frame_s / FASTER, "length_s": motion.length_s / FASTER}
+        times = {
+            "first_frame_s": motion.first_frame_s / FASTER,
+            "length_s": motion.length_s / FASTER,
+        }
         motion = dataclasses.replace(motion, rate_hz=FASTER * motion.rate_hz, **times)
     return rt.Body.from_motion(place(motion))
 
@@ -133,8 +170,12 @@ def body_of(activity: str) -> rt.Body:
 def window(activity: str, kind: str, middle_s: float) -> rt.Echoes:
     """Echoes of one window with its middle there."""
     made = radar(kind)
-    cycle = round((middle_s - made.cycles_per_frame * made.cycle_duration_s / 2) / made.cycle_duration_s)
-    return build_model("analytic", made, body_of(activity)).echoes(cycle * TX + np.arange(made.chirps_per_frame))
+    cycle = round(
+        (middle_s - made.cycles_per_frame * made.cycle_duration_s / 2) / made.cycle_duration_s
+    )
+    return build_model("analytic", made, body_of(activity)).echoes(
+        cycle * TX + np.arange(made.chirps_per_frame)
+    )
 
 
 def mean_velocity(power: NDArray[np.floating], made: rt.Radar) -> float:
@@ -166,10 +207,24 @@ def walk_rows(quick: bool) -> Iterator[Row]:
         error = float(np.abs(np.subtract(found[kind], found["tdm"])).max())
         says = "mean velocity in the maps of a walk: FDM and Doppler division against TDM, worst window"
         yield judged(
-            "walk", f"{NAMES[kind]} less TDM", "m/s", error, radar("tdm").velocity_bin_mps, says=says, cases=2 * len(times)
+            "walk",
+            f"{NAMES[kind]} less TDM",
+            "m/s",
+            error,
+            radar("tdm").velocity_bin_mps,
+            says=says,
+            cases=2 * len(times),
         )
         says = "power beyond 7 m/s in the maps of a walk that reaches 5 m/s: FDM and Doppler division, worst window"
-        yield judged("walk", f"beyond 7 m/s, {NAMES[kind]}", "share", max(beyond[kind]), 0.01, says=says, cases=2 * len(times))
+        yield judged(
+            "walk",
+            f"beyond 7 m/s, {NAMES[kind]}",
+            "share",
+            max(beyond[kind]),
+            0.01,
+            says=says,
+            cases=2 * len(times),
+        )
 
 
 def foot_rate(body: rt.Body, part: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -178,7 +233,9 @@ def foot_rate(body: rt.Body, part: int, times: NDArray[np.float64]) -> NDArray[n
     def distance(at: NDArray[np.float64]) -> NDArray[np.float64]:
         centres, frames, axes = body.at(at)
         sight = np.array(radar("tdm").position_m) - centres[:, part]
-        own = np.einsum("tji,tj->ti", frames[:, part], sight / np.linalg.norm(sight, axis=1, keepdims=True))
+        own = np.einsum(
+            "tji,tj->ti", frames[:, part], sight / np.linalg.norm(sight, axis=1, keepdims=True)
+        )
         near = axes[part] ** 2 * own / np.linalg.norm(axes[part] * own, axis=1, keepdims=True)
         point = centres[:, part] + np.einsum("tij,tj->ti", frames[:, part], near)
         return np.asarray(np.linalg.norm(point - np.array(radar("tdm").position_m), axis=1))
@@ -210,14 +267,26 @@ def kick_rows() -> Iterator[Row]:
         says = "a foot that kicks faster than 7.14 m/s, alone: folded under TDM, at its range rate under FDM and Doppler division"
         found = mean_velocity(power, made)
         yield judged(
-            "kick", f"the foot alone, {NAMES[kind]}", "m/s", found, made.velocity_bin_mps, reference=expected, says=says, cases=3
+            "kick",
+            f"the foot alone, {NAMES[kind]}",
+            "m/s",
+            found,
+            made.velocity_bin_mps,
+            reference=expected,
+            says=says,
+            cases=3,
         )
     for kind in KINDS:
-        fast = np.abs(radar(kind).velocity_mps(kicked(kind).shape[1])) > WAVELENGTH / (4 * CHIRP_S * TX)
+        fast = np.abs(radar(kind).velocity_mps(kicked(kind).shape[1])) > WAVELENGTH / (
+            4 * CHIRP_S * TX
+        )
         power = kicked(kind)
         above = np.where(power > 10 * np.median(power), power, 0)
         yield reported(
-            "kick", f"whole body, power beyond 7.14 m/s, {NAMES[kind]}", "share", float(above[:, fast].sum() / above.sum())
+            "kick",
+            f"whole body, power beyond 7.14 m/s, {NAMES[kind]}",
+            "share",
+            float(above[:, fast].sum() / above.sum()),
         )
 
 
@@ -236,13 +305,17 @@ def figure(rows: list[Row], path: Path) -> None:
     from matplotlib import pyplot as plt
 
     _, _, rate = fastest()
-    drawn, panels = plt.subplots(1, 3, figsize=(12, 4.4), sharex=True, sharey=True, layout="constrained")
+    drawn, panels = plt.subplots(
+        1, 3, figsize=(12, 4.4), sharex=True, sharey=True, layout="constrained"
+    )
     for axes, kind in zip(panels, KINDS, strict=True):
         made, power = radar(kind), kicked(kind)
         level = 10 * np.log10(power / power.max())
         velocity, step = made.velocity_mps(power.shape[1]), made.velocity_bin_mps
         extent = (velocity[0] - step / 2, velocity[-1] + step / 2, 0, made.max_range_m)
-        shown = axes.imshow(level, origin="lower", aspect="auto", extent=extent, vmin=-50, vmax=0, cmap="viridis")
+        shown = axes.imshow(
+            level, origin="lower", aspect="auto", extent=extent, vmin=-50, vmax=0, cmap="viridis"
+        )
         axes.axvline(rate, color="red", linewidth=0.8, linestyle=":")
         axes.text(rate, 5.9, f" foot {rate:.1f} m/s", color="red", fontsize=8, ha="left", va="top")
         axes.set_title(f"{NAMES[kind]}: ±{made.max_velocity_mps:.2f} m/s", fontsize=9)

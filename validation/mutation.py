@@ -48,7 +48,13 @@ MOST_FILES, MOST_SECONDS = 4, 25.0
 LIMIT_S, COMPILING_S = 60.0, 120.0
 """A mutant that takes longer has not ended: that is noticed. What compiles anew may take longer."""
 
-OPERATORS = {ast.Add: ("+", "-"), ast.Sub: ("-", "+"), ast.Mult: ("*", "/"), ast.Div: ("/", "*"), ast.FloorDiv: ("//", "*")}
+OPERATORS = {
+    ast.Add: ("+", "-"),
+    ast.Sub: ("-", "+"),
+    ast.Mult: ("*", "/"),
+    ast.Div: ("/", "*"),
+    ast.FloorDiv: ("//", "*"),
+}
 COMPARISONS = {
     ast.Lt: ("<", "<="),
     ast.LtE: ("<=", "<"),
@@ -58,7 +64,14 @@ COMPARISONS = {
     ast.NotEq: ("!=", "=="),
 }
 OPPOSITE = {ast.Lt: ("<", ">"), ast.Gt: (">", "<"), ast.LtE: ("<=", ">="), ast.GtE: (">=", "<=")}
-_PAIRS = (("sin", "cos"), ("min", "max"), ("minimum", "maximum"), ("argmin", "argmax"), ("floor", "ceil"), ("any", "all"))
+_PAIRS = (
+    ("sin", "cos"),
+    ("min", "max"),
+    ("minimum", "maximum"),
+    ("argmin", "argmax"),
+    ("floor", "ceil"),
+    ("any", "all"),
+)
 NAMES = {one: other for pair in _PAIRS for one, other in (pair, pair[::-1])}
 
 
@@ -103,7 +116,9 @@ class _Finder(ast.NodeVisitor):
     def _span(self, node: ast.expr) -> tuple[int, int]:
         assert node.end_lineno is not None
         assert node.end_col_offset is not None
-        return self._place(node.lineno, node.col_offset), self._place(node.end_lineno, node.end_col_offset)
+        return self._place(node.lineno, node.col_offset), self._place(
+            node.end_lineno, node.end_col_offset
+        )
 
     def _add(self, begin: int, end: int, text: str) -> None:
         source = self._source
@@ -112,7 +127,9 @@ class _Finder(ast.NodeVisitor):
         old = source[first:last].strip()
         new = (source[first:begin] + text + source[end:last]).strip()
         name = ".".join(self._function) or "<module>"
-        self.found.append(Mutant(self._file, name, source.count("\n", 0, begin) + 1, begin, end, text, old, new))
+        self.found.append(
+            Mutant(self._file, name, source.count("\n", 0, begin) + 1, begin, end, text, old, new)
+        )
 
     def _operator(self, left: ast.expr, right: ast.expr, sign: str, other: str) -> None:
         """Change the sign between two expressions."""
@@ -166,7 +183,9 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Compare(self, node: ast.Compare) -> None:
-        for left, sign, right in zip([node.left, *node.comparators], node.ops, node.comparators, strict=False):
+        for left, sign, right in zip(
+            [node.left, *node.comparators], node.ops, node.comparators, strict=False
+        ):
             for table in (COMPARISONS, OPPOSITE):
                 if type(sign) in table:
                     self._operator(left, right, *table[type(sign)])
@@ -184,7 +203,13 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_Call(self, node: ast.Call) -> None:
-        name = node.func.attr if isinstance(node.func, ast.Attribute) else node.func.id if isinstance(node.func, ast.Name) else ""
+        name = (
+            node.func.attr
+            if isinstance(node.func, ast.Attribute)
+            else node.func.id
+            if isinstance(node.func, ast.Name)
+            else ""
+        )
         if name.startswith("warn"):
             return
         end = self._span(node.func)[1]
@@ -193,7 +218,11 @@ class _Finder(ast.NodeVisitor):
         if name in ("arctan2", "atan2", "cross"):
             first, second = (self._span(argument) for argument in node.args[:2])
             text = self._source
-            self._add(first[0], second[1], text[slice(*second)] + text[first[1] : second[0]] + text[slice(*first)])
+            self._add(
+                first[0],
+                second[1],
+                text[slice(*second)] + text[first[1] : second[0]] + text[slice(*first)],
+            )
         if name in ("conj", "conjugate"):
             if node.args:
                 self._add(*self._span(node), f"({self._source[slice(*self._span(node.args[0]))]})")
@@ -202,7 +231,11 @@ class _Finder(ast.NodeVisitor):
         self.generic_visit(node)
 
     def visit_keyword(self, node: ast.keyword) -> None:
-        if node.arg == "axis" and isinstance(node.value, ast.Constant) and isinstance(node.value.value, int):
+        if (
+            node.arg == "axis"
+            and isinstance(node.value, ast.Constant)
+            and isinstance(node.value.value, int)
+        ):
             self._add(*self._span(node.value), "1" if node.value.value == 0 else "0")
         elif node.arg not in ("dtype", "strict", "stacklevel", "copy", "order"):
             self.visit(node.value)
@@ -231,7 +264,10 @@ def draw(count: int, seed: int, only: str) -> list[Mutant]:
     chance = random.Random(seed)
     piles = []
     for package in PACKAGES:
-        files = sorted(path.relative_to(CHECKOUT).as_posix() for path in (CHECKOUT / "rtradar" / package).rglob("*.py"))
+        files = sorted(
+            path.relative_to(CHECKOUT).as_posix()
+            for path in (CHECKOUT / "rtradar" / package).rglob("*.py")
+        )
         pile = [mutant for file in files if only in file for mutant in mutants_of(file)]
         chance.shuffle(pile)
         piles.append(pile)
@@ -245,20 +281,31 @@ class Tree:
     """A copy of the checkout, what its tests call, and its compiled code."""
 
     def __init__(self, folder: Path) -> None:
-        self._root, self._cache, self._traces = folder / "tree", folder / "numba", folder / "traces.json"
+        self._root, self._cache, self._traces = (
+            folder / "tree",
+            folder / "numba",
+            folder / "traces.json",
+        )
         if self._root.exists():
             shutil.rmtree(self._root)
         named = subprocess.run(
-            ["git", "ls-files", "-z", "-co", "--exclude-standard"], cwd=CHECKOUT, capture_output=True, check=True
+            ["git", "ls-files", "-z", "-co", "--exclude-standard"],
+            cwd=CHECKOUT,
+            capture_output=True,
+            check=True,
         )
         for name in filter(None, named.stdout.decode().split("\0")):
             if (CHECKOUT / name).is_file():
                 (self._root / name).parent.mkdir(parents=True, exist_ok=True)
                 shutil.copy2(CHECKOUT / name, self._root / name)
-        sources = [path for folder in ("rtradar", "tests") for path in (self._root / folder).rglob("*.py")]
+        sources = [
+            path for folder in ("rtradar", "tests") for path in (self._root / folder).rglob("*.py")
+        ]
         stamp = str(max(path.stat().st_mtime_ns for path in sources))
         kept = json.loads(self._traces.read_text()) if self._traces.exists() else {}
-        self._traced: dict[str, dict[str, dict[str, object]]] = kept.get("files", {}) if kept.get("stamp") == stamp else {}
+        self._traced: dict[str, dict[str, dict[str, object]]] = (
+            kept.get("files", {}) if kept.get("stamp") == stamp else {}
+        )
         self._stamp = stamp
         if not self._traced:
             shutil.rmtree(self._cache, ignore_errors=True)
@@ -272,13 +319,21 @@ class Tree:
             names = set()
             for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
                 if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("rtradar"):
-                    names |= {node.module or "", *(f"{node.module}.{alias.name}" for alias in node.names)}
+                    names |= {
+                        node.module or "",
+                        *(f"{node.module}.{alias.name}" for alias in node.names),
+                    }
                 elif isinstance(node, ast.Import):
-                    names |= {alias.name for alias in node.names if alias.name.startswith("rtradar")}
+                    names |= {
+                        alias.name for alias in node.names if alias.name.startswith("rtradar")
+                    }
             own = path.relative_to(self._root).as_posix()
             paths = {name.replace(".", "/") for name in names}
             found[own] = {
-                each for name in paths for each in (f"{name}.py", f"{name}/__init__.py") if (self._root / each).is_file()
+                each
+                for name in paths
+                for each in (f"{name}.py", f"{name}/__init__.py")
+                if (self._root / each).is_file()
             }
         return found
 
@@ -286,7 +341,11 @@ class Tree:
         """Files that import it, then those that import these, and so on."""
         rings, known = [], {file}
         while True:
-            ring = {name for name, taken in self.imports.items() if taken & (rings[-1] if rings else {file})} - known
+            ring = {
+                name
+                for name, taken in self.imports.items()
+                if taken & (rings[-1] if rings else {file})
+            } - known
             if not ring:
                 return rings
             known |= ring
@@ -296,15 +355,27 @@ class Tree:
         """Those that most likely notice a change: they import it, are called alike, and speak of what it defines."""
         path = Path(file)
         top = ast.parse((self._root / file).read_text(encoding="utf-8")).body
-        named = "|".join(node.name for node in top if isinstance(node, (ast.FunctionDef, ast.ClassDef))) or "$^"
+        named = (
+            "|".join(node.name for node in top if isinstance(node, (ast.FunctionDef, ast.ClassDef)))
+            or "$^"
+        )
         ranks: dict[str, float] = {}
         for distance, ring in enumerate(self.importers(file)):
             for name in ring:
                 if not Path(name).name.startswith("test_"):
                     continue
-                alike = Path(name).parent.name == path.parent.name or Path(name).stem.startswith(f"test_{path.parent.name}")
-                spoken = len(re.findall(rf"\b(?:{named})\b", (self._root / name).read_text(encoding="utf-8")))
-                ranks[name] = distance - 2 * (path.stem in Path(name).stem) - 1.5 * alike - min(spoken, 10) / 5
+                alike = Path(name).parent.name == path.parent.name or Path(name).stem.startswith(
+                    f"test_{path.parent.name}"
+                )
+                spoken = len(
+                    re.findall(rf"\b(?:{named})\b", (self._root / name).read_text(encoding="utf-8"))
+                )
+                ranks[name] = (
+                    distance
+                    - 2 * (path.stem in Path(name).stem)
+                    - 1.5 * alike
+                    - min(spoken, 10) / 5
+                )
         return sorted(ranks, key=lambda name: (ranks[name], name))[:MOST_FILES]
 
     def traced(self, test_file: str) -> dict[str, dict[str, object]]:
@@ -312,16 +383,23 @@ class Tree:
         if test_file not in self._traced:
             out = self._root.parent / "trace.json"
             out.unlink(missing_ok=True)
-            self._pytest([test_file, "-p", "mutation_trace"], self._cache, 600, {"MUTATION_TRACE": str(out)})
+            self._pytest(
+                [test_file, "-p", "mutation_trace"], self._cache, 600, {"MUTATION_TRACE": str(out)}
+            )
             found = json.loads(out.read_text()) if out.exists() else {}
-            self._traced[test_file] = {name: about for name, about in found.items() if about.get("outcome") == "passed"}
+            self._traced[test_file] = {
+                name: about for name, about in found.items() if about.get("outcome") == "passed"
+            }
             self._traces.write_text(json.dumps({"stamp": self._stamp, "files": self._traced}))
         return self._traced[test_file]
 
     def tests(self, mutant: Mutant, test_file: str) -> list[str]:
         """What is to be run of a file, fastest first."""
         own = mutant.file.removeprefix("rtradar/")
-        near = tuple(f"{name.removeprefix('rtradar/')}::" for name in next(iter(self.importers(mutant.file)), set()))
+        near = tuple(
+            f"{name.removeprefix('rtradar/')}::"
+            for name in next(iter(self.importers(mutant.file)), set())
+        )
         wanted = [(f"{own}::{mutant.function}",), (f"{own}::",), near]
         if mutant.function == "<module>" or self.is_compiled(mutant):
             wanted = [(f"{own}::", *near)]
@@ -345,9 +423,13 @@ class Tree:
             node.name
             for node in ast.walk(tree)
             if isinstance(node, ast.FunctionDef)
-            and re.search(r"compiled|inlined|njit|jit", " ".join(map(ast.unparse, node.decorator_list)))
+            and re.search(
+                r"compiled|inlined|njit|jit", " ".join(map(ast.unparse, node.decorator_list))
+            )
         }
-        return bool(by_numba) and (mutant.function == "<module>" or mutant.function.split(".")[0] in by_numba)
+        return bool(by_numba) and (
+            mutant.function == "<module>" or mutant.function.split(".")[0] in by_numba
+        )
 
     def run(self, mutant: Mutant) -> tuple[str, str, int]:
         """What came of it - ``noticed``, ``timeout``, ``survived`` or ``untested`` -, by which test, and how many ran at most."""
@@ -365,27 +447,54 @@ class Tree:
                 shutil.copy2(path, kept)
                 shutil.copytree(self._cache, cache, copy_function=os.link)
                 if compiled:
-                    stems = {Path(mutant.file).stem, *(Path(name).stem for ring in self.importers(mutant.file) for name in ring)}
+                    stems = {
+                        Path(mutant.file).stem,
+                        *(Path(name).stem for ring in self.importers(mutant.file) for name in ring),
+                    }
                     for entry in cache.rglob("*.nb?"):
                         if entry.name.split(".")[0] in stems:
                             entry.unlink()
                 try:
                     path.write_text(changed(source, mutant), encoding="utf-8")
-                    status, said = self._pytest(["-x", *tests], cache, COMPILING_S if compiled else LIMIT_S, {})
+                    status, said = self._pytest(
+                        ["-x", *tests], cache, COMPILING_S if compiled else LIMIT_S, {}
+                    )
                 finally:
                     shutil.copy2(kept, path)
             if status is None:
                 return "timeout", test_file, count
             if status != 0:
                 failed = re.search(r"^(?:FAILED|ERROR) (.*)$", said, re.MULTILINE)
-                return "noticed", failed[1][:200] if failed else f"status {status} of {test_file}", count
+                return (
+                    "noticed",
+                    failed[1][:200] if failed else f"status {status} of {test_file}",
+                    count,
+                )
         return "survived" if count else "untested", "", count
 
-    def _pytest(self, arguments: list[str], cache: Path, limit_s: float, more: dict[str, str]) -> tuple[int | None, str]:
-        environment = {name: value for name, value in os.environ.items() if not name.startswith("RTRADAR_MOCAP")}
+    def _pytest(
+        self, arguments: list[str], cache: Path, limit_s: float, more: dict[str, str]
+    ) -> tuple[int | None, str]:
+        environment = {
+            name: value
+            for name, value in os.environ.items()
+            if not name.startswith("RTRADAR_MOCAP")
+        }
         environment |= {"NUMBA_CACHE_DIR": str(cache), "PYTHONDONTWRITEBYTECODE": "1", **more}
-        environment["PYTHONPATH"] = os.pathsep.join([str(self._root), str(self._root / "validation")])
-        command = [sys.executable, "-m", "pytest", "-q", "-m", "not slow", "-p", "no:cacheprovider", *arguments]
+        environment["PYTHONPATH"] = os.pathsep.join(
+            [str(self._root), str(self._root / "validation")]
+        )
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-m",
+            "not slow",
+            "-p",
+            "no:cacheprovider",
+            *arguments,
+        ]
         # In a group of its own, for tests start processes, too.
         run = subprocess.Popen(
             command,
@@ -405,14 +514,25 @@ class Tree:
         return run.returncode, said
 
 
-def outcomes(mutants: list[Mutant], tree: Tree, path: Path | None) -> Iterator[tuple[Mutant, dict[str, object]]]:
+def outcomes(
+    mutants: list[Mutant], tree: Tree, path: Path | None
+) -> Iterator[tuple[Mutant, dict[str, object]]]:
     """What came of each; what the file has is not run again."""
-    known = {row["key"]: row for row in json.loads(path.read_text())["mutants"]} if path and path.exists() else {}
+    known = (
+        {row["key"]: row for row in json.loads(path.read_text())["mutants"]}
+        if path and path.exists()
+        else {}
+    )
     for mutant in mutants:
         if mutant.key not in known:
             began = time.monotonic()
             outcome, by, count = tree.run(mutant)
-            told = {"outcome": outcome, "by": by, "tests": count, "seconds": round(time.monotonic() - began, 1)}
+            told = {
+                "outcome": outcome,
+                "by": by,
+                "tests": count,
+                "seconds": round(time.monotonic() - began, 1),
+            }
             known[mutant.key] = {"key": mutant.key, **asdict(mutant), **told}
             if path:
                 path.write_text(json.dumps({"mutants": list(known.values())}, indent=1) + "\n")
@@ -424,13 +544,24 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=80)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--only", default="", help="files whose path holds this text")
-    parser.add_argument("--json", type=Path, help="outcomes are kept there; those that it holds are not found again")
+    parser.add_argument(
+        "--json", type=Path, help="outcomes are kept there; those that it holds are not found again"
+    )
     parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
-    parser.add_argument("--folder", type=Path, help="of the copy and its compiled code, used again (default: a temporary one)")
+    parser.add_argument(
+        "--folder",
+        type=Path,
+        help="of the copy and its compiled code, used again (default: a temporary one)",
+    )
     options = parser.parse_args()
     mutants = draw(options.count, options.seed, options.only)
     if options.list:
-        print("\n".join(f"{mutant.file}:{mutant.line} {mutant.function}: {mutant.change}" for mutant in mutants))
+        print(
+            "\n".join(
+                f"{mutant.file}:{mutant.line} {mutant.function}: {mutant.change}"
+                for mutant in mutants
+            )
+        )
         return 0
     reasons = {each["key"]: each["reason"] for each in json.loads(EQUIVALENT.read_text())}
     survivors = []
@@ -438,7 +569,9 @@ def main() -> int:
         tree = Tree((options.folder or Path(temporary)).resolve())
         for number, (mutant, told) in enumerate(outcomes(mutants, tree, options.json), 1):
             outcome = (
-                f"{told['outcome']}: equivalent" if mutant.key in reasons and told["outcome"] == "survived" else told["outcome"]
+                f"{told['outcome']}: equivalent"
+                if mutant.key in reasons and told["outcome"] == "survived"
+                else told["outcome"]
             )
             print(
                 f"{number:3d} {outcome:22s} {told['seconds']:6.1f} s {told['tests']:4d} tests  {mutant.file}:{mutant.line}",
@@ -446,7 +579,9 @@ def main() -> int:
             )
             if outcome in ("survived", "untested"):
                 survivors.append(mutant)
-                print(f"    in {mutant.function}\n    - {mutant.old}\n    + {mutant.new}", flush=True)
+                print(
+                    f"    in {mutant.function}\n    - {mutant.old}\n    + {mutant.new}", flush=True
+                )
     print(f"{len(mutants)} mutants, {len(survivors)} that no test notices and no reason excuses")
     return 1 if survivors else 0
 

@@ -46,8 +46,14 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     yield
     sys.settrace(None)
     threading.settrace(None)  # type: ignore[arg-type]
-    names = {f"{code.co_filename[len(ROOT) :]}::{code.co_qualname}" for code in _seen if code.co_filename.startswith(ROOT)}
-    _found.setdefault(item.nodeid, {})["calls"] = sorted(name.replace(".<locals>", "") for name in names)
+    names = {
+        f"{code.co_filename[len(ROOT) :]}::{code.co_qualname}"
+        for code in _seen
+        if code.co_filename.startswith(ROOT)
+    }
+    _found.setdefault(item.nodeid, {})["calls"] = sorted(
+        name.replace(".<locals>", "") for name in names
+    )
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:

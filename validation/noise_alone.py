@@ -31,11 +31,27 @@ def measure(quick: bool) -> list[Row]:
         cells = found["windows"] * radar.samples_per_chirp * radar.cycles_per_frame
         claim = f"{name}, {found['windows']} windows"
         rows.append(
-            reported(claim, "false alarms at exactly the asked rate", "voxels", cells * found["parameters"]["pfa"], key="cfar")
+            reported(
+                claim,
+                "false alarms at exactly the asked rate",
+                "voxels",
+                cells * found["parameters"]["pfa"],
+                key="cfar",
+            )
         )
         if name == "paper-12ghz":
             says = "noise alone through the whole chain for 3 s, 12 GHz: false voxels"
-            rows.append(judged(claim, "false alarms", "voxels", found["detections"], MOST_VOXELS, key="cfar", says=says))
+            rows.append(
+                judged(
+                    claim,
+                    "false alarms",
+                    "voxels",
+                    found["detections"],
+                    MOST_VOXELS,
+                    key="cfar",
+                    says=says,
+                )
+            )
         else:
             rows.append(reported(claim, "false alarms", "voxels", found["detections"], key="cfar"))
     return rows

@@ -71,7 +71,10 @@ class Band:
         )
 
 
-BANDS = (Band("12 GHz radar", 12e9, 0.75e-3, 133, 5.0, 5.0), Band("77 GHz radar", 77e9, 0.15e-3, 666, 2.5, 2.5))
+BANDS = (
+    Band("12 GHz radar", 12e9, 0.75e-3, 133, 5.0, 5.0),
+    Band("77 GHz radar", 77e9, 0.15e-3, 666, 2.5, 2.5),
+)
 
 
 # -- the reference --------------------------------------------------------------------------------------------------
@@ -89,9 +92,13 @@ class Target:
     def upright(cls, axes: Array, frequency: float, density: float) -> Target:
         quadrature = lit_points(ANTENNA, ANTENNA, axes, frequency, density=density)
         k = wave_number(frequency)
-        contribution = 1j * k / np.sqrt(np.pi) * quadrature.weight * np.exp(-1j * k * quadrature.path)
+        contribution = (
+            1j * k / np.sqrt(np.pi) * quadrature.weight * np.exp(-1j * k * quadrature.path)
+        )
         area = np.pi * axes[1] * axes[2]
-        return cls(quadrature.points - ANTENNA, contribution, float(np.sqrt(area / len(quadrature.weight))))
+        return cls(
+            quadrature.points - ANTENNA, contribution, float(np.sqrt(area / len(quadrature.weight)))
+        )
 
     def field(self, occluder: Array, radius: float) -> complex:
         """F with the shadow of a sphere at ``occluder (3,)`` [m], over the free one."""
@@ -120,7 +127,10 @@ def covered_share(axes: Array, occluder: Array, radius: float) -> float:
     rng = np.random.default_rng(0)
     disc = rng.normal(size=(200_000, 2))
     disc *= np.sqrt(rng.uniform(size=len(disc)) / (disc**2).sum(axis=1))[:, None]
-    rays, way = np.column_stack([np.zeros(len(disc)), disc * axes[1:]]) - ANTENNA, occluder - ANTENNA
+    rays, way = (
+        np.column_stack([np.zeros(len(disc)), disc * axes[1:]]) - ANTENNA,
+        occluder - ANTENNA,
+    )
     along = rays @ way / np.linalg.norm(rays, axis=1)
     return float(np.mean(way @ way - along**2 < radius**2))
 
@@ -129,14 +139,22 @@ def covered_share(axes: Array, occluder: Array, radius: float) -> float:
 
 
 def one(ellipsoids: rt.Ellipsoids, part: int) -> rt.Ellipsoids:
-    return rt.Ellipsoids(*(getattr(ellipsoids, field)[part : part + 1] for field in ("centres", "frames", "semi_axes")))
+    return rt.Ellipsoids(
+        *(
+            getattr(ellipsoids, field)[part : part + 1]
+            for field in ("centres", "frames", "semi_axes")
+        )
+    )
 
 
 def ours(axes: Array, occluder: Array, radius: float, frequency: float) -> complex:
     """Field of the target with the occluder before it, the occluder's own return taken out, over its free field."""
-    both = rt.Ellipsoids([np.zeros(3), occluder], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, radius)])
+    both = rt.Ellipsoids(
+        [np.zeros(3), occluder], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, radius)]
+    )
     whole, free, before = (
-        rt.scattering_length(target, ANTENNA, ANTENNA, frequency)[0] for target in (both, one(both, 0), one(both, 1))
+        rt.scattering_length(target, ANTENNA, ANTENNA, frequency)[0]
+        for target in (both, one(both, 0), one(both, 1))
     )
     return complex((whole - before) / free)
 
@@ -158,16 +176,25 @@ def hidden_rows(quick: bool) -> Iterator[Row]:
             cover = 1.3 * axes.max() + gap / distance * 0.4 + 0.1
             far = distance + cover + gap + axes.max()
             both = rt.Ellipsoids(
-                [far * direction, distance * direction], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, cover)]
+                [far * direction, distance * direction],
+                np.tile(np.eye(3), (2, 1, 1)),
+                [axes, np.full(3, cover)],
             )
             whole, free, before = (
-                rt.scattering_length(target, tx, rx, radar.centre_frequency_hz) for target in (both, one(both, 0), one(both, 1))
+                rt.scattering_length(target, tx, rx, radar.centre_frequency_hz)
+                for target in (both, one(both, 0), one(both, 1))
             )
             worst = max(worst, float((np.abs(whole - before) / np.abs(free)).max() ** 2))
             cases += len(tx)
     says = "a part straight behind another by `specular`: most of its free power"
     yield judged(
-        "straight behind another part", f"most of the free power, {cases} cases", "", worst, 1e-6, says=says, cases=cases
+        "straight behind another part",
+        f"most of the free power, {cases} cases",
+        "",
+        worst,
+        1e-6,
+        says=says,
+        cases=cases,
     )
 
 
@@ -183,16 +210,36 @@ def covered_rows(quick: bool) -> Iterator[Row]:
             for shift in radius + reach * np.linspace(-1.15, 1.15, 9 if quick else 15):
                 occluder = np.array([-BEFORE_M, shift, 0.0])
                 share = covered_share(axes, occluder, radius)
-                optics, got = target.field(occluder, radius), ours(axes, occluder, radius, band.centre)
+                optics, got = (
+                    target.field(occluder, radius),
+                    ours(axes, occluder, radius, band.centre),
+                )
                 errors.append(abs(got - optics))
                 if 0.02 < share < 0.98:
                     crossing.append(errors[-1])
                     quantity = f"{share:3.0%} covered: field over the free one"
-                    yield Row(claim, quantity, "", abs(optics), abs(got), errors[-1], None, bool(np.isfinite(errors[-1])), "edge")
+                    yield Row(
+                        claim,
+                        quantity,
+                        "",
+                        abs(optics),
+                        abs(got),
+                        errors[-1],
+                        None,
+                        bool(np.isfinite(errors[-1])),
+                        "edge",
+                    )
             # All or nothing where half the field is left is wrong by a half; physical optics swings a little past that.
             says = "a part half behind an edge by `specular`, seen or not: worst complex error"
-            yield judged(claim, "worst complex error", "", max(errors), 0.6, says=says, cases=len(errors))
-            yield reported(claim, "rms complex error where partly covered", "", float(np.sqrt(np.mean(np.square(crossing)))))
+            yield judged(
+                claim, "worst complex error", "", max(errors), 0.6, says=says, cases=len(errors)
+            )
+            yield reported(
+                claim,
+                "rms complex error where partly covered",
+                "",
+                float(np.sqrt(np.mean(np.square(crossing)))),
+            )
 
 
 # -- in time --------------------------------------------------------------------------------------------------------
@@ -246,25 +293,35 @@ def fade_rows(quick: bool) -> Iterator[Row]:
         target = Target.upright(TARGET, band.centre, band.density / (2.0 if quick else 1.0))
         times = band.radar.chirp_times(band.cycles)
         # Instants at which the specular point comes free, over one interval between anchors, in whole cycles.
-        late = np.linspace(0, round(10e-3 / band.cycle_s), 3 if quick else 11)[:-1].round().astype(int)
+        late = (
+            np.linspace(0, round(10e-3 / band.cycle_s), 3 if quick else 11)[:-1].round().astype(int)
+        )
         for speed in (1.5,) if quick else (0.5, 1.5, 4.0):
             claim = f"{band.name}, {speed:g} m/s"
             passing = Passing(speed, float(times.mean()))
             before = np.arange(-late.max(), band.cycles) * band.cycle_s + times[0]
-            series = np.array([target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(before)])
+            series = np.array(
+                [target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(before)]
+            )
             optics = series[late.max() :]
             yield reported(claim, "PO: power beside the line", "dB", beside_db(optics, band))
             if not quick and speed == 1.5:
                 # The softened edge must not make the floor: half as many points tell.
                 coarse = Target.upright(TARGET, band.centre, band.density / 1.4)
-                check = np.array([coarse.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)])
+                check = np.array(
+                    [coarse.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)]
+                )
                 change = beside_db(check, band) - beside_db(optics, band)
                 yield reported(claim, "PO, half the points: change beside the line", "dB", change)
-                yield reported(claim, "PO, half the points: rms change of the field", "", rms(check - optics))
+                yield reported(
+                    claim, "PO, half the points: rms change of the field", "", rms(check - optics)
+                )
             for name, (length, shape) in RAMPS.items():
                 # Hidden from when the front of the sphere comes, where it does in this window, until its rear frees the point.
                 gone, back = (passing.instant - 2 * OCCLUDER_RADIUS_M / speed, passing.instant)
-                ramp = 1 - shape((times - gone) / length + 0.5) + shape((times - back) / length + 0.5)
+                ramp = (
+                    1 - shape((times - gone) / length + 0.5) + shape((times - back) / length + 0.5)
+                )
                 yield reported(claim, f"{name}: power beside the line", "dB", beside_db(ramp, band))
                 yield reported(claim, f"{name}: rms complex error", "", rms(ramp - optics))
             floors, errors = [], []
@@ -275,10 +332,24 @@ def fade_rows(quick: bool) -> Iterator[Row]:
                 amplitude = rung.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
                 floors.append(beside_db(amplitude, band))
                 first = late.max() - shift
-                errors.append(rms(amplitude / amplitude.max() - series[first : first + band.cycles]))
-            yield reported(claim, f"specular, {len(late)} instants: power beside the line", "dB", db_mean(floors))
-            yield reported(claim, f"specular, {len(late)} instants: worst of them", "dB", max(floors))
-            yield reported(claim, f"specular, {len(late)} instants: rms complex error", "", rms(np.array(errors)))
+                errors.append(
+                    rms(amplitude / amplitude.max() - series[first : first + band.cycles])
+                )
+            yield reported(
+                claim,
+                f"specular, {len(late)} instants: power beside the line",
+                "dB",
+                db_mean(floors),
+            )
+            yield reported(
+                claim, f"specular, {len(late)} instants: worst of them", "dB", max(floors)
+            )
+            yield reported(
+                claim,
+                f"specular, {len(late)} instants: rms complex error",
+                "",
+                rms(np.array(errors)),
+            )
 
 
 def rms(values: Array | NDArray[np.complex128]) -> float:
@@ -294,4 +365,6 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Occlusion of `specular` against physical optics with a geometric shadow.", measure))
+    sys.exit(
+        main("Occlusion of `specular` against physical optics with a geometric shadow.", measure)
+    )

@@ -79,7 +79,10 @@ def if_samples(radar: rt.Radar, body: Poses, first: int = 0) -> Complex:
     distance = np.sqrt((sight**2).sum(axis=-1))
     sight /= distance[..., None]
     # Spreading, which the paper leaves out, costs nothing.
-    amplitude = np.sqrt(cross_section(body.semi_axes, (body.frames * sight[..., None]).sum(axis=-2))) / distance**2
+    amplitude = (
+        np.sqrt(cross_section(body.semi_axes, (body.frames * sight[..., None]).sum(axis=-2)))
+        / distance**2
+    )
     # Eqs 10 and 11: plane waves reach the elements of the array sooner by their place along the line of sight.
     sooner = ((tx[:, None] + rx)[:, :, None] * sight[:, None]).sum(axis=-1)
     tau = (2 * distance[:, None] - sooner) / SPEED_OF_LIGHT_MPS  # (chirp, rx, part)
@@ -136,7 +139,9 @@ def frame_seconds(radar: rt.Radar, body: Poses) -> dict[str, float]:
     for cycle in range(cycles):
         chirps = slice(cycle * radar.n_tx, (cycle + 1) * radar.n_tx)
         with watch.of("echoes and IF", scale):
-            samples = if_samples(radar, Poses(body.centres[chirps], body.frames[chirps], body.semi_axes))
+            samples = if_samples(
+                radar, Poses(body.centres[chirps], body.frames[chirps], body.semi_axes)
+            )
         with watch.of("noise", scale):
             sigma = math.sqrt(np.mean(np.abs(samples) ** 2) / 10 ** (SNR_DB / 10) / 2)
             samples += sigma * (rng.standard_normal(shape) + 1j * rng.standard_normal(shape))
@@ -158,9 +163,18 @@ def frame_seconds(radar: rt.Radar, body: Poses) -> dict[str, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--radar", default="paper-12ghz", help="a preset, or a TOML file")
-    parser.add_argument("--cycles", type=int, help="TDM cycles that are synthesised (default: a whole frame)")
-    parser.add_argument("--repeats", type=int, default=1, help="frames that are timed, after a cycle to warm up")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write seconds by stage there, a dictionary a frame")
+    parser.add_argument(
+        "--cycles", type=int, help="TDM cycles that are synthesised (default: a whole frame)"
+    )
+    parser.add_argument(
+        "--repeats", type=int, default=1, help="frames that are timed, after a cycle to warm up"
+    )
+    parser.add_argument(
+        "--json",
+        type=Path,
+        metavar="FILE",
+        help="write seconds by stage there, a dictionary a frame",
+    )
     options = parser.parse_args()
     radar = rt.Radar.load(options.radar)
     cycles = min(options.cycles or radar.cycles_per_frame, radar.cycles_per_frame)
@@ -168,10 +182,20 @@ def main() -> int:
     if_samples(radar, poses(radar, 1))
     frames = [frame_seconds(radar, body) for _ in range(options.repeats)]
     for seconds in frames:
-        print(", ".join(f"{stage} {each:.3f} s" for stage, each in seconds.items()), f"= {sum(seconds.values()):.3f} s a frame")
+        print(
+            ", ".join(f"{stage} {each:.3f} s" for stage, each in seconds.items()),
+            f"= {sum(seconds.values()):.3f} s a frame",
+        )
     if options.json:
-        found = {"radar": radar.name, "frame_s": radar.frame_duration_s, "cycles": cycles, "frames": frames}
-        options.json.write_text(json.dumps(found | {"cycles_per_frame": radar.cycles_per_frame}, indent=1) + "\n")
+        found = {
+            "radar": radar.name,
+            "frame_s": radar.frame_duration_s,
+            "cycles": cycles,
+            "frames": frames,
+        }
+        options.json.write_text(
+            json.dumps(found | {"cycles_per_frame": radar.cycles_per_frame}, indent=1) + "\n"
+        )
     return 0
 
 

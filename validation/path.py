@@ -60,7 +60,10 @@ class Surface:
 
     def roughly(self) -> Array:
         """Direction on the unit sphere near that of the shortest path, by a general minimiser."""
-        local_t, local_r = (self.tx - self.centre) @ self.frame, (self.rx - self.centre) @ self.frame
+        local_t, local_r = (
+            (self.tx - self.centre) @ self.frame,
+            (self.rx - self.centre) @ self.frame,
+        )
         pole = self.axes * (local_t / np.linalg.norm(local_t) + local_r / np.linalg.norm(local_r))
         pole /= np.linalg.norm(pole)
         east = np.cross(pole, np.eye(3)[np.argmin(np.abs(pole))])
@@ -74,10 +77,17 @@ class Surface:
         def longer(step: Array) -> float:
             # |T - p| - |T| without cancellation.
             point = place(step) * self.axes
-            legs = (float(point @ (point - 2 * a)) / (np.linalg.norm(point - a) + np.linalg.norm(a)) for a in (local_t, local_r))
+            legs = (
+                float(point @ (point - 2 * a)) / (np.linalg.norm(point - a) + np.linalg.norm(a))
+                for a in (local_t, local_r)
+            )
             return float(sum(legs))
 
-        return place(minimize(longer, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-16}).x)
+        return place(
+            minimize(
+                longer, np.zeros(2), method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-16}
+            ).x
+        )
 
     def solve(self) -> tuple[Decimal, Decimal]:
         """Shortest path [m], and by how much the law of reflection is missed (sine of the angle)."""
@@ -96,11 +106,16 @@ class Surface:
             local[pole] = side * (1 - s * s - t * t) / size * axes[pole]
             for axis, value in zip(others, (s, t), strict=True):
                 local[axis] = 2 * value / size * axes[axis]
-            return [centre[i] + sum((frame[i][j] * local[j] for j in range(3)), Decimal(0)) for i in range(3)]
+            return [
+                centre[i] + sum((frame[i][j] * local[j] for j in range(3)), Decimal(0))
+                for i in range(3)
+            ]
 
         def length(s: Decimal, t: Decimal) -> Decimal:
             p = point(s, t)
-            return norm([a - b for a, b in zip(tx, p, strict=True)]) + norm([a - b for a, b in zip(rx, p, strict=True)])
+            return norm([a - b for a, b in zip(tx, p, strict=True)]) + norm(
+                [a - b for a, b in zip(rx, p, strict=True)]
+            )
 
         for _ in range(8):
             s, t = at
@@ -110,7 +125,10 @@ class Surface:
             tt = (f[0, 1] - 2 * f[0, 0] + f[0, -1]) / STEP**2
             st = (f[1, 1] - f[1, -1] - f[-1, 1] + f[-1, -1]) / (4 * STEP**2)
             determinant = ss * tt - st * st
-            at = [s - (tt * slope_s - st * slope_t) / determinant, t - (ss * slope_t - st * slope_s) / determinant]
+            at = [
+                s - (tt * slope_s - st * slope_t) / determinant,
+                t - (ss * slope_t - st * slope_s) / determinant,
+            ]
         s, t = at
         p = point(s, t)
         # The bisector has no part along the surface where path is stationary; along both parameters, as a sine.
@@ -121,9 +139,14 @@ class Surface:
             sight = [a + b / size for a, b in zip(sight, way, strict=True)]
         missed = Decimal(0)
         for ds, dt in ((STEP, Decimal(0)), (Decimal(0), STEP)):
-            along = [a - b for a, b in zip(point(s + ds, t + dt), point(s - ds, t - dt), strict=True)]
+            along = [
+                a - b for a, b in zip(point(s + ds, t + dt), point(s - ds, t - dt), strict=True)
+            ]
             size = norm(along)
-            missed = max(missed, abs(sum((a * b / size for a, b in zip(sight, along, strict=True)), Decimal(0))))
+            missed = max(
+                missed,
+                abs(sum((a * b / size for a, b in zip(sight, along, strict=True)), Decimal(0))),
+            )
         return length(s, t), missed
 
 
@@ -150,7 +173,11 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                 worst = 0.0
                 count = 4 if quick else 40
                 for _ in range(count):
-                    axes = np.full(3, rng.uniform(0.02, 0.3)) if shape == "sphere" else rng.uniform(0.03, 0.3, 3)
+                    axes = (
+                        np.full(3, rng.uniform(0.02, 0.3))
+                        if shape == "sphere"
+                        else rng.uniform(0.03, 0.3, 3)
+                    )
                     frame = Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()
                     # Half of them far from the origin of the coordinates as well.
                     centre = rng.normal(size=3) * (distance if rng.uniform() < 0.5 else 1.0)
@@ -160,7 +187,9 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                     if shape == "sphere" and apart == "monostatic":
                         away = norm([a - b for a, b in zip(exact(tx), exact(centre), strict=True)])
                         own = max(own, abs(reference - 2 * (away - Decimal(float(axes[0])))))
-                    length = mirror(tx[None], rx[None, None], centre[None, None], frame[None, None], axes[None])[0]
+                    length = mirror(
+                        tx[None], rx[None, None], centre[None, None], frame[None, None], axes[None]
+                    )[0]
                     worst = max(worst, abs(float(Decimal(float(length[0, 0, 0])) - reference)))
                 claim = f"mirror, {distance:g} m, {shape}, {apart}"
                 says = "path over the mirror point against 60 digits, 4 m to 10 km, one place to bistatic"
@@ -176,7 +205,9 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
     )
     # The frame is orthonormal to 1e-16 only, and the sphere round to as much.
     quantity = "sphere from one place, against 2 (|T - O| - a)"
-    yield judged("the reference", quantity, "m", float(own), 1e-15, says=f"the judge of paths: {quantity}")
+    yield judged(
+        "the reference", quantity, "m", float(own), 1e-15, says=f"the judge of paths: {quantity}"
+    )
 
 
 @dataclass(frozen=True)
@@ -206,7 +237,10 @@ def rung_rows(quick: bool) -> Iterator[Row]:
     chirps = np.arange(0, whole.chirps_per_frame, 2663 if quick else 887)
     for away in (1e3, 1e4):
         for name, body in bodies.items():
-            for where, shift in {"at the origin": np.zeros(3), "10 km from it": np.array([1e4, -3e3, 50.0])}.items():
+            for where, shift in {
+                "at the origin": np.zeros(3),
+                "10 km from it": np.array([1e4, -3e3, 50.0]),
+            }.items():
                 there = Shifted(body, shift)
                 place = shift + away * np.array([-0.96, 0.28, 0.01])
                 radar = dataclasses.replace(whole, position_m=tuple(place.tolist()))
@@ -221,12 +255,27 @@ def rung_rows(quick: bool) -> Iterator[Row]:
                         tx = int(chirp % radar.n_tx)
                         for rx in (0, radar.n_rx - 1):
                             places = radar.tx[tx], radar.rx[radar.rx_of_tx[tx, rx]]
-                            pose = poses.centres[index, 0], poses.frames[index, 0], poses.semi_axes[0]
+                            pose = (
+                                poses.centres[index, 0],
+                                poses.frames[index, 0],
+                                poses.semi_axes[0],
+                            )
                             reference, _ = Surface(*places, *pose).solve()
-                            worst = max(worst, abs(float(Decimal(float(echoes.length[index, rx, 0])) - reference)))
+                            worst = max(
+                                worst,
+                                abs(float(Decimal(float(echoes.length[index, rx, 0])) - reference)),
+                            )
                     claim = f"{rung}, radar {away / 1e3:g} km away, {name} {where}"
                     says = f"path of a moving body by every rung, radar {away / 1e3:g} km away, scene up to 10 km from its origin"
-                    yield judged(claim, "worst error of the path", "m", worst, TOLERANCE_M, says=says, cases=2 * len(chirps))
+                    yield judged(
+                        claim,
+                        "worst error of the path",
+                        "m",
+                        worst,
+                        TOLERANCE_M,
+                        says=says,
+                        cases=2 * len(chirps),
+                    )
 
 
 def measure(quick: bool) -> list[Row]:

@@ -36,14 +36,18 @@ class Quadrature:
     def scattering_length(self, frequency: float, share: Array | float = 1.0) -> complex:
         """F [m]; ``share (n,)`` is how much of each point is not in shadow."""
         k = wave_number(frequency)
-        return complex(1j * k / np.sqrt(np.pi) * np.sum(self.weight * share * np.exp(-1j * k * self.path)))
+        return complex(
+            1j * k / np.sqrt(np.pi) * np.sum(self.weight * share * np.exp(-1j * k * self.path))
+        )
 
 
 def wave_number(frequency: float) -> float:
     return 2 * np.pi * frequency / SPEED_OF_LIGHT
 
 
-def lit_points(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0) -> Quadrature:
+def lit_points(
+    tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0
+) -> Quadrature:
     """Points and weights for one pair of antennas; ``tx, rx (3,)`` in the axes of the ellipsoid, about its centre.
 
     ``frequency`` is the highest that the points have to serve, ``density`` multiplies their number along both coordinates.
@@ -61,7 +65,10 @@ def lit_points(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, dens
     mesh = rim[:, None] * np.linspace(0, 1, 49)
     extent = np.ptp(_path(_points(mesh, probe[:, None], pole, east, north) * semi_axes, tx, rx))
     phase = wave_number(frequency) * float(extent)
-    polar_nodes, azimuth_nodes = round(density * (30 + 0.4 * phase)), round(density * (45 + 0.4 * phase))
+    polar_nodes, azimuth_nodes = (
+        round(density * (30 + 0.4 * phase)),
+        round(density * (45 + 0.4 * phase)),
+    )
 
     corners = _corners(cap_t, cap_r)
     if corners is None:
@@ -83,7 +90,9 @@ def lit_points(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, dens
     return Quadrature(points.reshape(-1, 3), weight.ravel(), _path(points, tx, rx).ravel())
 
 
-def mirror_contribution(tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0) -> complex:
+def mirror_contribution(
+    tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0
+) -> complex:
     """What the specular point alone adds to the integral, with all of its higher orders: PO without its terminator [m].
 
     The integral along each meridian from the specular point to the border is that down the valley of steepest descent from
@@ -95,15 +104,25 @@ def mirror_contribution(tx: Array, rx: Array, semi_axes: Array, frequency: float
     meridians = round(64 * density)
     azimuth = np.arange(meridians) * 2 * np.pi / meridians
     step = 1e-3
-    near = _path(_points(np.array([[-step, 0.0, step]]), azimuth[:, None], pole, east, north) * semi_axes, tx, rx)
+    near = _path(
+        _points(np.array([[-step, 0.0, step]]), azimuth[:, None], pole, east, north) * semi_axes,
+        tx,
+        rx,
+    )
     bend = (near[:, 0] - 2 * near[:, 1] + near[:, 2]) / step**2
     x, w = np.polynomial.legendre.leggauss(round(32 * density))
     # exp(-bend s^2 k / 2) is 1e-12 at the end of the line.
     reach = np.sqrt(55 / (k * bend))[:, None] * np.exp(-0.25j * np.pi)
     polar = reach * (x + 1) / 2
     unit = _points(polar, azimuth[:, None], pole, east, north)
-    integrand = np.sin(polar) * _density(unit, tx, rx, semi_axes) * np.exp(-1j * k * _path(unit * semi_axes, tx, rx))
-    return complex(1j * k / np.sqrt(np.pi) * np.sum(reach * w / 2 * integrand) * 2 * np.pi / meridians)
+    integrand = (
+        np.sin(polar)
+        * _density(unit, tx, rx, semi_axes)
+        * np.exp(-1j * k * _path(unit * semi_axes, tx, rx))
+    )
+    return complex(
+        1j * k / np.sqrt(np.pi) * np.sum(reach * w / 2 * integrand) * 2 * np.pi / meridians
+    )
 
 
 def _shortest(tx: Array, rx: Array, semi_axes: Array) -> Array:
@@ -112,7 +131,9 @@ def _shortest(tx: Array, rx: Array, semi_axes: Array) -> Array:
     for _ in range(50):
         centre, east, north = _axes_about(pole)
 
-        def move(step: Array, centre: Array = centre, east: Array = east, north: Array = north) -> Array:
+        def move(
+            step: Array, centre: Array = centre, east: Array = east, north: Array = north
+        ) -> Array:
             place = centre + step[..., :1] * east + step[..., 1:] * north
             return place / np.linalg.norm(place, axis=-1, keepdims=True)
 
@@ -121,7 +142,10 @@ def _shortest(tx: Array, rx: Array, semi_axes: Array) -> Array:
         f = _path(move(grid) * semi_axes, tx, rx).reshape(3, 3)
         slope = np.array([f[2, 1] - f[0, 1], f[1, 2] - f[1, 0]]) / (2 * h)
         cross = (f[2, 2] - f[2, 0] - f[0, 2] + f[0, 0]) / (4 * h * h)
-        hessian = np.array([[f[2, 1] - 2 * f[1, 1] + f[0, 1], 0], [0, f[1, 2] - 2 * f[1, 1] + f[1, 0]]]) / h**2
+        hessian = (
+            np.array([[f[2, 1] - 2 * f[1, 1] + f[0, 1], 0], [0, f[1, 2] - 2 * f[1, 1] + f[1, 0]]])
+            / h**2
+        )
         hessian += np.array([[0, cross], [cross, 0]])
         step = -np.linalg.solve(hessian, slope)
         pole = move(step * (0.3 / max(float(np.linalg.norm(step)), 0.3)))
@@ -142,7 +166,9 @@ def _density(unit: Any, tx: Array, rx: Array, semi_axes: Array) -> Any:
     to_t, to_r = tx - unit * semi_axes, rx - unit * semi_axes
     range_t, range_r = (np.sqrt(np.sum(way * way, axis=-1)) for way in (to_t, to_r))
     normal = np.prod(semi_axes) * unit / semi_axes
-    facing = (np.sum(normal * to_t, axis=-1) / range_t + np.sum(normal * to_r, axis=-1) / range_r) / 2
+    facing = (
+        np.sum(normal * to_t, axis=-1) / range_t + np.sum(normal * to_r, axis=-1) / range_r
+    ) / 2
     return facing * np.linalg.norm(tx) * np.linalg.norm(rx) / (range_t * range_r)
 
 

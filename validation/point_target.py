@@ -39,7 +39,9 @@ def summed_power(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> Array:
     chirps = radar.chirps_per_frame
     times = radar.chirp_times(chirps)
     tx = radar.tx_of_chirp(np.arange(chirps))
-    at = np.asarray(place) + (times - chirps * radar.chirp_duration_s / 2)[:, None] * np.asarray(velocity)
+    at = np.asarray(place) + (times - chirps * radar.chirp_duration_s / 2)[:, None] * np.asarray(
+        velocity
+    )
     there = np.linalg.norm(radar.tx[tx] - at, axis=1)
     back = np.linalg.norm(radar.rx[radar.rx_of_tx[tx]] - at[:, None], axis=2)
     length = (there[:, None] + back)[..., None]
@@ -74,21 +76,49 @@ def case_rows(preset: str, place: str, speed: float) -> Iterator[Row]:
     power = summed_power(radar, PLACES_M[place], speed * way / range_m)
 
     cycles = radar.cycles_per_frame
-    seen = nearest_turn(speed / radar.velocity_bin_mps, cycles)  # bins; not the speed itself where it aliases
+    seen = nearest_turn(
+        speed / radar.velocity_bin_mps, cycles
+    )  # bins; not the speed itself where it aliases
     # 12 bins beside the plateau: a Hann-windowed tone has 1e-6 of its power beyond.
     reach = 12 + int(abs(speed) * radar.frame_duration_s / radar.range_bin_m)
     read_range = centroid(power.sum(axis=1), reach)
-    read_velocity = seen + nearest_turn(centroid(power.sum(axis=0), reach) - cycles // 2 - seen, cycles)
+    read_velocity = seen + nearest_turn(
+        centroid(power.sum(axis=0), reach) - cycles // 2 - seen, cycles
+    )
 
     claim = f"{preset}, {place}, {speed:+g} m/s"
     velocity = "alias" if abs(speed) > radar.max_velocity_mps else "velocity"
     tolerance = MOVING_TOLERANCE if speed else STANDING_TOLERANCE
     says = f"a point reads back: range, {'moving' if speed else 'standing'}"
-    yield judged(claim, "range", "bins", read_range, tolerance, reference=range_m / radar.range_bin_m, key="point", says=says)
+    yield judged(
+        claim,
+        "range",
+        "bins",
+        read_range,
+        tolerance,
+        reference=range_m / radar.range_bin_m,
+        key="point",
+        says=says,
+    )
     says = "a point reads back: velocity or its known alias, up to and beyond the unambiguous one"
-    yield judged(claim, velocity, "bins", read_velocity, VELOCITY_TOLERANCE, reference=seen, key="point", says=says)
+    yield judged(
+        claim,
+        velocity,
+        "bins",
+        read_velocity,
+        VELOCITY_TOLERANCE,
+        reference=seen,
+        key="point",
+        says=says,
+    )
     peak = np.unravel_index(power.argmax(), power.shape)
-    yield reported(claim, "highest cell, range off", "bins", float(peak[0]) - range_m / radar.range_bin_m, key="point")
+    yield reported(
+        claim,
+        "highest cell, range off",
+        "bins",
+        float(peak[0]) - range_m / radar.range_bin_m,
+        key="point",
+    )
     off = nearest_turn(float(peak[1]) - cycles // 2 - seen, cycles)
     yield reported(claim, f"highest cell, {velocity} off", "bins", off, key="point")
 
@@ -96,7 +126,9 @@ def case_rows(preset: str, place: str, speed: float) -> Iterator[Row]:
 def measure(quick: bool) -> list[Row]:
     presets = PRESETS[:1] if quick else PRESETS
     places = list(PLACES_M)[:2] if quick else list(PLACES_M)
-    cases = [(preset, place, speed) for preset in presets for place in places for speed in SPEEDS_MPS]
+    cases = [
+        (preset, place, speed) for preset in presets for place in places for speed in SPEEDS_MPS
+    ]
     return [row for case in cases for row in case_rows(*case)]
 
 

@@ -50,8 +50,12 @@ def decibels(field: complex, reference: float) -> float:
     return float(20 * np.log10(abs(field) / reference))
 
 
-def field_of(target: rt.Ellipsoids | trimesh.Trimesh, tx: Array, rx: Array, frequency: float, **dials: object) -> complex:
-    one = rays_scattering(target, np.atleast_2d(tx), np.atleast_2d(rx), np.array([frequency]), **dials)  # type: ignore[arg-type]
+def field_of(
+    target: rt.Ellipsoids | trimesh.Trimesh, tx: Array, rx: Array, frequency: float, **dials: object
+) -> complex:
+    one = rays_scattering(
+        target, np.atleast_2d(tx), np.atleast_2d(rx), np.array([frequency]), **dials
+    )  # type: ignore[arg-type]
     return complex(one[0])
 
 
@@ -60,7 +64,9 @@ def sheet(vertices: object, faces: object) -> trimesh.Trimesh:
 
 
 def spheres(*places: tuple[float, float, float], radius: float) -> rt.Ellipsoids:
-    return rt.Ellipsoids(places, np.tile(np.eye(3), (len(places), 1, 1)), np.full((len(places), 3), radius))
+    return rt.Ellipsoids(
+        places, np.tile(np.eye(3), (len(places), 1, 1)), np.full((len(places), 3), radius)
+    )
 
 
 # -- one bounce -----------------------------------------------------------------------------------------------------
@@ -72,9 +78,23 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
     for radius, frequency in cases:
         reference = complex(rt.rcs.sphere(radius, frequency, "po"))
         for dial in (1.0, 2.0, 3.0, 4.0, 6.0):
-            field_of(spheres((0, 0, 0), radius=radius), tx, tx, frequency, rays_per_wavelength=dial, bounces=1)
+            field_of(
+                spheres((0, 0, 0), radius=radius),
+                tx,
+                tx,
+                frequency,
+                rays_per_wavelength=dial,
+                bounces=1,
+            )
             start = time.perf_counter()
-            field = field_of(spheres((0, 0, 0), radius=radius), tx, tx, frequency, rays_per_wavelength=dial, bounces=1)
+            field = field_of(
+                spheres((0, 0, 0), radius=radius),
+                tx,
+                tx,
+                frequency,
+                rays_per_wavelength=dial,
+                bounces=1,
+            )
             taken = time.perf_counter() - start
             what = f"radius {radius} m, {frequency / 1e9:.0f} GHz, {dial:g} rays per wavelength"
             error = 100 * abs(field / reference - 1)
@@ -85,9 +105,15 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
                 yield judged("sphere", f"{what}: power", "dB", power, 0.1, key="sphere", says=says)
             yield reported("sphere", f"{what}: complex error", "%", error, key="sphere")
             if dial in (1, 3):
-                tubes = len(EllipsoidGrid.cover(np.full((1, 3), radius), SPEED_OF_LIGHT / frequency / dial).part)
+                tubes = len(
+                    EllipsoidGrid.cover(
+                        np.full((1, 3), radius), SPEED_OF_LIGHT / frequency / dial
+                    ).part
+                )
                 yield reported("sphere", f"{what}: tubes", "1", tubes, key="sphere")
-                yield reported("sphere", f"{what}: time a tube", "us", 1e6 * taken / tubes, key="sphere")
+                yield reported(
+                    "sphere", f"{what}: time a tube", "us", 1e6 * taken / tubes, key="sphere"
+                )
 
 
 def plate_rows(quick: bool) -> Iterator[Row]:
@@ -99,9 +125,15 @@ def plate_rows(quick: bool) -> Iterator[Row]:
         for side in (1, -1):
             tx = np.array([side * FAR, 0, 0])
             field = field_of(plate, tx, tx, frequency)
-            what = f"{width} x {height} m, {frequency / 1e9:g} GHz, {'front' if side > 0 else 'back'}"
-            says = "plates by `rays`, 5 m at 1 and 3 GHz among them, both sides, against 4 pi A² / λ²"
-            yield judged("plate", what, "dB", abs(decibels(field, reference)), 0.01, key="plate", says=says)
+            what = (
+                f"{width} x {height} m, {frequency / 1e9:g} GHz, {'front' if side > 0 else 'back'}"
+            )
+            says = (
+                "plates by `rays`, 5 m at 1 and 3 GHz among them, both sides, against 4 pi A² / λ²"
+            )
+            yield judged(
+                "plate", what, "dB", abs(decibels(field, reference)), 0.01, key="plate", says=says
+            )
         # Turned about z: sinc(k w sin(a)) cos(a), the sides of the pattern and their zeros.
         for angle in np.radians([3.0, 10.0, 25.0]):
             tx = FAR * np.array([np.cos(angle), np.sin(angle), 0])
@@ -119,13 +151,17 @@ def plate_rows(quick: bool) -> Iterator[Row]:
 def dihedral_rows(quick: bool) -> Iterator[Row]:
     a, h = EDGE, EDGE / 2
     corner = sheet(
-        [[0, 0, -h], [a, 0, -h], [a, 0, h], [0, 0, h], [0, a, -h], [0, a, h]], [[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 3]]
+        [[0, 0, -h], [a, 0, -h], [a, 0, h], [0, 0, h], [0, a, -h], [0, a, h]],
+        [[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 3]],
     )
     tx = FAR * np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
     for frequency in (12e9, 24e9) if quick else (12e9, 24e9, 77e9):
         reference = np.sqrt(8 * np.pi) * a * a * frequency / SPEED_OF_LIGHT
         for polarization in ("v", "h"):
-            one, two = (field_of(corner, tx, tx, frequency, bounces=n, polarization=polarization) for n in (1, 2))
+            one, two = (
+                field_of(corner, tx, tx, frequency, bounces=n, polarization=polarization)
+                for n in (1, 2)
+            )
             what = f"edge {a} m, {frequency / 1e9:.0f} GHz, {polarization}"
             against = "dihedral by `rays`, 12, 24 and 77 GHz, v and h, against 8 pi (w h)² / λ²"
             error = abs(decibels(two - one, reference))
@@ -140,11 +176,26 @@ def dihedral_rows(quick: bool) -> Iterator[Row]:
             )
             # Each plate seen alone, at 45 degrees, sends 38 dB less: 0.1 dB.
             error = abs(decibels(two, reference))
-            yield judged("dihedral", f"{what}: all bounces", "dB", error, 0.1, key="dihedral", says=f"{against}: all bounces")
+            yield judged(
+                "dihedral",
+                f"{what}: all bounces",
+                "dB",
+                error,
+                0.1,
+                key="dihedral",
+                says=f"{against}: all bounces",
+            )
             # The field's component along the crease turns over at each bounce like a mirror's, that across it does not.
             sign = np.cos(np.angle(two - one) - np.angle(-1j if polarization == "v" else 1j))
             yield judged(
-                "dihedral", f"{what}: sign", "1", float(sign), 0.01, reference=1.0, key="dihedral", says=f"{against}: sign"
+                "dihedral",
+                f"{what}: sign",
+                "1",
+                float(sign),
+                0.01,
+                reference=1.0,
+                key="dihedral",
+                says=f"{against}: sign",
             )
 
 
@@ -155,13 +206,25 @@ def trihedral_rows(quick: bool) -> Iterator[Row]:
     for frequency in (12e9, 24e9) if quick else (12e9, 24e9, 77e9):
         reference = np.sqrt(4 * np.pi / 3) * a * a * frequency / SPEED_OF_LIGHT
         for dial in (1.0, 2.0, 3.0) if frequency == 12e9 and not quick else (3.0,):
-            two, three = (field_of(corner, tx, tx, frequency, bounces=n, rays_per_wavelength=dial) for n in (2, 3))
+            two, three = (
+                field_of(corner, tx, tx, frequency, bounces=n, rays_per_wavelength=dial)
+                for n in (2, 3)
+            )
             what = f"edge {a} m, {frequency / 1e9:.0f} GHz, {dial:g} rays per wavelength"
             against = "trihedral by `rays`, 12, 24 and 77 GHz, against 4 pi a⁴ / (3 λ²)"
-            for name, field, limit in (("third bounce alone", three - two, 0.03), ("all bounces", three, 0.26)):
-                error, quantity, says = abs(decibels(field, reference)), f"{what}: {name}", f"{against}: {name}"
+            for name, field, limit in (
+                ("third bounce alone", three - two, 0.03),
+                ("all bounces", three, 0.26),
+            ):
+                error, quantity, says = (
+                    abs(decibels(field, reference)),
+                    f"{what}: {name}",
+                    f"{against}: {name}",
+                )
                 if dial == 3:
-                    yield judged("trihedral", quantity, "dB", error, limit, key="trihedral", says=says)
+                    yield judged(
+                        "trihedral", quantity, "dB", error, limit, key="trihedral", says=says
+                    )
                 else:
                     yield reported("trihedral", quantity, "dB", error, key="trihedral")
 
@@ -171,10 +234,18 @@ def small_trihedral_rows(quick: bool) -> Iterator[Row]:
     along = np.ones(3) / np.sqrt(3)
     for frequency in (12e9,) if quick else (12e9, 24e9, 77e9):
         for a in (0.1, 0.05):
-            corner = sheet([[0, 0, 0], [a, 0, 0], [0, a, 0], [0, 0, a]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+            corner = sheet(
+                [[0, 0, 0], [a, 0, 0], [0, a, 0], [0, 0, a]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
+            )
             # Three reflections at conductors and the focus between turn the field to -j of its length.
-            whole = -1j * np.sqrt(4 * np.pi / 3) * a * a * frequency / SPEED_OF_LIGHT + single_bounces(a, frequency, along)
-            error = abs(decibels(field_of(corner, FAR * along, FAR * along, frequency, bounces=3), abs(whole)))
+            whole = -1j * np.sqrt(
+                4 * np.pi / 3
+            ) * a * a * frequency / SPEED_OF_LIGHT + single_bounces(a, frequency, along)
+            error = abs(
+                decibels(
+                    field_of(corner, FAR * along, FAR * along, frequency, bounces=3), abs(whole)
+                )
+            )
             what = f"edge {a} m, {frequency / 1e9:.0f} GHz"
             says = "smaller trihedrals by `rays`, edge 0.1 and 0.05 m, against closed form and the plates' own single bounce"
             yield judged("trihedral", what, "dB", error, 0.3, key="trihedral", says=says)
@@ -189,7 +260,9 @@ def single_bounces(a: float, frequency: float, along: Array) -> complex:
     found = 0j
     for i in range(3):
         j, n = (i + 1) % 3, (i + 2) % 3
-        found += along[n] * a * a * (weight * np.exp(2j * k * a * (u * along[i] + v * along[j]))).sum()
+        found += (
+            along[n] * a * a * (weight * np.exp(2j * k * a * (u * along[i] + v * along[j]))).sum()
+        )
     return complex(1j * k / np.sqrt(np.pi) * found)
 
 
@@ -203,13 +276,21 @@ def two_sphere_rows(quick: bool) -> Iterator[Row]:
         for distance in (4.0,) if quick else (4.0, 1000.0):
             tx = np.array([distance, 0.1, 0.05])
             for polarization in ("v",) if quick else ("v", "h"):
-                one, two = (field_of(pair, tx, tx, frequency, bounces=n, polarization=polarization) for n in (1, 2))
+                one, two = (
+                    field_of(pair, tx, tx, frequency, bounces=n, polarization=polarization)
+                    for n in (1, 2)
+                )
                 reference = 2 * between_spheres(tx, pair.centres, radius)
                 what = f"{polarization}, radius {radius} m, {apart} m apart, from {distance:g} m"
                 # Stationary phase leaves terms of the order 1 / (k a) out, 2 % here; a sphere far behind the other's glint is
                 # lit by some twenty tubes across, and those on its outline count whole or not at all.
-                says, error = "what two spheres send each other against stationary phase", abs(decibels(two - one, reference))
-                yield judged("two spheres", f"{what}: second bounce", "dB", error, 1.0, key="rays", says=says)
+                says, error = (
+                    "what two spheres send each other against stationary phase",
+                    abs(decibels(two - one, reference)),
+                )
+                yield judged(
+                    "two spheres", f"{what}: second bounce", "dB", error, 1.0, key="rays", says=says
+                )
 
 
 def between_spheres(tx: Array, centres: Array, radius: float) -> float:
@@ -222,7 +303,9 @@ def between_spheres(tx: Array, centres: Array, radius: float) -> float:
     def points(q: Array) -> list[Array]:
         found = []
         for index in range(2):
-            place = start[index] + q[2 * index] * easts[index] + q[2 * index + 1] * np.array([0, 0, 1])
+            place = (
+                start[index] + q[2 * index] * easts[index] + q[2 * index + 1] * np.array([0, 0, 1])
+            )
             found.append(centres[index] + radius * place / np.linalg.norm(place))
         return found
 
@@ -244,11 +327,18 @@ def between_spheres(tx: Array, centres: Array, radius: float) -> float:
             / np.linalg.norm(pole + (step[2 * i : 2 * i + 2] / radius) @ frame)
             for i, (centre, pole, frame) in enumerate(zip(centres, start, frames, strict=True))
         ]
-        return float(sum(np.linalg.norm(b - a) for a, b in ((tx, places[0]), (places[0], places[1]), (places[1], tx))))
+        return float(
+            sum(
+                np.linalg.norm(b - a)
+                for a, b in ((tx, places[0]), (places[0], places[1]), (places[1], tx))
+            )
+        )
 
     h = 2e-4
     unit = np.eye(4) * h
-    hessian = np.array([[moved(a + b) - moved(a - b) - moved(b - a) + moved(-a - b) for a in unit] for b in unit]) / (4 * h * h)
+    hessian = np.array(
+        [[moved(a + b) - moved(a - b) - moved(b - a) + moved(-a - b) for a in unit] for b in unit]
+    ) / (4 * h * h)
     legs = [np.linalg.norm(p - tx), np.linalg.norm(r - p), np.linalg.norm(tx - r)]
     cosines = [abs(start[0] @ (tx - p)) / legs[0], abs(start[1] @ (tx - r)) / legs[2]]
     spread = legs[0] * legs[1] * legs[2] * np.sqrt(abs(np.linalg.det(hessian)))
@@ -261,26 +351,59 @@ def between_spheres(tx: Array, centres: Array, radius: float) -> float:
 def law_rows(quick: bool) -> Iterator[Row]:
     rng = np.random.default_rng(0)
     frames = Rotation.random(3, random_state=0).as_matrix()
-    body = rt.Ellipsoids(np.array([[0, 0, 0], [0.1, 0.35, 0.1], [0.1, -0.3, 0]]), frames, rng.uniform(0.05, 0.15, (3, 3)))
+    body = rt.Ellipsoids(
+        np.array([[0, 0, 0], [0.1, 0.35, 0.1], [0.1, -0.3, 0]]),
+        frames,
+        rng.uniform(0.05, 0.15, (3, 3)),
+    )
     tx = np.array([[4.0, 0.2, 0.1], [1.0, 3.0, -0.5], [2.0, -2.0, 1.0]])
     rx = tx + rng.normal(0, 0.3, tx.shape)
     frequency = np.full(3, 14e9)
     for bounces in (1, 2):
-        there, back = (rays_scattering(body, *pair, frequency, bounces=bounces) for pair in ((tx, rx), (rx, tx)))
+        there, back = (
+            rays_scattering(body, *pair, frequency, bounces=bounces)
+            for pair in ((tx, rx), (rx, tx))
+        )
         error = 100 * float(np.linalg.norm(there - back) / np.linalg.norm(there))
         # One bounce swaps exactly; of two bounces one end is cut into tubes and the other is not.
         if bounces == 1:
             says = "Tx and Rx swapped, one bounce: change"
-            yield judged("reciprocity", "three ellipsoids, one bounce", "%", error, 1e-6, key="rays", says=says)
+            yield judged(
+                "reciprocity",
+                "three ellipsoids, one bounce",
+                "%",
+                error,
+                1e-6,
+                key="rays",
+                says=says,
+            )
         else:
             says = "Tx and Rx swapped, up to two bounces: change"
-            yield judged("reciprocity", "three ellipsoids, up to two bounces", "%", error, 3.0, key="rays", says=says)
+            yield judged(
+                "reciprocity",
+                "three ellipsoids, up to two bounces",
+                "%",
+                error,
+                3.0,
+                key="rays",
+                says=says,
+            )
     front, back_ = spheres((0, 0, 0), radius=0.2), spheres((0, 0, 0), (-0.6, 0, 0), radius=0.2)
     shadowed = rt.Ellipsoids(back_.centres, back_.frames, [[0.2] * 3, [0.1] * 3])
     antenna = np.array([4.0, 0.02, 0.01])
-    alone, both = (field_of(target, antenna, antenna, 14e9, bounces=1) for target in (front, shadowed))
+    alone, both = (
+        field_of(target, antenna, antenna, 14e9, bounces=1) for target in (front, shadowed)
+    )
     says = "what a sphere straight behind another adds"
-    yield judged("hidden", "a sphere behind another adds", "m", abs(both - alone), 1e-12, key="rays", says=says)
+    yield judged(
+        "hidden",
+        "a sphere behind another adds",
+        "m",
+        abs(both - alone),
+        1e-12,
+        key="rays",
+        says=says,
+    )
 
 
 def doppler_rows(quick: bool) -> Iterator[Row]:
@@ -299,7 +422,10 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
         bandwidth_hz=1e9,
     )
     n = radar.cycles_per_frame
-    fast, slow = chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False), chebwin(n, ATTENUATION_DB, sym=False)
+    fast, slow = (
+        chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False),
+        chebwin(n, ATTENUATION_DB, sym=False),
+    )
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     bodies: dict[str, Moving] = {name: MOTIONS[name] for name in list(MOTIONS)[: 1 if quick else 3]}
     for name, body in bodies.items():
@@ -309,7 +435,9 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
             x = rt.signal.synthesize(rung.echoes(np.arange(n)), radar, radar.chirp_times(n))
             spectrum = rt.process.range_doppler(x, radar, range_window=fast, doppler_window=slow)
             power = np.abs(spectrum.values[:, :, 0]) ** 2
-            outside = beyond(spectrum.velocity, least - 2 * lobe, most + 2 * lobe, 2 * radar.max_velocity_mps)
+            outside = beyond(
+                spectrum.velocity, least - 2 * lobe, most + 2 * lobe, 2 * radar.max_velocity_mps
+            )
             floor = float(10 * np.log10(power[:, outside].max() / power.max()))
             shots = f"shot every {1e3 * anchors:g} ms" if anchors else "shot at every chirp"
             what = f"{dial:g} rays per wavelength, {shots}: floor"

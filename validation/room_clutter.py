@@ -30,7 +30,14 @@ from rtradar.scene import Furniture, Surface, Wall, material, room_walls
 Array = NDArray[np.float64]
 C = 299_792_458.0
 SIZE, CORNER = (6.0, 4.5, 2.6), (-4.8, -2.0)
-PLACES = {"near": (0, -4.8), "far": (0, 1.2), "right": (1, -2.0), "left": (1, 2.5), "floor": (2, 0.0), "ceiling": (2, 2.6)}
+PLACES = {
+    "near": (0, -4.8),
+    "far": (0, 1.2),
+    "right": (1, -2.0),
+    "left": (1, 2.5),
+    "floor": (2, 0.0),
+    "ceiling": (2, 2.6),
+}
 
 
 def image_rows() -> Iterator[Row]:
@@ -48,29 +55,59 @@ def image_rows() -> Iterator[Row]:
             axis, place = PLACES[name]
             images[..., axis] = 2 * place - images[..., axis]
         strength = np.abs(echoes.amplitude[0, ..., 0]) * echoes.length[..., 0] / np.sqrt(4 * np.pi)
-        error = np.abs(echoes.length[..., 0] - np.sqrt(((images - rx) ** 2).sum(axis=-1)))[strength > 0]
+        error = np.abs(echoes.length[..., 0] - np.sqrt(((images - rx) ** 2).sum(axis=-1)))[
+            strength > 0
+        ]
         order = len(names)
         worst[order] = max(worst[order], float(error.max()))
         # Over an edge two orders of reflection share one image; to and fro between opposite walls they are two.
-        key = echoes.name if order == 2 and PLACES[names[0]][0] == PLACES[names[1]][0] else frozenset(names)
+        key = (
+            echoes.name
+            if order == 2 and PLACES[names[0]][0] == PLACES[names[1]][0]
+            else frozenset(names)
+        )
         shares[order][key] = shares[order].get(key, 0.0) + strength
     for order, count in ((1, 6), (2, 6 + 12)):
         # float32 would be 0.3 um off; the limit is asked for.
         yield judged(
-            f"images, order {order}", "length, worst", "m", worst[order], 1e-6, says="lengths of mirror paths in a box room"
+            f"images, order {order}",
+            "length, worst",
+            "m",
+            worst[order],
+            1e-6,
+            says="lengths of mirror paths in a box room",
         )
         says = "mirror paths in a box room: how many"
-        yield judged(f"images, order {order}", "how many", "1", len(shares[order]), 0, reference=count, says=says)
+        yield judged(
+            f"images, order {order}",
+            "how many",
+            "1",
+            len(shares[order]),
+            0,
+            reference=count,
+            says=says,
+        )
         # A conductor mirrors v into v exactly, whatever the angles: rounding.
         missing = max(float(np.abs(strength - 1).max()) for strength in shares[order].values())
         says = "mirror paths in a box room of perfect mirrors: each once, and whole"
-        yield judged(f"images, order {order}", "each once, of a perfect mirror", "1", missing, 1e-9, says=says)
+        yield judged(
+            f"images, order {order}",
+            "each once, of a perfect mirror",
+            "1",
+            missing,
+            1e-9,
+            says=says,
+        )
 
 
 def airy(eta: complex, thickness: float, k: float, cosine: Array, te: bool) -> Array:
     """Reflection of a slab: r - r (1 - r^2) q^2 + ..., Airy's sum; the field, TM with the sign of a conductor's +1."""
     inner = np.sqrt(eta - 1 + cosine**2 + 0j)
-    r = (cosine - inner) / (cosine + inner) if te else (eta * cosine - inner) / (eta * cosine + inner)
+    r = (
+        (cosine - inner) / (cosine + inner)
+        if te
+        else (eta * cosine - inner) / (eta * cosine + inner)
+    )
     q = np.exp(-1j * k * thickness * inner)
     return r - (1 - r**2) * r * q**2 / (1 - r**2 * q**2)
 
@@ -80,7 +117,10 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
     k = 2 * np.pi * frequency / C
     step = 2 * np.pi / k / 6
     (_, y0, z0), (_, y1, z1) = wall.corners.min(axis=0), wall.corners.max(axis=0)
-    ys, zs = (np.linspace(a, b, int(np.ceil((b - a) / step)) * 2 + 1)[1::2] for a, b in ((y0, y1), (z0, z1)))
+    ys, zs = (
+        np.linspace(a, b, int(np.ceil((b - a) / step)) * 2 + 1)[1::2]
+        for a, b in ((y0, y1), (z0, z1))
+    )
     area = (y1 - y0) * (z1 - z0) / (len(ys) * len(zs))
     x = float(wall.corners[0, 0])
     normal = np.array([-1.0, 0.0, 0.0])
@@ -97,7 +137,9 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
         if np.isinf(eta):
             mirror = np.ones(len(d))
         else:
-            mirror = airy(eta, wall.thickness_m, k, cosine, polarization == "v") * (-1 if polarization == "v" else 1)
+            mirror = airy(eta, wall.thickness_m, k, cosine, polarization == "v") * (
+                -1 if polarization == "v" else 1
+            )
         current = 2 * np.cross(normal, np.cross(d, sent)) * mirror[:, None]
         total += ((current * heard).sum(axis=1) / (r1 * r2) * np.exp(-1j * k * (r1 + r2))).sum()
     # The field is -jk / (4 pi) of this; a scattering length counts it against what a conductor turns round.
@@ -139,13 +181,29 @@ def wall_rows(quick: bool) -> Iterator[Row]:
         ours = own.at_nodes(frequency, radar)[..., 0]
         worst, single = 0.0, 0.0
         for tx, rx in ((0, 0), (0, 1), (1, 0)):
-            exact = np.array([plate(wall, radar.tx[tx], radar.rx[rx], f, polarization) for f in frequency])
-            mean = 10 * np.log10((np.abs(ours[:, tx, rx]) ** 2).mean() / (np.abs(exact) ** 2).mean())
-            phase = np.conj(ours[:, tx, rx]) * np.exp(-2j * np.pi * frequency / C * own.length[tx, rx, 0])
-            worst, single = max(worst, abs(float(mean))), max(single, float(np.abs(phase / exact - 1).max()))
+            exact = np.array(
+                [plate(wall, radar.tx[tx], radar.rx[rx], f, polarization) for f in frequency]
+            )
+            mean = 10 * np.log10(
+                (np.abs(ours[:, tx, rx]) ** 2).mean() / (np.abs(exact) ** 2).mean()
+            )
+            phase = np.conj(ours[:, tx, rx]) * np.exp(
+                -2j * np.pi * frequency / C * own.length[tx, rx, 0]
+            )
+            worst, single = (
+                max(worst, abs(float(mean))),
+                max(single, float(np.abs(phase / exact - 1).max())),
+            )
         case = f"wall of {made}, {polarization}, bistatic"
         # Waves of the four edges, which images leave out, are up to 3 % each at one frequency, and part over the sweep.
-        yield judged(case, "power over the sweep, worst channel", "dB", worst, 0.4, says="a large wall against physical optics")
+        yield judged(
+            case,
+            "power over the sweep, worst channel",
+            "dB",
+            worst,
+            0.4,
+            says="a large wall against physical optics",
+        )
         yield reported(case, "field at one frequency, worst, with its phase", "1", single)
 
 
@@ -167,20 +225,35 @@ def reflector_rows(quick: bool) -> Iterator[Row]:
             position_m=(-away, 0.0, 1.0),
         )
         for mesh, (factor, limit) in closed.items():
-            piece = Furniture(name=mesh, mesh=mesh, material=material("perfect-conductor"), position_m=(0, 0, 1), yaw_deg=180)
+            piece = Furniture(
+                name=mesh,
+                mesh=mesh,
+                material=material("perfect-conductor"),
+                position_m=(0, 0, 1),
+                yaw_deg=180,
+            )
             echoes = Clutter(radar, rt.Scene(furniture=(piece,))).echoes()
             middle = len(echoes.frequency) // 2
             turn = np.exp(2j * np.pi * echoes.frequency[middle] / C * (echoes.length - 2 * away))
             power = abs((echoes.amplitude[middle] * turn).sum()) ** 2 * away**4
             error = 10 * np.log10(power / (factor * np.pi * 0.4**4 / wavelength**2))
             case = f"{mesh} in a scene, {frequency / 1e9:.0f} GHz"
-            yield judged(case, "echo against closed form", "dB", abs(error), limit, says=f"a {mesh} that stands in a scene")
+            yield judged(
+                case,
+                "echo against closed form",
+                "dB",
+                abs(error),
+                limit,
+                says=f"a {mesh} that stands in a scene",
+            )
 
 
 def still_rows(quick: bool) -> Iterator[Row]:
     """Energy beside zero Doppler over the strongest cell."""
     for preset, name in (
-        [("paper-12ghz", "living-room")] if quick else [("paper-12ghz", "living-room"), ("paper-77ghz", "corridor")]
+        [("paper-12ghz", "living-room")]
+        if quick
+        else [("paper-12ghz", "living-room"), ("paper-77ghz", "corridor")]
     ):
         scene = rt.Scene.load(name)
         # Four Tx: windows of 400 and 2000 cycles at a third of the memory.
@@ -189,14 +262,25 @@ def still_rows(quick: bool) -> Iterator[Row]:
         clutter = Clutter(radar, scene)
         samples = RoomIf(clutter).clutter_if(np.arange(n * radar.n_tx))
         # Periodic, as windows of spectra are: one point longer and cut.
-        windows = [chebwin(length + 1, ATTENUATION_DB)[:-1] for length in (radar.samples_per_chirp, n)]
-        spectra = rt.process.range_doppler(samples, radar, range_window=windows[0], doppler_window=windows[1])
+        windows = [
+            chebwin(length + 1, ATTENUATION_DB)[:-1] for length in (radar.samples_per_chirp, n)
+        ]
+        spectra = rt.process.range_doppler(
+            samples, radar, range_window=windows[0], doppler_window=windows[1]
+        )
         power = (np.abs(spectra.values) ** 2).max(axis=(0, 2))
         beside = np.abs(np.arange(n) - n // 2) > np.ceil(main_lobe_bins(n + 1))
         floor = 10 * np.log10(max(power[beside].max(), 1e-300) / power.max())
         case = f"still room: {name}, {radar.start_frequency_hz / 1e9:.0f} GHz, {clutter.n_echoes} echoes"
         # The windows' side lobes are at -160 dB, the rounding of complex64 spectra at -140 dB.
-        yield judged(case, "highest beside zero Doppler", "dB", floor, -100.0, says="a still room: energy beside zero Doppler")
+        yield judged(
+            case,
+            "highest beside zero Doppler",
+            "dB",
+            floor,
+            -100.0,
+            says="a still room: energy beside zero Doppler",
+        )
 
 
 def measure(quick: bool) -> list[Row]:
@@ -204,4 +288,6 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Static clutter of a room: images, walls, corner reflectors, stillness.", measure))
+    sys.exit(
+        main("Static clutter of a room: images, walls, corner reflectors, stillness.", measure)
+    )

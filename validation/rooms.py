@@ -51,26 +51,46 @@ def measure(quick: bool) -> list[Row]:
             rt.run(motion, radar, out=quiet, snr_db=np.inf, heading_deg=scene.heading_deg)
             noise = alone.summary["noise_power_m2"]
             with h5py.File(quiet / "maps.h5") as maps:
-                truth = target_cells(maps["range_doppler"][:], cell_noise_power(noise, radar, radar.n_channels), MARGIN_DB)
+                truth = target_cells(
+                    maps["range_doppler"][:],
+                    cell_noise_power(noise, radar, radar.n_channels),
+                    MARGIN_DB,
+                )
             if name == "free-space":
                 rows += detection_rows("free space, none", scored(free, truth))
                 continue
             for removal in removals:
                 out = Path(folder, name, removal)
-                found = rt.run(motion, radar, scene, out=out, noise_power_m2=noise, clutter_removal=removal)
+                found = rt.run(
+                    motion, radar, scene, out=out, noise_power_m2=noise, clutter_removal=removal
+                )
                 claim = f"{name}, {removal}"
                 if removal == "none":
                     clutter = found.summary["room"]["clutter"]
-                    rows.append(reported(claim, "signal to clutter", "dB", clutter["signal_to_clutter_db"]))
+                    rows.append(
+                        reported(claim, "signal to clutter", "dB", clutter["signal_to_clutter_db"])
+                    )
                 cost = found.summary["wall_s"] / alone.summary["wall_s"]
                 rows.append(reported(claim, "cost over free space", "", cost))
                 once = found.summary["stages"]["room"] / alone.summary["wall_s"]
-                rows.append(reported(claim, "of it what is done once a capture: tracing the room, choosing paths", "", once))
+                rows.append(
+                    reported(
+                        claim,
+                        "of it what is done once a capture: tracing the room, choosing paths",
+                        "",
+                        once,
+                    )
+                )
                 rows += detection_rows(claim, scored(out, truth))
                 if len(found.points) and len(alone.points):
                     scale = np.array([radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps])
                     rows.append(
-                        reported(claim, "RDT cloud to that of free space", "bins", chamfer(found.points, alone.points, scale))
+                        reported(
+                            claim,
+                            "RDT cloud to that of free space",
+                            "bins",
+                            chamfer(found.points, alone.points, scale),
+                        )
                     )
     return rows
 

@@ -27,9 +27,17 @@ def main() -> int:
     parser.add_argument("after", type=Path, help="folder of the same run by another version")
     options = parser.parse_args()
     worst = 0.0
-    with h5py.File(options.before / "maps.h5") as before, h5py.File(options.after / "maps.h5") as after:
+    with (
+        h5py.File(options.before / "maps.h5") as before,
+        h5py.File(options.after / "maps.h5") as after,
+    ):
         same = (before["detections"][:] == after["detections"][:]).all(axis=(1, 2))
-        for name in ("range_doppler", "range_time", "spectrogram", *(name for name in _OF_DETECTIONS if name in before)):
+        for name in (
+            "range_doppler",
+            "range_time",
+            "spectrogram",
+            *(name for name in _OF_DETECTIONS if name in before),
+        ):
             one, other = before[name][:].astype(np.float64), after[name][:].astype(np.float64)
             peak = one.max()
             if name in _OF_DETECTIONS:
@@ -37,8 +45,13 @@ def main() -> int:
             difference = float(np.abs(one - other).max(initial=0.0) / peak)
             worst = max(worst, difference)
             print(f"{name:<16} {difference:.1e} of its peak")
-        cells, all_cells = int((before["detections"][:] != after["detections"][:]).sum()), int(before["detections"][:].sum())
-        print(f"{'detections':<16} {cells} of {all_cells} differ, in {int((~same).sum())} of {len(same)} windows")
+        cells, all_cells = (
+            int((before["detections"][:] != after["detections"][:]).sum()),
+            int(before["detections"][:].sum()),
+        )
+        print(
+            f"{'detections':<16} {cells} of {all_cells} differ, in {int((~same).sum())} of {len(same)} windows"
+        )
     print(f"largest: {worst:.1e}, limit {_LIMIT:g}")
     return int(worst > _LIMIT)
 

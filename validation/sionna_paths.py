@@ -55,7 +55,9 @@ def lattice(tx: Array, rx: Array) -> Array:
         own += [(2 * n * length - place, abs(2 * n - 1)) for n in range(-ORDER, ORDER + 1)]
         choices.append([(image + CORNER[axis], count) for image, count in own])
     kept = [images for images in product(*choices) if sum(count for _, count in images) <= ORDER]
-    return np.sort([np.linalg.norm(np.array([image for image, _ in images]) - rx) for images in kept])
+    return np.sort(
+        [np.linalg.norm(np.array([image for image, _ in images]) - rx) for images in kept]
+    )
 
 
 def sionna(pairs: list[tuple[Array, Array]]) -> list[Array] | None:
@@ -74,10 +76,18 @@ def sionna(pairs: list[tuple[Array, Array]]) -> list[Array] | None:
     place = mi.ScalarTransform4f().translate(middle.tolist()).scale((SIZE / 2).tolist())
     concrete = other.ITURadioMaterial("walls", "concrete", thickness=0.2)
     scene.edit(
-        add=[other.SceneObject(mi_mesh=mi.load_dict({"type": "cube", "to_world": place}), name="box", radio_material=concrete)]
+        add=[
+            other.SceneObject(
+                mi_mesh=mi.load_dict({"type": "cube", "to_world": place}),
+                name="box",
+                radio_material=concrete,
+            )
+        ]
     )
     scene.frequency = 10e9
-    scene.tx_array = scene.rx_array = other.PlanarArray(num_rows=1, num_cols=1, pattern="iso", polarization="V")
+    scene.tx_array = scene.rx_array = other.PlanarArray(
+        num_rows=1, num_cols=1, pattern="iso", polarization="V"
+    )
     found = []
     for number, (tx, rx) in enumerate(pairs):
         scene.add(other.Transmitter(f"tx {number}", tx.tolist()))
@@ -102,21 +112,51 @@ def _rows(quick: bool) -> Iterator[Row]:
     count = sum(len(lengths) for lengths in mine)
     lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, closed, strict=True))
     says = "Specular paths of an empty box room, orders 0 to 2"
-    yield judged("box room", f"paths more or fewer than of the lattice, {count}", "", lost, 0, says=says, cases=count)
+    yield judged(
+        "box room",
+        f"paths more or fewer than of the lattice, {count}",
+        "",
+        lost,
+        0,
+        says=says,
+        cases=count,
+    )
     if lost == 0:
         worst = max(float(np.abs(a - b).max()) for a, b in zip(mine, closed, strict=True))
         yield judged(
-            "box room", f"worst length to the lattice of images, {count} paths", "um", worst * 1e6, 1.0, says=says, cases=count
+            "box room",
+            f"worst length to the lattice of images, {count} paths",
+            "um",
+            worst * 1e6,
+            1.0,
+            says=says,
+            cases=count,
         )
     theirs = sionna(pairs)
     if theirs is None:
         return
     lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, theirs, strict=True))
     says = "Specular paths of an empty box room, to Sionna RT (float32)"
-    yield judged("box room", f"paths more or fewer than of Sionna RT, {count}", "", lost, 0, says=says, cases=count)
+    yield judged(
+        "box room",
+        f"paths more or fewer than of Sionna RT, {count}",
+        "",
+        lost,
+        0,
+        says=says,
+        cases=count,
+    )
     if lost == 0:
         worst = max(float(np.abs(a - b).max()) for a, b in zip(mine, theirs, strict=True))
-        yield judged("box room", f"worst length to Sionna RT, {count} paths", "um", worst * 1e6, 50.0, says=says, cases=count)
+        yield judged(
+            "box room",
+            f"worst length to Sionna RT, {count} paths",
+            "um",
+            worst * 1e6,
+            50.0,
+            says=says,
+            cases=count,
+        )
 
 
 if __name__ == "__main__":

@@ -36,14 +36,30 @@ def measure(quick: bool) -> list[Row]:
                 rt.run(motion, rt.Radar.preset("paper-12ghz"), out=folder)
                 cloud = dict(np.load(Path(folder, "cloud_xyz.npz")))
             distance = np.concatenate(
-                [from_body(body, time, cloud["points"][cloud["time"] == time]) for time in np.unique(cloud["time"])]
+                [
+                    from_body(body, time, cloud["points"][cloud["time"] == time])
+                    for time in np.unique(cloud["time"])
+                ]
             )
             far = distance > FAR_M
             claim = f"{activity}, peaks to {below_db:g} dB below the highest"
             rows.append(reported(claim, "points a second", "", len(distance) / motion.duration_s))
-            rows.append(reported(claim, "median distance to a part's centre", "m", float(np.median(distance))))
-            rows.append(reported(claim, "share of points more than 0.3 m off", "", float(far.mean())))
-            rows.append(reported(claim, "their share of the power", "", float(cloud["power"][far].sum() / cloud["power"].sum())))
+            rows.append(
+                reported(
+                    claim, "median distance to a part's centre", "m", float(np.median(distance))
+                )
+            )
+            rows.append(
+                reported(claim, "share of points more than 0.3 m off", "", float(far.mean()))
+            )
+            rows.append(
+                reported(
+                    claim,
+                    "their share of the power",
+                    "",
+                    float(cloud["power"][far].sum() / cloud["power"].sum()),
+                )
+            )
     peaks.BELOW_HIGHEST_DB = chosen
     return rows
 

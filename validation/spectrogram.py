@@ -54,7 +54,9 @@ def gathered(radar: rt.Radar, blocks: Iterable[NDArray[np.complex64]], channel: 
     """Spectrogram of a stream of IF samples."""
     stream = SlidingSpectrogram(radar, channel=channel)
     parts = [stream.push(range_spectrum(samples, radar)) for samples in blocks]
-    power, time = (np.concatenate([getattr(part, name) for part in parts]) for name in ("power", "time"))
+    power, time = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("power", "time")
+    )
     return Spectrogram(power, time, parts[0].velocity)
 
 
@@ -110,23 +112,40 @@ def pendulum_rows(radar: rt.Radar) -> Iterator[Row]:
         seen = gathered(radar, pendulum_if(radar), channel)
         times, weight = over_window(radar, seen.time)
         truth = range_rate(times, radar.tx[tx], radar.rx[radar.rx_of_tx[tx, rx]]) @ weight
-        width = SPEED_OF_LIGHT / (2 * radar.centre_frequency_hz * WINDOW * radar.n_tx * radar.chirp_duration_s)
+        width = SPEED_OF_LIGHT / (
+            2 * radar.centre_frequency_hz * WINDOW * radar.n_tx * radar.chirp_duration_s
+        )
         ridge = seen.velocity[seen.power.argmax(axis=1)]
         # Within 20 bins of the highest cell: 14 % of 25 bins, 3 for the speed's change, and the window's skirts.
         near = np.abs(seen.velocity - ridge[:, None]) < 20.5 * width
         centroid = (seen.power * near * seen.velocity).sum(axis=1) / (seen.power * near).sum(axis=1)
         claim = f"{radar.name}, pendulum, channel {channel}"
         yield reported(claim, "greatest range rate", "m/s", float(np.abs(truth).max()))
-        yield reported(claim, "greatest change of it within a window", "bins", steepest(radar, seen.time, truth) / width)
+        yield reported(
+            claim,
+            "greatest change of it within a window",
+            "bins",
+            steepest(radar, seen.time, truth) / width,
+        )
         # One bin: the claim. A hundredth: a shift of a quarter of a cycle in time is 0.01 bins at 12 GHz.
         columns, says = len(truth), "spectrogram of a pendulum against elliptic functions"
         for name, found, limit in (("highest cell", ridge, 1.0), ("centroid", centroid, 0.01)):
             quantity, error = f"{name}, worst of {columns} columns", worst(found - truth, width)
-            yield judged(claim, quantity, "bins", error, limit, says=f"{says}: {name}", cases=columns)
+            yield judged(
+                claim, quantity, "bins", error, limit, says=f"{says}: {name}", cases=columns
+            )
         # By Parseval's theorem 1.5 in range times 1.5 in velocity, for an echo of amplitude 1, in every column.
         total = seen.power.sum(axis=1)
         error = float(np.abs(total / 2.25 - 1).max())
-        yield judged(claim, "power of a column, worst", "", error, 1e-5, says=f"{says}: power of a column", cases=columns)
+        yield judged(
+            claim,
+            "power of a column, worst",
+            "",
+            error,
+            1e-5,
+            says=f"{says}: power of a column",
+            cases=columns,
+        )
 
 
 def steepest(radar: rt.Radar, times: Array, rate: Array) -> float:
@@ -145,7 +164,9 @@ def walk(folder: Path) -> Body:
     return Body.from_motion(place(motion, start_s=0.5, duration_s=3.0))
 
 
-def walk_spectrogram(radar: rt.Radar, body: Body, fidelity: str, snr_db: float = 20.0) -> Spectrogram:
+def walk_spectrogram(
+    radar: rt.Radar, body: Body, fidelity: str, snr_db: float = 20.0
+) -> Spectrogram:
     """Channel 0, through the pieces of the chain."""
     rung = build_model(fidelity, radar, body)
     n_chirps = int(body.duration_s / radar.cycle_duration_s) * radar.n_tx
@@ -155,7 +176,12 @@ def walk_spectrogram(radar: rt.Radar, body: Body, fidelity: str, snr_db: float =
     def blocks() -> Iterator[NDArray[np.complex64]]:
         for first in range(0, n_chirps, block):
             chirps = np.arange(first, min(first + block, n_chirps))
-            samples = synthesize(rung.echoes(chirps), radar, radar.chirp_times(len(chirps), first), dtype=np.complex64)
+            samples = synthesize(
+                rung.echoes(chirps),
+                radar,
+                radar.chirp_times(len(chirps), first),
+                dtype=np.complex64,
+            )
             noise.add(samples, radar, first)
             yield samples
 
@@ -174,12 +200,16 @@ class Gait:
     def of(cls, radar: rt.Radar, body: Body) -> Gait:
         times = np.linspace(0, body.duration_s, round(body.duration_s / 5e-3) + 1)
         poses, tx, rx = body.at(times), radar.tx[0], radar.rx[radar.rx_of_tx[0, 0]]
-        ways = np.linalg.norm(poses.centres - tx, axis=2) + np.linalg.norm(poses.centres - rx, axis=2)
+        ways = np.linalg.norm(poses.centres - tx, axis=2) + np.linalg.norm(
+            poses.centres - rx, axis=2
+        )
         feet = {}
         for side in ("left", "right"):
             k = PART_NAMES.index(f"{side} foot")
             pairs = zip(poses.centres[:, k], poses.frames[:, k], strict=True)
-            mirrored = np.array([shortest(tx, rx, centre, frame, poses.semi_axes[k]) for centre, frame in pairs])
+            mirrored = np.array(
+                [shortest(tx, rx, centre, frame, poses.semi_axes[k]) for centre, frame in pairs]
+            )
             feet[side] = np.gradient(mirrored, times) / 2
         return cls(times, np.gradient(ways, times, axis=0) / 2, feet)
 
@@ -203,18 +233,29 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
     width = found.velocity[1] - found.velocity[0]
     noise = float(np.median(found.power[:, found.velocity > 3.5]))  # nothing goes away so fast
 
-    torso = gait.seen(gait.parts[:, [PART_NAMES.index(name) for name in TORSO]].mean(axis=1), radar, found.time)
+    torso = gait.seen(
+        gait.parts[:, [PART_NAMES.index(name) for name in TORSO]].mean(axis=1), radar, found.time
+    )
     away = np.abs(found.velocity[found.power.argmax(axis=1)] - torso) / width
     # An arm or a thigh outshines the torso now and then: of the line in the picture the median column speaks.
     says = "spectrogram of a recorded walk against the motion: torso, legs; median of the columns"
-    yield judged(claim, "torso: highest cell, median of the columns", "bins", float(np.median(away)), 1.0, says=says)
+    yield judged(
+        claim,
+        "torso: highest cell, median of the columns",
+        "bins",
+        float(np.median(away)),
+        1.0,
+        says=says,
+    )
     yield reported(claim, "torso: columns within 3 bins", "share", float((away < 3).mean()))
 
     count = 0
     for side, rate in gait.feet.items():
         foot = gait.seen(rate, radar, found.time)
         others = [k for k, name in enumerate(PART_NAMES) if name != f"{side} foot"]
-        next_fastest = np.min([gait.seen(gait.parts[:, k], radar, found.time) for k in others], axis=0)
+        next_fastest = np.min(
+            [gait.seen(gait.parts[:, k], radar, found.time) for k in others], axis=0
+        )
         for run in swings(foot, found.time):
             apart = np.flatnonzero(next_fastest[run] - foot[run] > APART_BINS * width) + run.start
             beyond = found.velocity < ((foot + next_fastest) / 2)[apart, None]
@@ -222,15 +263,33 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
             away = np.abs(found.velocity[power.argmax(axis=1)] - foot[apart]) / width
             begin, end = found.time[run.start], found.time[run.stop - 1]
             case = f"{side} leg, {begin:.2f} to {end:.2f} s"
-            quantity, middle = f"{case}: its line, median of {len(apart)} columns", float(np.median(away))
+            quantity, middle = (
+                f"{case}: its line, median of {len(apart)} columns",
+                float(np.median(away)),
+            )
             yield judged(claim, quantity, "bins", middle, 1.0, says=says)
-            yield reported(claim, f"{case}: columns within 3 bins", "share", float((away < 3).mean()))
-            yield reported(claim, f"{case}: above the noise, median", "dB", decibels(np.median(power.max(axis=1)) / noise))
+            yield reported(
+                claim, f"{case}: columns within 3 bins", "share", float((away < 3).mean())
+            )
+            yield reported(
+                claim,
+                f"{case}: above the noise, median",
+                "dB",
+                decibels(np.median(power.max(axis=1)) / noise),
+            )
             level = np.median(power.max(axis=1) / found.power[apart].max(axis=1))
             yield reported(claim, f"{case}: re the highest cell, median", "dB", decibels(level))
             count += 1
     # The right foot swings as the recording begins, then left, right, left.
-    yield judged(claim, "swings of the legs", "", count, 0.0, reference=4, says="swings of the legs in it, of 4: missed")
+    yield judged(
+        claim,
+        "swings of the legs",
+        "",
+        count,
+        0.0,
+        reference=4,
+        says="swings of the legs in it, of 4: missed",
+    )
 
 
 def decibels(ratio: float) -> float:
@@ -255,4 +314,6 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("The spectrogram follows a pendulum, and shows torso and legs of a walk.", measure))
+    sys.exit(
+        main("The spectrogram follows a pendulum, and shows torso and legs of a walk.", measure)
+    )

@@ -37,7 +37,19 @@ def seconds(checkout: Path, words: list[str], folder: Path) -> tuple[float, floa
     """To the cloud, and the whole run after its warm-up [s]."""
     told = folder / "summary.json"
     with tempfile.TemporaryDirectory(dir=folder) as out:
-        command = [sys.executable, "-P", "-c", RUN, str(checkout), "run", *words, "--out", out, "--json", str(told)]
+        command = [
+            sys.executable,
+            "-P",
+            "-c",
+            RUN,
+            str(checkout),
+            "run",
+            *words,
+            "--out",
+            out,
+            "--json",
+            str(told),
+        ]
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
     if done.returncode:
         raise SystemExit(f"{checkout}: {' '.join(words)}: {done.stderr.strip()}")
@@ -50,12 +62,16 @@ def main() -> int:
     parser.add_argument("checkout", type=Path, help="folder of another version")
     parser.add_argument("--repeats", type=int, default=7, help="pairs of runs (default: 7)")
     parser.add_argument("--duration", default="3", help="of the walk [s] (default: 3)")
-    parser.add_argument("--only", nargs="+", choices=CASES, default=list(CASES), help="cases (default: all)")
+    parser.add_argument(
+        "--only", nargs="+", choices=CASES, default=list(CASES), help="cases (default: all)"
+    )
     parser.add_argument("--json", type=Path, help="write all seconds there")
     options = parser.parse_args()
     checkouts = (options.checkout.resolve(), Path(__file__).resolve().parents[1])
     found: dict[str, list[list[tuple[float, float]]]] = {}
-    print(f"{'':26} {'to the cloud, before, now [s]':>30} {'ratio':>7} {'whole run, before, now [s]':>30} {'ratio':>7}")
+    print(
+        f"{'':26} {'to the cloud, before, now [s]':>30} {'ratio':>7} {'whole run, before, now [s]':>30} {'ratio':>7}"
+    )
     for name in options.only:
         words = ["synthetic:walk", "--duration", options.duration, *CASES[name]]
         with tempfile.TemporaryDirectory() as folder:
@@ -67,7 +83,9 @@ def main() -> int:
         line = f"{name:26}"
         for which in (0, 1):
             before, after = ([pair[version][which] for pair in rounds] for version in (0, 1))
-            line += f" {median(before):15.2f} {median(after):14.2f} {paired_ratio(after, before):7.3f}"
+            line += (
+                f" {median(before):15.2f} {median(after):14.2f} {paired_ratio(after, before):7.3f}"
+            )
         print(line, flush=True)
     if options.json is not None:
         options.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")

@@ -79,25 +79,45 @@ def closed_rows(quick: bool) -> Iterator[Row]:
     mie = rt.rcs.sphere(radius, FREQUENCY_HZ, "mie")
     claim = f"ka {LEAST_KA:g} to {LARGEST_KA:g}"
     # The index of 1e6 turns the phase by 2e-6; otherwise both series have rounding only.
-    about = {"says": f"Mie's series against miepython, {claim}: power and phase, relative", "cases": len(ka)}
+    about = {
+        "says": f"Mie's series against miepython, {claim}: power and phase, relative",
+        "cases": len(ka),
+    }
     error = float(np.abs(abs(mie / reference) ** 2 - 1).max())
     yield judged(claim, "Mie against miepython, worst relative power", "", error, 1e-5, **about)
     ratio = mie / reference
     turned = float(np.abs(ratio / ratio[0] / abs(ratio / ratio[0]) - 1).max())
-    yield judged(claim, "Mie against miepython, worst phase but for a constant", "", turned, 1e-5, **about)
+    yield judged(
+        claim, "Mie against miepython, worst phase but for a constant", "", turned, 1e-5, **about
+    )
     optics = rt.rcs.sphere(radius, FREQUENCY_HZ, "po")
     integral = np.array([optics_integral(float(x)) for x in ka])
     # Phases up to 2e4 rad, whose rounding alone is 4e-12.
     about["says"] = f"physical optics' closed form against its integral, {claim}: complex, relative"
-    yield judged(claim, "PO against its integral, worst relative", "", float(np.abs(optics / integral - 1).max()), 1e-9, **about)
+    yield judged(
+        claim,
+        "PO against its integral, worst relative",
+        "",
+        float(np.abs(optics / integral - 1).max()),
+        1e-9,
+        **about,
+    )
     for (least, largest), tolerance in GO_DB.items():
         some = spread(least, largest, 40 if quick else 200)
         go = rt.rcs.sphere(some / WAVE_NUMBER, FREQUENCY_HZ, "go")
         claim, error = f"ka {least:g} to {largest:g}", decibels(go / exact(some))
-        about = {"says": f"geometric optics of a sphere against miepython, {claim}", "cases": len(some)}
+        about = {
+            "says": f"geometric optics of a sphere against miepython, {claim}",
+            "cases": len(some),
+        }
         yield judged(claim, "GO against miepython, worst", "dB", error, tolerance, **about)
         po = rt.rcs.sphere(some / WAVE_NUMBER, FREQUENCY_HZ, "po")
-        yield reported(f"ka {least:g} to {largest:g}", "PO against miepython, worst", "dB", decibels(po / exact(some)))
+        yield reported(
+            f"ka {least:g} to {largest:g}",
+            "PO against miepython, worst",
+            "dB",
+            decibels(po / exact(some)),
+        )
 
 
 def specular_rows(quick: bool) -> Iterator[Row]:
@@ -111,7 +131,12 @@ def specular_rows(quick: bool) -> Iterator[Row]:
     says = f"a sphere by `specular` against geometric optics, ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}: complex, relative"
     yield judged(claim, "against GO, worst complex", "", error, 1e-4, says=says, cases=n)
     some = spread(LEAST_OPTICAL_KA, 12.6, n)
-    yield reported("specular, ka 5 to 12.6", "against miepython, worst", "dB", decibels(specular(some) / exact(some)))
+    yield reported(
+        "specular, ka 5 to 12.6",
+        "against miepython, worst",
+        "dB",
+        decibels(specular(some) / exact(some)),
+    )
     for (least, largest), tolerance in GO_DB.items():
         some = spread(least, largest, n)
         error = decibels(specular(some) / exact(some))
@@ -131,18 +156,32 @@ def draw(_: list[Row], path: Path) -> None:
     unit = np.sqrt(np.pi) * radius
     figure, axes = plt.subplots(2, 1, figsize=(7, 6), sharex=True, layout="constrained")
     reference = exact(ka)
-    forms = {f"rtradar, {name}": rt.rcs.sphere(radius, FREQUENCY_HZ, method) for name, method in (("Mie", "mie"), ("PO", "po"))}
-    axes[0].semilogx(ka, 20 * np.log10(np.abs(reference) / unit), color="black", linewidth=2.5, label="miepython")
+    forms = {
+        f"rtradar, {name}": rt.rcs.sphere(radius, FREQUENCY_HZ, method)
+        for name, method in (("Mie", "mie"), ("PO", "po"))
+    }
+    axes[0].semilogx(
+        ka, 20 * np.log10(np.abs(reference) / unit), color="black", linewidth=2.5, label="miepython"
+    )
     for name, values in forms.items():
         axes[0].semilogx(ka, 20 * np.log10(np.abs(values) / unit), linewidth=1, label=name)
     seen = spread(LEAST_OPTICAL_KA, LARGEST_KA, 60)
     found = specular(seen)
-    axes[0].semilogx(seen, 20 * np.log10(np.abs(found) / (np.sqrt(np.pi) * seen / WAVE_NUMBER)), ".", label="specular")
+    axes[0].semilogx(
+        seen,
+        20 * np.log10(np.abs(found) / (np.sqrt(np.pi) * seen / WAVE_NUMBER)),
+        ".",
+        label="specular",
+    )
     axes[0].set(ylim=(-40, 10), ylabel="RCS / πa² [dB]", title="Conducting sphere, backscatter")
     axes[0].legend()
     for name, values in forms.items():
-        axes[1].loglog(ka, np.abs(20 * np.log10(np.abs(values / reference))) + 1e-12, linewidth=1, label=name)
-    axes[1].loglog(seen, np.abs(20 * np.log10(np.abs(found / exact(seen)))) + 1e-12, ".", label="specular")
+        axes[1].loglog(
+            ka, np.abs(20 * np.log10(np.abs(values / reference))) + 1e-12, linewidth=1, label=name
+        )
+    axes[1].loglog(
+        seen, np.abs(20 * np.log10(np.abs(found / exact(seen)))) + 1e-12, ".", label="specular"
+    )
     for (least, largest), tolerance in GO_DB.items():
         axes[1].plot([least, largest], [tolerance, tolerance], color="tab:red", linewidth=2)
     axes[1].set(xlabel="ka", ylabel="|error| to miepython [dB]", ylim=(1e-9, 100))
@@ -156,4 +195,6 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Spheres: closed forms against miepython, `specular` against both.", measure, draw))
+    sys.exit(
+        main("Spheres: closed forms against miepython, `specular` against both.", measure, draw)
+    )

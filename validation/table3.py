@@ -58,7 +58,12 @@ RADAR = rt.Radar.preset("paper-12ghz")
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
 SNR_DB, PFA, MARGIN_DB = 20.0, 1e-6, 13.0
 LOOKS = {"SISO": 1, "MIMO": RADAR.n_channels}
-PAPER = {"SISO-CA": (3.57, 82.17), "SISO-OS": (41.85, 11.72), "MIMO-CA": (100.0, 75.95), "MIMO-OS": (79.19, 5.06)}
+PAPER = {
+    "SISO-CA": (3.57, 82.17),
+    "SISO-OS": (41.85, 11.72),
+    "MIMO-CA": (100.0, 75.95),
+    "MIMO-OS": (79.19, 5.06),
+}
 KNOWN = ("SISO-known noise", "MIMO-known noise")
 
 PAPER_LEVELS_DB = {"SISO": 50.0, "MIMO": 85.0}
@@ -86,10 +91,15 @@ class Capture(NamedTuple):
         """Noise-free IF of the window that starts at this cycle."""
         chirps = np.arange(RADAR.chirps_per_frame) + start * RADAR.n_tx
         times = RADAR.chirp_times(len(chirps), int(chirps[0]))
-        return np.asarray(synthesize(self.rung.echoes(chirps), RADAR, times, dtype=np.complex64), dtype=np.complex64)
+        return np.asarray(
+            synthesize(self.rung.echoes(chirps), RADAR, times, dtype=np.complex64),
+            dtype=np.complex64,
+        )
 
 
-def noisy(samples: NDArray[np.complex64], power: float, seed: int, start: int) -> NDArray[np.complex64]:
+def noisy(
+    samples: NDArray[np.complex64], power: float, seed: int, start: int
+) -> NDArray[np.complex64]:
     """The samples of the window that starts at this cycle, with noise."""
     copy = samples.copy()
     Noise(power, seed).add(copy, RADAR, start * RADAR.n_tx)
@@ -98,7 +108,9 @@ def noisy(samples: NDArray[np.complex64], power: float, seed: int, start: int) -
 
 def power_maps(samples: NDArray[np.complex64]) -> dict[str, Map]:
     """Power of the first channel, and of all summed."""
-    cube = range_spectrum(samples, RADAR).reshape(-1, RADAR.n_tx, RADAR.n_rx, RADAR.samples_per_chirp)
+    cube = range_spectrum(samples, RADAR).reshape(
+        -1, RADAR.n_tx, RADAR.n_rx, RADAR.samples_per_chirp
+    )
     return {"SISO": power_map(cube, RADAR, channel=0), "MIMO": power_map(cube, RADAR)}
 
 
@@ -112,14 +124,19 @@ def our_masks(maps: dict[str, Map], noise: dict[str, float]) -> dict[str, Mask]:
         looks = LOOKS[kind]
         masks[f"{kind}-CA"] = ca_cfar(power, pfa=PFA, looks=looks)
         masks[f"{kind}-OS"] = os_cfar(power, pfa=PFA, looks=looks)
-        masks[f"{kind}-known noise"] = np.asarray(power > noise[kind] / looks * gammainccinv(looks, PFA))
+        masks[f"{kind}-known noise"] = np.asarray(
+            power > noise[kind] / looks * gammainccinv(looks, PFA)
+        )
     return masks
 
 
 def paper_heights_db() -> dict[str, float]:
     """The paper's levels above its own noise, as mean power of a channel."""
     noise = 10 * math.log10(cell_noise_power(PAPER_NOISE_M2, RADAR)) + paper_gain_db()
-    return {"SISO": PAPER_LEVELS_DB["SISO"] - noise, "MIMO": PAPER_LEVELS_DB["MIMO"] - 20 * math.log10(LOOKS["MIMO"]) - noise}
+    return {
+        "SISO": PAPER_LEVELS_DB["SISO"] - noise,
+        "MIMO": PAPER_LEVELS_DB["MIMO"] - 20 * math.log10(LOOKS["MIMO"]) - noise,
+    }
 
 
 def paper_gain_db() -> float:
@@ -154,7 +171,9 @@ class Tally:
             if math.isnan(values[index]):
                 continue
             reference = PAPER[scheme][index] if scheme in PAPER else None
-            yield reported(f"{claim}, {rule}", f"{scheme} {name}", "%", values[index], reference=reference)
+            yield reported(
+                f"{claim}, {rule}", f"{scheme} {name}", "%", values[index], reference=reference
+            )
             for between, several in (("windows", by_window), ("seeds of noise", by_seed)):
                 deviation = several[~np.isnan(several[:, index]), index]
                 if spread and len(deviation) > 1:
@@ -190,13 +209,19 @@ def tally_of(activity: str, fidelity: str, every: int, seeds: int) -> tuple[Tall
         }
         for seed in range(seeds):
             maps = power_maps(noisy(samples, power, seed, start))
-            truths[PAPERS_RULE] = {kind: target_cells(maps[kind], noise[kind], heights[kind]) for kind in LOOKS}
+            truths[PAPERS_RULE] = {
+                kind: target_cells(maps[kind], noise[kind], heights[kind]) for kind in LOOKS
+            }
             masks = our_masks(maps, noise)
             for scheme, mask in masks.items():
                 for rule, truth in truths.items():
                     tally.add(rule, scheme, seed, score(mask, truth[scheme[:4]]))
             if index % 4 == 0 and seed == 0:
-                laws += [law for kind in LOOKS for law in expected(kind, clean[kind], maps[kind], noise[kind], masks)]
+                laws += [
+                    law
+                    for kind in LOOKS
+                    for law in expected(kind, clean[kind], maps[kind], noise[kind], masks)
+                ]
     return tally, laws
 
 
@@ -212,7 +237,9 @@ class Law(NamedTuple):
     variance: float
 
 
-def expected(kind: str, clean: Map, power: Map, noise: float, masks: dict[str, Mask]) -> Iterator[Law]:
+def expected(
+    kind: str, clean: Map, power: Map, noise: float, masks: dict[str, Mask]
+) -> Iterator[Law]:
     """Survival of each cell above the threshold that its own noisy training cells set.
 
     A cell in units of half the noise of a channel is noncentral chi-square of 2 looks; guard cells keep it independent of
@@ -226,10 +253,17 @@ def expected(kind: str, clean: Map, power: Map, noise: float, masks: dict[str, M
     for name, level in (("CA", averaged), ("OS", ordered)):
         threshold = scales[name.lower()][counts] * level / unit
         chance = gammaincc(looks, threshold)
-        some = (signal > 1e-3) & (threshold < 20 * (signal + looks + 20))  # farther above, no noise lifts the cell there
+        some = (signal > 1e-3) & (
+            threshold < 20 * (signal + looks + 20)
+        )  # farther above, no noise lifts the cell there
         chance[some] = ncx2.sf(2 * threshold[some], 2 * looks, 2 * signal[some])
         scheme = f"{kind}-{name}"
-        yield Law(scheme, int(masks[scheme].sum()), float(chance.sum()), float((chance * (1 - chance)).sum()))
+        yield Law(
+            scheme,
+            int(masks[scheme].sum()),
+            float(chance.sum()),
+            float((chance * (1 - chance)).sum()),
+        )
 
 
 def law_rows(laws: list[Law]) -> Iterator[Row]:
@@ -238,10 +272,25 @@ def law_rows(laws: list[Law]) -> Iterator[Row]:
     for scheme in PAPER:
         own = [law for law in laws if law.scheme == scheme]
         counted, foreseen = sum(law.counted for law in own), sum(law.expected for law in own)
-        yield reported("theory", f"{scheme} detections in {len(own)} maps", "cells", counted, reference=foreseen)
+        yield reported(
+            "theory",
+            f"{scheme} detections in {len(own)} maps",
+            "cells",
+            counted,
+            reference=foreseen,
+        )
         deviation = abs(counted - foreseen) / math.sqrt(alike * sum(law.variance for law in own))
-        says = "CFAR on maps of a person, 1 and 96 channels: detections counted, from those expected"
-        yield judged("theory", f"{scheme} count from expectation", "standard deviations", deviation, 4.0, says=says)
+        says = (
+            "CFAR on maps of a person, 1 and 96 channels: detections counted, from those expected"
+        )
+        yield judged(
+            "theory",
+            f"{scheme} count from expectation",
+            "standard deviations",
+            deviation,
+            4.0,
+            says=says,
+        )
 
 
 # -- the paper's chain ---------------------------------------------------------------------------------------------------
@@ -255,8 +304,12 @@ class Recipe:
     fidelity: str = "analytic-paper"
     snr_db: float | None = None  # None: noise of fixed power for each part
     truth: str = "noisy"
-    own_threshold: bool = False  # CA: each cell against its own training cells, not the largest threshold so far
-    pfa: float | None = None  # OS and CA multipliers solved for it; None: 5.0003, and CA's for the asked 0.1
+    own_threshold: bool = (
+        False  # CA: each cell against its own training cells, not the largest threshold so far
+    )
+    pfa: float | None = (
+        None  # OS and CA multipliers solved for it; None: 5.0003, and CA's for the asked 0.1
+    )
     power_sum: bool = False  # with the law of its looks
 
 
@@ -271,21 +324,38 @@ RECIPES = (
     Recipe(name="power sum and its law, 1e-6", own_threshold=True, pfa=PFA, power_sum=True),
     Recipe(name="true SNR of 20 dB", snr_db=SNR_DB),
     Recipe(name="echoes of specular", fidelity="specular"),
-    Recipe(name="all mended", fidelity="specular", snr_db=SNR_DB, truth="margin", own_threshold=True, pfa=PFA, power_sum=True),
+    Recipe(
+        name="all mended",
+        fidelity="specular",
+        snr_db=SNR_DB,
+        truth="margin",
+        own_threshold=True,
+        pfa=PFA,
+        power_sum=True,
+    ),
 )
 
 
 def paper_maps(samples: NDArray[np.complex64]) -> dict[str, Map]:
     """In the paper's units, all as power: one channel, the square of the sum of magnitudes, and the sum of powers."""
-    magnitude = np.abs(range_doppler(samples, RADAR).values) * np.float32(10 ** (paper_gain_db() / 20))
+    magnitude = np.abs(range_doppler(samples, RADAR).values) * np.float32(
+        10 ** (paper_gain_db() / 20)
+    )
     magnitude = magnitude.astype(np.float64)
-    return {"SISO": magnitude[..., 0] ** 2, "MIMO": magnitude.sum(axis=2) ** 2, "powers": (magnitude**2).sum(axis=2)}
+    return {
+        "SISO": magnitude[..., 0] ** 2,
+        "MIMO": magnitude.sum(axis=2) ** 2,
+        "powers": (magnitude**2).sum(axis=2),
+    }
 
 
 def growing_ca(power: Map) -> Mask:
     """The paper code's CA-CFAR: a cell must exceed the largest threshold up to it, range bin by range bin; no edges."""
     n_train = (2 * REACH + 1) ** 2 - (2 * GUARD + 1) ** 2
-    sums = [np.lib.stride_tricks.sliding_window_view(power, (2 * half + 1,) * 2).sum(axis=(2, 3)) for half in (REACH, GUARD)]
+    sums = [
+        np.lib.stride_tricks.sliding_window_view(power, (2 * half + 1,) * 2).sum(axis=(2, 3))
+        for half in (REACH, GUARD)
+    ]
     trim = REACH - GUARD
     mean = (sums[0] - sums[1][trim:-trim, trim:-trim]) / n_train
     largest = np.maximum.accumulate(mean.ravel()).reshape(mean.shape) * ca_scale(n_train, PAPER_PFA)
@@ -295,7 +365,9 @@ def growing_ca(power: Map) -> Mask:
     return mask
 
 
-def recipe_scores(recipe: Recipe, clean: dict[str, Map], maps: dict[str, Map], noise_m2: float) -> dict[str, DetectionScore]:
+def recipe_scores(
+    recipe: Recipe, clean: dict[str, Map], maps: dict[str, Map], noise_m2: float
+) -> dict[str, DetectionScore]:
     found = {}
     cell = cell_noise_power(noise_m2, RADAR) * 10 ** (paper_gain_db() / 10)
     for kind in LOOKS:
@@ -327,7 +399,9 @@ def tally_of_recipes(activity: str, every: int, chosen: Sequence[Recipe]) -> Tal
             samples = capture.samples(start)
             clean = paper_maps(samples)
             for snr_db in dict.fromkeys(recipe.snr_db for recipe in own):
-                noise_m2 = PAPER_NOISE_M2 if snr_db is None else capture.echo_power / 10 ** (snr_db / 10)
+                noise_m2 = (
+                    PAPER_NOISE_M2 if snr_db is None else capture.echo_power / 10 ** (snr_db / 10)
+                )
                 maps = paper_maps(noisy(samples, noise_m2, 0, start))
                 for recipe in (recipe for recipe in own if recipe.snr_db == snr_db):
                     for scheme, found in recipe_scores(recipe, clean, maps, noise_m2).items():
@@ -342,8 +416,17 @@ def rebuilt_rows() -> Iterator[Row]:
     if path and path.is_file():
         with np.load(path) as crops:
             names = [name for name in crops.files if f"ca_{name}" in crops.files]
-            wrong = sum(int((growing_ca(10 ** (crops[name] / 10)) != crops[f"ca_{name}"]).sum()) for name in names)
-        yield judged("paper as coded", f"CA masks of its code rebuilt, {len(names)} crops: wrong", "cells", wrong, 0.0)
+            wrong = sum(
+                int((growing_ca(10 ** (crops[name] / 10)) != crops[f"ca_{name}"]).sum())
+                for name in names
+            )
+        yield judged(
+            "paper as coded",
+            f"CA masks of its code rebuilt, {len(names)} crops: wrong",
+            "cells",
+            wrong,
+            0.0,
+        )
 
 
 # -- rows --------------------------------------------------------------------------------------------------------------

@@ -35,7 +35,16 @@ from rtradar.scatter.models.rays import ANCHOR_S
 
 CHEAPEST = "analytic"  # all costs are over its
 # In the order of the table; `reference` has a cost and no error.
-MODELS = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics", "auto", "rays", "reference")
+MODELS = (
+    "analytic-paper",
+    "analytic",
+    "specular",
+    "fresnel",
+    "physical-optics",
+    "auto",
+    "rays",
+    "reference",
+)
 SLOW = ("rays", "reference")  # minutes a frame: after all others
 
 
@@ -56,7 +65,9 @@ def for_both(values: Any) -> dict[str, Any]:
 
 DIALS = (
     Dial("fresnel", "shadow_rays", for_both((16, 64, 256)), for_both(64), "-"),
-    Dial("physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"),
+    Dial(
+        "physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"
+    ),
     Dial(
         "physical-optics",
         "facets",
@@ -66,7 +77,13 @@ DIALS = (
     ),
     Dial("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
     Dial("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
-    Dial("rays", "rays_per_wavelength", {"paper-12ghz": (1.0, 2.0, 3.0), "paper-77ghz": (3.0,)}, for_both(3.0), "-"),
+    Dial(
+        "rays",
+        "rays_per_wavelength",
+        {"paper-12ghz": (1.0, 2.0, 3.0), "paper-77ghz": (3.0,)},
+        for_both(3.0),
+        "-",
+    ),
 )
 COLOURS = {
     "analytic-paper": "tab:gray",
@@ -115,7 +132,11 @@ def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
     """Along an option, each with its value; where it stands by itself is the model as it is."""
 
     def at(value: float) -> Setting:
-        return Setting(dial.fidelity) if value == dial.default[preset] else Setting(dial.fidelity, dial.name, value)
+        return (
+            Setting(dial.fidelity)
+            if value == dial.default[preset]
+            else Setting(dial.fidelity, dial.name, value)
+        )
 
     return [(value, at(value)) for value in dial.values[preset]]
 
@@ -123,7 +144,9 @@ def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
 def settings(preset: str, quick: bool) -> list[Setting]:
     """Each once, `analytic` first."""
     found = [Setting(CHEAPEST), *(Setting(fidelity) for fidelity in MODELS)]
-    found += [] if quick else [setting for dial in DIALS for _, setting in settings_of(dial, preset)]
+    found += (
+        [] if quick else [setting for dial in DIALS for _, setting in settings_of(dial, preset)]
+    )
     return list(dict.fromkeys(found))
 
 
@@ -133,7 +156,10 @@ def settings(preset: str, quick: bool) -> list[Setting]:
 def seconds(rung: EchoModel, radar: rt.Radar, first: int) -> float:
     """Of echoes and IF samples of the frame that begins at this chirp."""
     step, end = 33 * radar.n_tx, first + radar.chirps_per_frame
-    return sum(timed(rung, radar, np.arange(begin, min(begin + step, end))) for begin in range(first, end, step))
+    return sum(
+        timed(rung, radar, np.arange(begin, min(begin + step, end)))
+        for begin in range(first, end, step)
+    )
 
 
 def timed(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
@@ -157,7 +183,12 @@ def seconds_of(scene: Scene, setting: Setting) -> float:
         begin = -(-first // step) * step
         before, chirps = (np.arange(at, at + step) for at in (begin, begin + step))
         timed(rung, radar, before[before % radar.n_tx == 0])
-        return timed(rung, radar, chirps[chirps % radar.n_tx == 0]) * radar.n_tx * radar.chirps_per_frame / step
+        return (
+            timed(rung, radar, chirps[chirps % radar.n_tx == 0])
+            * radar.n_tx
+            * radar.chirps_per_frame
+            / step
+        )
     return seconds(rung, radar, first)
 
 
@@ -176,7 +207,9 @@ def warm_up(scene: Scene, fidelity: str) -> None:
         return  # begun anyway
     chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
     rung = build_model(fidelity, scene.radar, scene.body)
-    rt.signal.synthesize(rung.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64)
+    rt.signal.synthesize(
+        rung.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64
+    )
 
 
 # -- all of it ------------------------------------------------------------------------------------------------------
@@ -191,10 +224,14 @@ def read(path: Path | None) -> dict[tuple[str, str, str], Point]:
 
 def write(path: Path | None, points: dict[tuple[str, str, str], Point]) -> None:
     if path is not None:
-        path.write_text(json.dumps({"points": [asdict(point) for point in points.values()]}, indent=1) + "\n")
+        path.write_text(
+            json.dumps({"points": [asdict(point) for point in points.values()]}, indent=1) + "\n"
+        )
 
 
-def measure_points(scene: Scene, wanted: Sequence[Setting], points: dict[tuple[str, str, str], Point]) -> Iterator[Point]:
+def measure_points(
+    scene: Scene, wanted: Sequence[Setting], points: dict[tuple[str, str, str], Point]
+) -> Iterator[Point]:
     """What is not there yet, one after the other."""
     base = None
     for setting in wanted:
@@ -204,7 +241,11 @@ def measure_points(scene: Scene, wanted: Sequence[Setting], points: dict[tuple[s
             continue
         if point is None:
             exact = setting.fidelity == "reference"
-            error, power_db = (0.0, 0.0) if exact else scene.compared(scene.spectrum(setting.fidelity, **setting.dials))
+            error, power_db = (
+                (0.0, 0.0)
+                if exact
+                else scene.compared(scene.spectrum(setting.fidelity, **setting.dials))
+            )
             point = points[key] = Point(*key, error, power_db)
         if base is None:
             # In this run, however little of it is left to do.
@@ -239,18 +280,31 @@ def figures(points: list[Point]) -> str:
 
 def table(points: dict[tuple[str, str, str], Point]) -> str:
     """For docs/choosing-a-level.md: a line a model, then a line a setting of an option; from and to over the activities."""
-    lines = ["| rung | " + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS) + " |"]
+    lines = [
+        "| rung | "
+        + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS)
+        + " |"
+    ]
     lines.append("|---" * (1 + 3 * len(PRESETS)) + "|")
 
     def line(name: str, labels: dict[str, str]) -> None:
-        own = [[point for (of, _, label), point in points.items() if (of, label) == (each, labels.get(each))] for each in PRESETS]
+        own = [
+            [
+                point
+                for (of, _, label), point in points.items()
+                if (of, label) == (each, labels.get(each))
+            ]
+            for each in PRESETS
+        ]
         if any(own):
             lines.append(f"| {name} | " + " | ".join(figures(each) for each in own) + " |")
 
     for fidelity in MODELS:
         line(f"`{fidelity}`", dict.fromkeys(PRESETS, fidelity))
     for dial in DIALS:
-        at = {(value, each): setting for each in PRESETS for value, setting in settings_of(dial, each)}
+        at = {
+            (value, each): setting for each in PRESETS for value, setting in settings_of(dial, each)
+        }
         for value in sorted({value for value, _ in at}):
             labels = {each: at[value, each].label for each in PRESETS if (value, each) in at}
             line(f"`{dial.fidelity}`, {dial.name} {value:g}", labels)
@@ -265,40 +319,96 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
     from matplotlib import pyplot as plt
     from matplotlib.lines import Line2D
 
-    figure, panels = plt.subplots(1, len(PRESETS), figsize=(11, 5), sharex=True, sharey=True, layout="constrained")
+    figure, panels = plt.subplots(
+        1, len(PRESETS), figsize=(11, 5), sharex=True, sharey=True, layout="constrained"
+    )
     for axes, preset in zip(panels, PRESETS, strict=True):
         for (of, activity, _), point in points.items():
             fidelity, _, dial = point.setting.partition(" ")
             if of == preset and point.error > 0:
-                style: dict[str, Any] = {"s": 14, "alpha": 0.6} if dial else {"s": 42, "edgecolors": "black", "linewidths": 0.6}
-                axes.scatter(point.cost, 100 * point.error, color=COLOURS[fidelity], marker=MARKERS[activity], zorder=3, **style)
+                style: dict[str, Any] = (
+                    {"s": 14, "alpha": 0.6}
+                    if dial
+                    else {"s": 42, "edgecolors": "black", "linewidths": 0.6}
+                )
+                axes.scatter(
+                    point.cost,
+                    100 * point.error,
+                    color=COLOURS[fidelity],
+                    marker=MARKERS[activity],
+                    zorder=3,
+                    **style,
+                )
         for dial in DIALS:
             for activity in FRAMES:
-                along = [(value, points.get((preset, activity, each.label))) for value, each in settings_of(dial, preset)]
+                along = [
+                    (value, points.get((preset, activity, each.label)))
+                    for value, each in settings_of(dial, preset)
+                ]
                 found = [(value, point) for value, point in along if point is not None]
                 x, y = [point.cost for _, point in found], [100 * point.error for _, point in found]
-                axes.plot(x, y, dial.style, color=COLOURS[dial.fidelity], linewidth=0.8, alpha=0.6, zorder=2)
+                axes.plot(
+                    x,
+                    y,
+                    dial.style,
+                    color=COLOURS[dial.fidelity],
+                    linewidth=0.8,
+                    alpha=0.6,
+                    zorder=2,
+                )
                 # The ends of the option, once.
                 if activity == "walk" and len(found) > 1:
                     for value, point in (found[0], found[-1]):
                         text = f"{1e3 * value:g} ms" if dial.name == "anchor_s" else f"{value:g}"
                         place = (point.cost, 100 * point.error)
-                        axes.annotate(text, place, (4, 4), textcoords="offset points", fontsize=6.5, color=COLOURS[dial.fidelity])
-        dearest = [point.cost for (of, _, name), point in points.items() if (of, name) == (preset, "reference")]
+                        axes.annotate(
+                            text,
+                            place,
+                            (4, 4),
+                            textcoords="offset points",
+                            fontsize=6.5,
+                            color=COLOURS[dial.fidelity],
+                        )
+        dearest = [
+            point.cost
+            for (of, _, name), point in points.items()
+            if (of, name) == (preset, "reference")
+        ]
         if dearest:
-            axes.axvline(float(np.median(dearest)), color=COLOURS["reference"], linestyle=":", linewidth=1.5)
+            axes.axvline(
+                float(np.median(dearest)), color=COLOURS["reference"], linestyle=":", linewidth=1.5
+            )
         axes.set(xscale="log", yscale="log", xlabel="cost of a 100 ms frame [times analytic]")
         axes.set_title(f"{preset[6:8]} GHz", fontsize=10)
         axes.grid(which="both", alpha=0.2)
     panels[0].set_ylabel("error of H(f, t) against reference, rms [%]")
     seen = {point.setting.partition(" ")[0] for point in points.values() if point.error > 0}
     keys = [
-        Line2D([], [], color=colour, marker="o", linestyle="", label=name) for name, colour in COLOURS.items() if name in seen
+        Line2D([], [], color=colour, marker="o", linestyle="", label=name)
+        for name, colour in COLOURS.items()
+        if name in seen
     ]
-    keys.append(Line2D([], [], color=COLOURS["reference"], linestyle=":", label="reference: no error, this cost"))
-    keys += [Line2D([], [], color="black", marker=mark, linestyle="", label=name) for name, mark in MARKERS.items()]
+    keys.append(
+        Line2D(
+            [],
+            [],
+            color=COLOURS["reference"],
+            linestyle=":",
+            label="reference: no error, this cost",
+        )
+    )
     keys += [
-        Line2D([], [], color=COLOURS[dial.fidelity], linestyle=dial.style, label=f"{dial.fidelity}: {dial.name}")
+        Line2D([], [], color="black", marker=mark, linestyle="", label=name)
+        for name, mark in MARKERS.items()
+    ]
+    keys += [
+        Line2D(
+            [],
+            [],
+            color=COLOURS[dial.fidelity],
+            linestyle=dial.style,
+            label=f"{dial.fidelity}: {dial.name}",
+        )
         for dial in DIALS
     ]
     figure.legend(handles=keys, loc="outside right upper", fontsize=7)
@@ -308,10 +418,18 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--json", type=Path, help="points are kept there; those that it holds are not measured again")
-    parser.add_argument("--figure", type=Path, metavar="FILE", help="draw error over cost there, as PNG")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="points are kept there; those that it holds are not measured again",
+    )
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw error over cost there, as PNG"
+    )
     parser.add_argument("--costs", action="store_true", help="measure the cost of all points anew")
-    parser.add_argument("--quick", action="store_true", help="one activity at 12 GHz, without dials")
+    parser.add_argument(
+        "--quick", action="store_true", help="one activity at 12 GHz, without dials"
+    )
     options = parser.parse_args()
     began = time.perf_counter()
     points = read(options.json)
@@ -320,9 +438,15 @@ def main() -> int:
             point.seconds = point.cost = 0.0
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
-        scenes = [Scene(*each) for each in itertools.product(PRESETS, FRAMES)][: 1 if options.quick else None]
+        scenes = [Scene(*each) for each in itertools.product(PRESETS, FRAMES)][
+            : 1 if options.quick else None
+        ]
         for slow, scene in itertools.product((False, True), scenes):
-            wanted = [each for each in settings(scene.preset, options.quick) if (each.fidelity in SLOW) == slow]
+            wanted = [
+                each
+                for each in settings(scene.preset, options.quick)
+                if (each.fidelity in SLOW) == slow
+            ]
             for point in measure_points(scene, wanted, points):
                 write(options.json, points)
                 print(

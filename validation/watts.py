@@ -60,10 +60,19 @@ def equation_dbm(centre_hz: float, sigma: float, distance: float) -> float:
 def received_dbm(centre_hz: float, scattering: complex, distance: float) -> float:
     """Through the chain, for what scatters so many metres, on the boresight."""
     made = radar(centre_hz)
-    length = np.linalg.norm(made.rx - [distance, 0, 0], axis=1)[None, :, None] + np.linalg.norm(made.tx[0] - [distance, 0, 0])
+    length = np.linalg.norm(made.rx - [distance, 0, 0], axis=1)[None, :, None] + np.linalg.norm(
+        made.tx[0] - [distance, 0, 0]
+    )
     one = np.zeros(1, np.int64)
     amplitude = np.full((1, *length.shape), np.conj(scattering) / distance**2)
-    echoes = rt.Echoes(length=length, amplitude=amplitude, frequency=np.array([centre_hz]), tx=one, part=one, bounces=one + 1)
+    echoes = rt.Echoes(
+        length=length,
+        amplitude=amplitude,
+        frequency=np.array([centre_hz]),
+        tx=one,
+        part=one,
+        bounces=one + 1,
+    )
     spectra = range_spectrum(synthesize(echoes, made, made.chirp_times(1)), made)
     return float(10 * np.log10((np.abs(spectra[0]) ** 2).max() * made.watts_per_m2 * 1e3))
 
@@ -95,9 +104,19 @@ def point_rows() -> Iterator[Row]:
     for centre in (14e9, 24e9, 79e9):
         distance = 25 * radar(centre).range_bin_m
         found = received_dbm(centre, math.sqrt(0.7), distance)
-        says = "received power of a point of known cross-section in watts against the radar equation"
+        says = (
+            "received power of a point of known cross-section in watts against the radar equation"
+        )
         expected = equation_dbm(centre, 0.7, distance)
-        yield judged("point", f"power at {centre / 1e9:.0f} GHz", "dBm", found, 0.01, reference=expected, says=says)
+        yield judged(
+            "point",
+            f"power at {centre / 1e9:.0f} GHz",
+            "dBm",
+            found,
+            0.01,
+            reference=expected,
+            says=says,
+        )
 
 
 def noise_rows(quick: bool) -> Iterator[Row]:
@@ -112,7 +131,11 @@ def noise_rows(quick: bool) -> Iterator[Row]:
         maps.append(float(power.mean()) * made.watts_per_m2)
     sigmas = abs(total / count / expected - 1) * math.sqrt(count)
     yield reported(
-        "noise", "power of a sample", "dBm", 10 * math.log10(total / count * 1e3), reference=10 * math.log10(expected * 1e3)
+        "noise",
+        "power of a sample",
+        "dBm",
+        10 * math.log10(total / count * 1e3),
+        reference=10 * math.log10(expected * 1e3),
     )
     says = "noise power of IF samples in watts against k T F Fs, in standard deviations of the mean"
     yield judged("noise", f"of {count} samples, off by", "sigma", sigmas, 5.0, says=says)
@@ -129,7 +152,9 @@ def noise_rows(quick: bool) -> Iterator[Row]:
         samples = noise_samples(dataclasses.replace(made, noise_temperature_k=antenna_k), 8)
         mean = float((np.abs(samples.astype(np.complex128)) ** 2).mean()) * made.watts_per_m2
         sigmas = abs(mean / noise_w(antenna_k) - 1) * math.sqrt(samples.size)
-        yield judged("noise", f"antennas that see {antenna_k:g} K, off by", "sigma", sigmas, 5.0, says=says)
+        yield judged(
+            "noise", f"antennas that see {antenna_k:g} K, off by", "sigma", sigmas, 5.0, says=says
+        )
 
 
 def noise_w(antenna_k: float) -> float:

@@ -30,7 +30,9 @@ SIDE = """?hipjoint root @1 -.5 0 .1|?femur ?hipjoint 0 -1 0 .42|?tibia ?femur 0
 
 def write_wave(asf: Path, amc: Path) -> None:
     """Somebody stands, and swings the left arm out to the side and back, once a second."""
-    text = "\n".join([MIDDLE, SIDE.replace("?", "l").replace("@", ""), SIDE.replace("?", "r").replace("@", "-")])
+    text = "\n".join(
+        [MIDDLE, SIDE.replace("?", "l").replace("@", ""), SIDE.replace("?", "r").replace("@", "-")]
+    )
     bones = [bone.split() for bone in text.replace("|", "\n").split("\n")]
     data = [
         f"begin\nid {number}\nname {name}\ndirection {x} {y} {z}\nlength {length}\naxis 0 0 0 XYZ\n"
@@ -43,18 +45,28 @@ def write_wave(asf: Path, amc: Path) -> None:
     links = [f"{parent} {name}" for name, parent, *_ in bones]
     asf.write_text("\n".join([*head, *data, ":hierarchy", "begin", *links, "end", ""]))
     swings = 45 * (1 - np.cos(2 * np.pi * np.arange(120 * SECONDS + 1) / 120))  # AMC is at 120 Hz
-    frames = [f"{number}\nroot 0 .95 0 0 0 0\nlhumerus {angle:.3f}" for number, angle in enumerate(swings, start=1)]
+    frames = [
+        f"{number}\nroot 0 .95 0 0 0 0\nlhumerus {angle:.3f}"
+        for number, angle in enumerate(swings, start=1)
+    ]
     amc.write_text("\n".join([":FULLY-SPECIFIED", ":DEGREES", *frames, ""]))
 
 
 # %%
 # Names of recordings begin with that of their skeleton: ``HDM_bd.asf``, ``HDM_bd_kickLFront1Reps_001_120.amc``.
 recordings = sorted(Path(os.environ.get("RTRADAR_MOCAP", "none")).rglob("*.amc"))
-pairs = [(amc, asf) for amc in recordings for asf in amc.parent.glob("*.asf") if amc.stem.startswith(asf.stem)]
+pairs = [
+    (amc, asf)
+    for amc in recordings
+    for asf in amc.parent.glob("*.asf")
+    if amc.stem.startswith(asf.stem)
+]
 if pairs:
     amc, asf = pairs[0]
 else:
-    print("RTRADAR_MOCAP names no folder with AMC files: a small recording is written and taken instead")
+    print(
+        "RTRADAR_MOCAP names no folder with AMC files: a small recording is written and taken instead"
+    )
     amc, asf = OUT / "waver.amc", OUT / "waver.asf"
     write_wave(asf, amc)
 motion = rt.load_motion(amc, skeleton=asf)
@@ -69,7 +81,15 @@ for column, time in enumerate((0.0, length / 4, length / 2), start=1):
     vertices, faces = ellipsoid_meshes(body.ellipsoids(time), subdivisions=2)
     for part in vertices:
         axes.plot_trisurf(*part.T, triangles=faces, color="steelblue")
-    axes.set(title=f"{time:.2f} s", xlim=(-1, 1), ylim=(-1, 1), zlim=(0, 2), xticks=[], yticks=[], zticks=[])
+    axes.set(
+        title=f"{time:.2f} s",
+        xlim=(-1, 1),
+        ylim=(-1, 1),
+        zlim=(0, 2),
+        xticks=[],
+        yticks=[],
+        zticks=[],
+    )
     axes.set_box_aspect((1, 1, 1), zoom=1.4)
     axes.view_init(elev=8, azim=190)
 figure.suptitle(f"{amc.name}: 21 ellipsoids, in boxes of 2 m")

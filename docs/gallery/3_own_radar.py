@@ -43,9 +43,13 @@ position_m = [-3, 0, 1.2]
 # %%
 # What it can measure follows from the file.
 radar = rt.Radar.load(OUT / "iwr6843.toml")
-print(f"range to {radar.max_range_m:.1f} m in steps of {100 * radar.range_bin_m:.1f} cm, {radar.n_channels} channels")
+print(
+    f"range to {radar.max_range_m:.1f} m in steps of {100 * radar.range_bin_m:.1f} cm, {radar.n_channels} channels"
+)
 print(f"velocity to {radar.max_velocity_mps:.1f} m/s in steps of {radar.velocity_bin_mps:.3f} m/s")
-print(f"beam {radar.angle_resolution_deg:.0f} degrees wide, {radar.sample_rate_hz / 1e6:.1f} million samples a second")
+print(
+    f"beam {radar.angle_resolution_deg:.0f} degrees wide, {radar.sample_rate_hz / 1e6:.1f} million samples a second"
+)
 
 # %%
 # The spectrogram of a kick, relative to its strongest value: maps hold abs(amplitude)^2 [m^2] with the loss over distance in it.
@@ -55,8 +59,14 @@ figure, axes = plt.subplots(figsize=(8, 4), layout="constrained")
 with h5py.File(OUT / "own_radar" / "maps.h5") as maps:
     power = 10 * np.log10(maps["spectrogram"][:].T)
     power -= power.max()
-    image = axes.pcolormesh(maps["spectrogram_time"][:], maps["spectrogram_velocity"][:], power, cmap="magma")
+    image = axes.pcolormesh(
+        maps["spectrogram_time"][:], maps["spectrogram_velocity"][:], power, cmap="magma"
+    )
 image.set_clim(np.median(power), power.max())
-axes.set(xlabel="Time [s]", ylabel="Velocity [m/s] (positive: receding)", title=f"A kick before the {radar.name}")
+axes.set(
+    xlabel="Time [s]",
+    ylabel="Velocity [m/s] (positive: receding)",
+    title=f"A kick before the {radar.name}",
+)
 figure.colorbar(image, label="Power [dB re maximum]")
 figure.savefig(OUT / "3_own_radar.png")

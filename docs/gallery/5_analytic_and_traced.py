@@ -20,8 +20,13 @@ SECONDS = float(os.environ.get("RTRADAR_GALLERY_S", 3.0))
 
 # %%
 # A kick seen from the side: one leg passes before the other, the trunk hides an arm.
-kick, radar = rt.synthetic_motion("kick", seed=0, duration_s=SECONDS), rt.Radar.preset("paper-12ghz")
-found = rt.compare(kick, radar, fidelities=["analytic", "specular"], heading_deg=90, out=OUT / "compare")
+kick, radar = (
+    rt.synthetic_motion("kick", seed=0, duration_s=SECONDS),
+    rt.Radar.preset("paper-12ghz"),
+)
+found = rt.compare(
+    kick, radar, fidelities=["analytic", "specular"], heading_deg=90, out=OUT / "compare"
+)
 print(found.table())
 
 # %%
@@ -35,7 +40,9 @@ for model in ("analytic", "specular"):
 strongest = max(one.max() for one in power.values())
 for model, one in power.items():
     above.plot(times, 10 * np.log10(one / strongest), label=model)
-above.set(xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps")
+above.set(
+    xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps"
+)
 above.legend()
 hidden = found.summary["fidelities"]["specular"]["part_hidden_share"]
 below.barh(list(hidden), [100 * share for share in hidden.values()])

@@ -46,7 +46,9 @@ for name, (fidelity, model_options) in models.items():
     error = 100 * np.sqrt(np.mean(np.abs(found - judge) ** 2) / np.mean(np.abs(judge) ** 2))
     print(f"{name:30s} {error:6.1f} %  {1000 * cost:8.1f} ms")
     axes.plot(cost, error, "o", markersize=9, label=name)
-axes.set(xscale="log", yscale="log", xlabel="Time of 48 Tx-Rx pairs [s]", ylabel="Field, rms error [%]")
+axes.set(
+    xscale="log", yscale="log", xlabel="Time of 48 Tx-Rx pairs [s]", ylabel="Field, rms error [%]"
+)
 axes.set_title("21 ellipsoids at 14 GHz, against 20 480 facets a part")
 axes.grid(alpha=0.3, which="both")
 axes.legend()

@@ -41,7 +41,19 @@ subjects = 4
 
 # %%
 # On a command line: rtradar dataset build small.toml --out small
-subprocess.run([sys.executable, "-m", "rtradar", "dataset", "build", OUT / "small.toml", "--out", OUT / "small"], check=True)
+subprocess.run(
+    [
+        sys.executable,
+        "-m",
+        "rtradar",
+        "dataset",
+        "build",
+        OUT / "small.toml",
+        "--out",
+        OUT / "small",
+    ],
+    check=True,
+)
 
 # %%
 # Clouds are read when they are asked for, with their label and all that they follow from.

@@ -35,6 +35,10 @@ print(f"{100 * right:.0f} % of the clouds of unseen people are told right")
 figure, axes = plt.subplots(figsize=(7, 4), layout="constrained")
 for outcome in study.outcomes:
     axes.plot([row["train_loss"] for row in outcome.history], label=outcome.name)
-axes.set(xlabel="Epoch", ylabel="Loss of the training clouds", title=f"{100 * right:.0f} % right of people never seen")
+axes.set(
+    xlabel="Epoch",
+    ylabel="Loss of the training clouds",
+    title=f"{100 * right:.0f} % right of people never seen",
+)
 axes.legend()
 figure.savefig(OUT / "8_train.png")

@@ -19,7 +19,9 @@ import rtradar as rt
 OUT = Path(os.environ.get("RTRADAR_GALLERY_OUT", "out/gallery"))
 SECONDS = min(1.0, float(os.environ.get("RTRADAR_GALLERY_S", 1.0)))
 radar = rt.Radar.preset("paper-12ghz")
-rt.run(rt.synthetic_motion("punch", seed=0, duration_s=SECONDS), radar, save_if=True, out=OUT / "cube")
+rt.run(
+    rt.synthetic_motion("punch", seed=0, duration_s=SECONDS), radar, save_if=True, out=OUT / "cube"
+)
 
 # %%
 # The IF samples (chirp, rx, sample), cut into TDM cycles: (cycle, tx, rx, sample), with the time of each cycle's first chirp.
@@ -42,6 +44,8 @@ left.set(xlim=(2, 6), xlabel="Range [m]", ylabel="Time [s]", title="One channel,
 with xr.open_dataset(OUT / "cube" / "maps.h5", engine="h5netcdf") as maps:
     strongest = maps.range_doppler.sum("range").idxmax("velocity")
     print(f"velocity of the most power, window by window: {np.round(strongest.values, 2)} m/s")
-    (10 * np.log10(maps.range_doppler.sel(time=SECONDS / 2, method="nearest"))).plot(ax=right, x="velocity", y="range")
+    (10 * np.log10(maps.range_doppler.sel(time=SECONDS / 2, method="nearest"))).plot(
+        ax=right, x="velocity", y="range"
+    )
 right.set(ylim=(2, 6), title="All channels, from maps.h5")
 figure.savefig(OUT / "9_read_with_xarray.png")

@@ -76,12 +76,19 @@ def measure(plan: Plan) -> dict[str, Any]:
         "machine": {
             "system": platform.platform(),
             "cores": os.cpu_count(),
-            "versions": {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS},
+            "versions": {"python": platform.python_version()}
+            | {name: version(name) for name in _VERSIONS},
         },
         "rates": {},
         "models": [],
         "paper": {"trouble": "", "radars": {}},
-        "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": [], "channels": [], "echoes": []},
+        "growth": {
+            "fidelity": plan.growing_fidelity,
+            "chirps": [],
+            "duration": [],
+            "channels": [],
+            "echoes": [],
+        },
     }
     with temporary_folder("rtradar-bench-") as folder:
         runner = Runner(folder)
@@ -100,12 +107,18 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         radar: measure_baseline(radar, plan.repeats, quick=plan.quick) for radar in plan.radars
     }
     runs = runner.measure(model_cases(plan, one_core=can_pin()), plan.repeats, "models")
-    cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST and not case.one_core}
+    cheapest = {
+        case.radar: own
+        for case, own in runs.items()
+        if case.fidelity == CHEAPEST and not case.one_core
+    }
     found["models"] = [
         model_row(
             case,
             own,
-            first=runner.first[case.fidelity] if case.radar == plan.radars[0] and not case.one_core else None,
+            first=runner.first[case.fidelity]
+            if case.radar == plan.radars[0] and not case.one_core
+            else None,
             cheapest=None if case.one_core else cheapest.get(case.radar),
             rates=rates[case.radar],
             baseline=baselines[case.radar],
@@ -113,7 +126,13 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         for case, own in runs.items()
     ]
     found["rates"] = {Radar.load(radar).name: asdict(own) for radar, own in rates.items()}
-    known = {Radar.load(radar).name: asdict(own) for radar, own in baselines.items() if own is not None}
-    trouble = "" if known else "there is no paper_numpy.py among the validation scripts; use a checkout, or install rtradar again"
+    known = {
+        Radar.load(radar).name: asdict(own) for radar, own in baselines.items() if own is not None
+    }
+    trouble = (
+        ""
+        if known
+        else "there is no paper_numpy.py among the validation scripts; use a checkout, or install rtradar again"
+    )
     found["paper"] = {"trouble": trouble, "radars": known}
     found["growth"]["chirps"] = chirp_rows(found["models"])

@@ -25,15 +25,31 @@ def draw(found: dict[str, Any], file: BinaryIO) -> None:
     figure = plt.figure(figsize=(11, 3.4 * rows), layout="constrained")
     places = figure.add_gridspec(rows, max(1, len(grown)))
     for number, radar in enumerate(radars):
-        _bars(figure.add_subplot(places[number, :]), [row for row in models if row["radar"] == radar], radar)
+        _bars(
+            figure.add_subplot(places[number, :]),
+            [row for row in models if row["radar"] == radar],
+            radar,
+        )
     for column, name in enumerate(grown):
         axes = figure.add_subplot(places[-1, column])
         if name == "echoes":
-            _lines(axes, growth[name], "echoes", "echoes of a chirp and receiver", [("signal_s", "IF of a block")])
+            _lines(
+                axes,
+                growth[name],
+                "echoes",
+                "echoes of a chirp and receiver",
+                [("signal_s", "IF of a block")],
+            )
         else:
             label = "recording [s]" if name == "duration" else "channels"
             key = "duration_s" if name == "duration" else "channels"
-            _lines(axes, growth[name], key, label, [("to_cloud_s", "to the cloud"), ("whole_s", "whole run")])
+            _lines(
+                axes,
+                growth[name],
+                key,
+                label,
+                [("to_cloud_s", "to the cloud"), ("whole_s", "whole run")],
+            )
             _memory(axes.twinx(), growth[name], key)
             axes.set_title(f"`{growth['fidelity']}`", fontsize=9)
     figure.savefig(file, format="png", dpi=110)
@@ -56,19 +72,32 @@ def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
             label = name if not number else None
             hatch = "//" if name in (*OTHER_PRODUCTS, *FILES) else None
             place = names.index(name)
-            axes.barh(number, stage["median"], left=left, color=colours(place % colours.N), hatch=hatch, label=label, height=0.7)
+            axes.barh(
+                number,
+                stage["median"],
+                left=left,
+                color=colours(place % colours.N),
+                hatch=hatch,
+                label=label,
+                height=0.7,
+            )
             if stage["floor"]:
                 axes.barh(number, stage["floor"], left=left, color="black", height=0.15)
             left += stage["median"]
     axes.barh([0], [0], color="black", label="floor")
     axes.set_yticks(range(len(models)), [row["fidelity"] for row in models])
     axes.invert_yaxis()
-    axes.set(ylabel="model", xlabel=f"time of a run of {models[0]['capture_s']:.2f} s of radar, median [s]")
+    axes.set(
+        ylabel="model",
+        xlabel=f"time of a run of {models[0]['capture_s']:.2f} s of radar, median [s]",
+    )
     axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9)
     axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _lines(axes: Any, rows: Sequence[Row], key: str, label: str, series: Sequence[tuple[str, str]]) -> None:
+def _lines(
+    axes: Any, rows: Sequence[Row], key: str, label: str, series: Sequence[tuple[str, str]]
+) -> None:
     x = [row[key] for row in rows]
     for name, said in series:
         y = [row[name] if isinstance(row[name], float) else row[name]["median"] for row in rows]
@@ -79,5 +108,14 @@ def _lines(axes: Any, rows: Sequence[Row], key: str, label: str, series: Sequenc
 
 
 def _memory(axes: Any, rows: Sequence[Row], key: str) -> None:
-    axes.plot([row[key] for row in rows], [row["peak_memory_mb"] for row in rows], "s--", color="0.5", markersize=4)
-    axes.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(row["peak_memory_mb"] for row in rows)))
+    axes.plot(
+        [row[key] for row in rows],
+        [row["peak_memory_mb"] for row in rows],
+        "s--",
+        color="0.5",
+        markersize=4,
+    )
+    axes.set(
+        ylabel="peak memory [MB], dashed",
+        ylim=(0, 1.3 * max(row["peak_memory_mb"] for row in rows)),
+    )

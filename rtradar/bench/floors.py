@@ -15,7 +15,9 @@ from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
 _ECHO = 24  # bytes of a float64 length and a complex128 amplitude
-_MULTIPLY_ADDS = 2  # of a complex amplitude times a complex power, which is another's conjugate, added up
+_MULTIPLY_ADDS = (
+    2  # of a complex amplitude times a complex power, which is another's conjugate, added up
+)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,16 @@ class Work:
         """Of a run by this radar."""
         lines = (radar.tx_y * radar.rx_y > 1) + (radar.tx_z * radar.rx_z > 1)
         shape = (radar.n_rx, radar.samples_per_chirp)
-        return cls(chirps, *shape, echoes, windows, radar.cycles_per_frame, radar.n_channels, detections, lines)
+        return cls(
+            chirps,
+            *shape,
+            echoes,
+            windows,
+            radar.cycles_per_frame,
+            radar.n_channels,
+            detections,
+            lines,
+        )
 
     @property
     def if_samples(self) -> int:
@@ -135,22 +146,32 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
         return count / rates.copied_bytes
 
     samples, echoes = work.if_samples, work.chirps * work.rx * work.echoes
-    tones = max(_MULTIPLY_ADDS * samples * work.echoes / rates.multiply_adds, copied(_SAMPLE * samples))
+    tones = max(
+        _MULTIPLY_ADDS * samples * work.echoes / rates.multiply_adds, copied(_SAMPLE * samples)
+    )
     spectra = _SAMPLE * work.windows * work.cycles * work.channels * work.samples
     doppler = max(work.windows * work.channels * work.samples / rates.doppler_ffts, copied(spectra))
     return {
         ELSEWHERE: Floor(copied(2 * _SAMPLE * samples), "spectra kept for the windows"),
         "scatter": Floor(copied(_ECHO * echoes), "lengths and amplitudes written"),
         "signal": Floor(tones, "two multiply-adds an echo and sample, or samples written"),
-        "noise": Floor(max(samples / rates.random_words, copied(2 * _SAMPLE * samples)), "a random word a sample"),
-        "range": Floor(
-            max(samples / work.samples / rates.range_ffts, copied(2 * _SAMPLE * samples)), "an FFT a chirp and receiver"
+        "noise": Floor(
+            max(samples / rates.random_words, copied(2 * _SAMPLE * samples)),
+            "a random word a sample",
         ),
-        "spectrogram": Floor(work.spectrogram_columns * work.samples / rates.spectrogram_ffts, "an FFT a column and range bin"),
+        "range": Floor(
+            max(samples / work.samples / rates.range_ffts, copied(2 * _SAMPLE * samples)),
+            "an FFT a chirp and receiver",
+        ),
+        "spectrogram": Floor(
+            work.spectrogram_columns * work.samples / rates.spectrogram_ffts,
+            "an FFT a column and range bin",
+        ),
         "doppler": Floor(doppler, "an FFT a window, channel and range bin, or spectra read"),
         "cfar": Floor(copied(5 * work.cells), "power read, mask written"),
         "cloud": Floor(copied(work.cells), "masks read"),
         "angle": Floor(
-            work.detections * work.lines / rates.angle_ffts, "an FFT a detection and line, zero-padded to the directions"
+            work.detections * work.lines / rates.angle_ffts,
+            "an FFT a detection and line, zero-padded to the directions",
         ),
     }

@@ -34,10 +34,14 @@ def _grown(runs: list[Run]) -> dict[str, Any]:
 
 def with_duration(plan: Plan, runner: Runner) -> list[dict[str, Any]]:
     """Runs of growing length, a row each: ``duration_s``, ``capture_s``, seconds and memory."""
-    cases = [Case(plan.radars[0], plan.growing_fidelity, duration) for duration in plan.growing_durations_s]
+    cases = [
+        Case(plan.radars[0], plan.growing_fidelity, duration)
+        for duration in plan.growing_durations_s
+    ]
     runs = runner.measure(cases, plan.repeats, "length")
     return [
-        {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_grown(own)} for case, own in runs.items()
+        {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_grown(own)}
+        for case, own in runs.items()
     ]
 
 
@@ -66,13 +70,17 @@ def arrays(radar: Radar) -> list[Radar]:
 def as_toml(radar: Radar) -> str:
     """The fields of a radar as a TOML file that `Radar.load` reads."""
     fields = {name: value for name, value in dataclasses.asdict(radar).items() if value is not None}
-    tables = {name: fields.pop(name) for name, value in list(fields.items()) if isinstance(value, dict)}
+    tables = {
+        name: fields.pop(name) for name, value in list(fields.items()) if isinstance(value, dict)
+    }
     return _lines(fields) + "".join(f"[{name}]\n{_lines(table)}" for name, table in tables.items())
 
 
 def _lines(fields: dict[str, Any]) -> str:
     # A JSON string, number or list of numbers is one of TOML.
-    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in fields.items() if value is not None)
+    return "".join(
+        f"{name} = {json.dumps(value)}\n" for name, value in fields.items() if value is not None
+    )
 
 
 def with_echoes(radar: Radar) -> list[dict[str, Any]]:
@@ -83,7 +91,11 @@ def with_echoes(radar: Radar) -> list[dict[str, Any]]:
 def _if_row(radar: Radar, echoes: Echoes) -> dict[str, Any]:
     times = radar.chirp_times(len(echoes.tx))
     seconds = best_s(lambda: synthesize(echoes, radar, times, dtype=np.complex64), _ECHOES_S)
-    return {"echoes": len(echoes.part), "samples": len(times) * radar.n_rx * radar.samples_per_chirp, "signal_s": seconds}
+    return {
+        "echoes": len(echoes.part),
+        "samples": len(times) * radar.n_rx * radar.samples_per_chirp,
+        "signal_s": seconds,
+    }
 
 
 def _echoes(radar: Radar, count: int) -> Echoes:

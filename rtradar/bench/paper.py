@@ -60,11 +60,22 @@ def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | Non
         return None
     with temporary_folder() as folder:
         written = folder / "frames.json"
-        command = [sys.executable, str(script), "--radar", radar, "--repeats", str(repeats), "--json", str(written)]
+        command = [
+            sys.executable,
+            str(script),
+            "--radar",
+            radar,
+            "--repeats",
+            str(repeats),
+            "--json",
+            str(written),
+        ]
         command += ["--cycles", str(_QUICK_CYCLES)] if quick else []
         done = subprocess.run(command, capture_output=True, text=True, check=False)
         if done.returncode != 0:
-            raise RunError(f"bench: {script.name}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}")
+            raise RunError(
+                f"bench: {script.name}: {(done.stderr.strip().splitlines() or ['failed'])[-1]}"
+            )
         found = json.loads(written.read_text(encoding="utf-8"))
     frames = found["frames"]
     total = Spread.of([sum(frame.values()) for frame in frames])

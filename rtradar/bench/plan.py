@@ -60,7 +60,9 @@ class Plan:
                 raise InputError(f"{option} {','.join(names)}: name each once, with commas between")
         for fidelity in self.fidelities:
             if fidelity not in MODELS:
-                raise InputError(f"--fidelity {fidelity}: there is no such model; allowed: {', '.join(MODELS)}")
+                raise InputError(
+                    f"--fidelity {fidelity}: there is no such model; allowed: {', '.join(MODELS)}"
+                )
         if self.repeats < 1:
             raise InputError(f"--repeats {self.repeats}: it must be a whole number, at least 1")
         for radar in map(Radar.load, self.radars):
@@ -78,7 +80,9 @@ class Plan:
     @property
     def growing_durations_s(self) -> tuple[float, ...]:
         """Lengths of recording that growth is measured over [s]."""
-        return (self.duration_s, 2 * self.duration_s) if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
+        return (
+            (self.duration_s, 2 * self.duration_s) if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
+        )
 
 
 @dataclass(frozen=True)
@@ -102,14 +106,24 @@ class Case:
 
 def model_cases(plan: Plan, *, one_core: bool) -> list[Case]:
     """Every model with every radar; with ``one_core`` also the model of the paper's method on one core, with the first radar."""
-    cases = [Case(radar, fidelity, plan.duration_s) for radar in plan.radars for fidelity in plan.fidelities]
+    cases = [
+        Case(radar, fidelity, plan.duration_s)
+        for radar in plan.radars
+        for fidelity in plan.fidelities
+    ]
     if one_core and SAME_AS_PAPER in plan.fidelities:
         cases.append(replace(cases[0], fidelity=SAME_AS_PAPER, one_core=True))
     return cases
 
 
 def plan_of(
-    *, radar: str | None, fidelity: str | None, repeats: int | None, duration_s: float | None, quick: bool, only: str | None
+    *,
+    radar: str | None,
+    fidelity: str | None,
+    repeats: int | None,
+    duration_s: float | None,
+    quick: bool,
+    only: str | None,
 ) -> Plan:
     """The plan that the options of the command line ask for; what is None is left to `Plan`, or with ``quick`` to less.
 
@@ -120,7 +134,9 @@ def plan_of(
     """
     if only is not None and only not in PARTS:
         raise InputError(f"--only {only}: there is no such part; allowed: {', '.join(PARTS)}")
-    plan = Plan(RADARS[:1], FIDELITIES[:3], repeats=1, duration_s=0.5, quick=True) if quick else Plan()
+    plan = (
+        Plan(RADARS[:1], FIDELITIES[:3], repeats=1, duration_s=0.5, quick=True) if quick else Plan()
+    )
     return replace(
         plan,
         radars=plan.radars if radar is None else _named(radar),

@@ -53,9 +53,13 @@ def best_s(work: Callable[[], object], least_s: float = _LEAST_S) -> float:
 
 def _copied_bytes() -> float:
     source, target = (np.ones(_COPIED_BYTES // 8) for _ in range(2))
-    parts = list(zip(np.array_split(target, _cores()), np.array_split(source, _cores()), strict=True))
+    parts = list(
+        zip(np.array_split(target, _cores()), np.array_split(source, _cores()), strict=True)
+    )
     with ThreadPoolExecutor(_cores()) as pool:
-        return 2 * _COPIED_BYTES / best_s(lambda: list(pool.map(lambda pair: np.copyto(*pair), parts)))
+        return (
+            2 * _COPIED_BYTES / best_s(lambda: list(pool.map(lambda pair: np.copyto(*pair), parts)))
+        )
 
 
 def _random_words() -> float:
@@ -89,6 +93,8 @@ def _ffts(length: int) -> float:
 
     def seconds(block: np.ndarray[tuple[int, ...], np.dtype[np.complex64]], axis: int) -> float:
         # Unitary, so that it can be done again and again in place.
-        return best_s(lambda: scipy.fft.fft(block, axis=axis, norm="ortho", overwrite_x=True, workers=-1))
+        return best_s(
+            lambda: scipy.fft.fft(block, axis=axis, norm="ortho", overwrite_x=True, workers=-1)
+        )
 
     return count / min(seconds(columns, 0), seconds(rows, 1))

@@ -17,7 +17,13 @@ Row = dict[str, Any]
 
 
 def model_row(
-    case: Case, runs: list[Run], *, first: Run | None, cheapest: list[Run] | None, rates: Rates, baseline: Baseline | None
+    case: Case,
+    runs: list[Run],
+    *,
+    first: Run | None,
+    cheapest: list[Run] | None,
+    rates: Rates,
+    baseline: Baseline | None,
 ) -> Row:
     """What was measured of one model with one radar.
 
@@ -57,14 +63,22 @@ def model_row(
         "warmup_s": asdict(Spread.of([run.summary["warmup_s"] for run in runs])),
         "first_use": None if first is None else first_use(first, runs),
         "peak_memory_mb": max(run.peak_memory_mb for run in runs),
-        f"over_{CHEAPEST}": None if cheapest is None else paired_ratio(to_cloud, [run.to_cloud_s for run in cheapest]),
+        f"over_{CHEAPEST}": None
+        if cheapest is None
+        else paired_ratio(to_cloud, [run.to_cloud_s for run in cheapest]),
         "stages": {
             name: asdict(seconds)
-            | ({"floor": least[name].seconds, "rule": least[name].rule} if name in least else {"floor": None, "rule": ""})
+            | (
+                {"floor": least[name].seconds, "rule": least[name].rule}
+                if name in least
+                else {"floor": None, "rule": ""}
+            )
             for name, seconds in by_stage([run.stages for run in runs]).items()
         },
     }
-    return row | {"paper_over": None if baseline is None else paper_over(baseline, radar, work.chirps, row)}
+    return row | {
+        "paper_over": None if baseline is None else paper_over(baseline, radar, work.chirps, row)
+    }
 
 
 def first_use(first: Run, runs: list[Run]) -> dict[str, float]:
@@ -102,7 +116,11 @@ def paper_over(baseline: Baseline, radar: Radar, chirps: int, row: Row) -> dict[
 
 def chirp_rows(models: list[Row]) -> list[Row]:
     """Radars with more chirps than the first, each model over its own with the first: chirps, time and peak memory as ratios."""
-    base = {row["fidelity"]: row for row in models if row["radar"] == models[0]["radar"] and row["cores"] == "all"}
+    base = {
+        row["fidelity"]: row
+        for row in models
+        if row["radar"] == models[0]["radar"] and row["cores"] == "all"
+    }
     return [
         {
             "radar": row["radar"],

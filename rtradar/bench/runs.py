@@ -97,9 +97,15 @@ class Runner:
         RunError
             Where a run fails.
         """
-        fresh = {case.fidelity: case for case in reversed(cases) if case.fidelity not in self.first and not case.one_core}
+        fresh = {
+            case.fidelity: case
+            for case in reversed(cases)
+            if case.fidelity not in self.first and not case.one_core
+        }
         runs: dict[Case, list[Run]] = {case: [] for case in cases}
-        with tqdm(total=len(fresh) + repeats * len(cases), desc=what, unit="run", disable=None) as bar:
+        with tqdm(
+            total=len(fresh) + repeats * len(cases), desc=what, unit="run", disable=None
+        ) as bar:
             for fidelity, case in reversed(fresh.items()):
                 self.first[fidelity] = self.run(case)
                 bar.update()
@@ -113,12 +119,37 @@ class Runner:
         """One run of a case."""
         with temporary_folder(inside=self._folder) as out:
             written = out / "said.json"
-            command = [sys.executable, "-m", "rtradar", "run", MOTION, "--duration", str(case.duration_s), "--radar", case.radar]
+            command = [
+                sys.executable,
+                "-m",
+                "rtradar",
+                "run",
+                MOTION,
+                "--duration",
+                str(case.duration_s),
+                "--radar",
+                case.radar,
+            ]
             # Its floors are of the CPU.
-            command += ["--fidelity", case.fidelity, "--variant", "cpu", "--out", str(out / "run"), "--json", str(written)]
+            command += [
+                "--fidelity",
+                case.fidelity,
+                "--variant",
+                "cpu",
+                "--out",
+                str(out / "run"),
+                "--json",
+                str(written),
+            ]
             with _on_one_core(case.one_core):
                 began = time.perf_counter()
-                done = subprocess.run(command, env=self._environment(case.fidelity), capture_output=True, text=True, check=False)
+                done = subprocess.run(
+                    command,
+                    env=self._environment(case.fidelity),
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
                 process_s = time.perf_counter() - began
             if done.returncode != 0:
                 lines = done.stderr.strip().splitlines() or [f"ended with status {done.returncode}"]
@@ -131,7 +162,11 @@ class Runner:
         home.mkdir(exist_ok=True)
         # Packages that the user installed for himself are found through HOME, unless told otherwise.
         moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
-        return {**os.environ, "PYTHONUSERBASE": site.getuserbase(), **{name: str(place) for name, place in moved.items()}}
+        return {
+            **os.environ,
+            "PYTHONUSERBASE": site.getuserbase(),
+            **{name: str(place) for name, place in moved.items()},
+        }
 
 
 @contextmanager

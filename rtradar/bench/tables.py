@@ -32,11 +32,17 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
         else:
             yield _paper(found["paper"]["radars"])
         for radar in dict.fromkeys(row["radar"] for row in models):
-            yield _stages(radar, [row for row in models if row["radar"] == radar and row["cores"] == "all"])
+            yield _stages(
+                radar, [row for row in models if row["radar"] == radar and row["cores"] == "all"]
+            )
     growth = found["growth"]
     if growth["chirps"]:
         lines = [
-            [f"{row['radar']} / {row['of_radar']}", f"`{row['fidelity']}`", *map(_plain, _values(row))]
+            [
+                f"{row['radar']} / {row['of_radar']}",
+                f"`{row['fidelity']}`",
+                *map(_plain, _values(row)),
+            ]
             for row in growth["chirps"]
         ]
         yield table(["radars", "model", "chirps", "to the cloud", "peak memory"], lines)
@@ -62,12 +68,19 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
         yield table(head, lines)
     if growth["channels"]:
         lines = [
-            [str(row["channels"]), f"{row['to_cloud_s']['median']:.2f} s", f"{row['peak_memory_mb']:.0f} MB"]
+            [
+                str(row["channels"]),
+                f"{row['to_cloud_s']['median']:.2f} s",
+                f"{row['peak_memory_mb']:.0f} MB",
+            ]
             for row in growth["channels"]
         ]
         yield table([f"channels, `{growth['fidelity']}`", "to the cloud", "peak memory"], lines)
     if growth["echoes"]:
-        lines = [[str(row["echoes"]), f"{1e9 * row['signal_s'] / row['samples']:.2f} ns"] for row in growth["echoes"]]
+        lines = [
+            [str(row["echoes"]), f"{1e9 * row['signal_s'] / row['samples']:.2f} ns"]
+            for row in growth["echoes"]
+        ]
         yield table(["echoes of a chirp and receiver", "IF alone, a sample"], lines)
 
 
@@ -80,7 +93,15 @@ def _rates(rates: dict[str, Any]) -> str:
 
 
 def _models(models: Sequence[Row]) -> str:
-    head = ["radar", "model", "to the cloud: best", "median", "whole run", "first use adds", "peak memory"]
+    head = [
+        "radar",
+        "model",
+        "to the cloud: best",
+        "median",
+        "whole run",
+        "first use adds",
+        "peak memory",
+    ]
     head += [f"over `{CHEAPEST}`", "paper's method over it"]
     lines = [
         [
@@ -92,7 +113,9 @@ def _models(models: Sequence[Row]) -> str:
             "-" if row["first_use"] is None else f"{row['first_use']['adds_s']:.1f} s",
             f"{row['peak_memory_mb']:.0f} MB",
             _or_dash(row[f"over_{CHEAPEST}"], "{:.2f}"),
-            "-" if row["paper_over"] is None else f"{row['paper_over']['to_cloud']:.3g} (IF {row['paper_over']['if']:.3g})",
+            "-"
+            if row["paper_over"] is None
+            else f"{row['paper_over']['to_cloud']:.3g} (IF {row['paper_over']['if']:.3g})",
         ]
         for row in models
     ]
@@ -102,7 +125,11 @@ def _models(models: Sequence[Row]) -> str:
 def _paper(radars: dict[str, Any]) -> str:
     names = dict.fromkeys(name for baseline in radars.values() for name in baseline["stages"])
     lines = [
-        [radar, *(f"{baseline['stages'][name]['median']:.3f} s" for name in names), f"{baseline['total']['median']:.2f} s"]
+        [
+            radar,
+            *(f"{baseline['stages'][name]['median']:.3f} s" for name in names),
+            f"{baseline['total']['median']:.2f} s",
+        ]
         for radar, baseline in radars.items()
     ]
     return table(["the paper's method in NumPy, one thread, a frame", *names, "all"], lines)
@@ -121,7 +148,11 @@ def _stages(radar: str, models: Sequence[Row]) -> str:
         lines.append([f"{name}{group}", *map(_stage, own), floor, rule])
     # The floors of all stages to the cloud, as if nothing else took time.
     sums = [
-        sum(stage["floor"] or 0.0 for name, stage in row["stages"].items() if name not in (*OTHER_PRODUCTS, *FILES))
+        sum(
+            stage["floor"] or 0.0
+            for name, stage in row["stages"].items()
+            if name not in (*OTHER_PRODUCTS, *FILES)
+        )
         for row in models
     ]
     whole = [
@@ -129,13 +160,18 @@ def _stages(radar: str, models: Sequence[Row]) -> str:
         for row, least in zip(models, sums, strict=True)
     ]
     lines.append(["all to the cloud", *whole, f"{sums[0]:.3f} s", "sum of the floors"])
-    return table([f"{radar}: stage", *(f"`{row['fidelity']}`" for row in models), "floor", "floor's work"], lines)
+    return table(
+        [f"{radar}: stage", *(f"`{row['fidelity']}`" for row in models), "floor", "floor's work"],
+        lines,
+    )
 
 
 def _stage(stage: Row | None) -> str:
     if stage is None:
         return "-"
-    return f"{stage['median']:.3f} s" + (f" ({_times(stage['median'], stage['floor'])})" if stage["floor"] else "")
+    return f"{stage['median']:.3f} s" + (
+        f" ({_times(stage['median'], stage['floor'])})" if stage["floor"] else ""
+    )
 
 
 def _times(seconds: float, floor: float) -> str:
@@ -163,6 +199,12 @@ def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
     widths = [max(len(line[column]) for line in (head, *lines)) for column in range(len(head))]
 
     def row(cells: Sequence[str]) -> str:
-        return "| " + " | ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)) + " |"
+        return (
+            "| "
+            + " | ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True))
+            + " |"
+        )
 
-    return "\n".join([row(head), "|" + "|".join("-" * (width + 2) for width in widths) + "|", *map(row, lines)])
+    return "\n".join(
+        [row(head), "|" + "|".join("-" * (width + 2) for width in widths) + "|", *map(row, lines)]
+    )

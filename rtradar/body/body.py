@@ -95,7 +95,9 @@ class Body:
             raise InputError("Body: the motion is not on the 22 nodes; use Body.from_motion")
         axes = np.ascontiguousarray(self.semi_axes, dtype=np.float64)
         if axes.shape != (len(PART_NAMES), 3):
-            raise InputError(f"Body: semi_axes have shape {axes.shape}; semi_axes must be ({len(PART_NAMES)}, 3)")
+            raise InputError(
+                f"Body: semi_axes have shape {axes.shape}; semi_axes must be ({len(PART_NAMES)}, 3)"
+            )
         good = (np.isfinite(axes) & (axes > 0)).all(axis=1)
         if not good.all():
             part = int(np.argmin(good))
@@ -160,7 +162,14 @@ class Body:
         positions, quaternions = self.motion.at(times)
         shape = len(positions), len(self.semi_axes), 3
         centres, frames = np.empty(shape), np.empty((*shape, 3))
-        _stand(positions, quaternions, np.array(self.motion.parents), self._rest_frames, centres, frames)
+        _stand(
+            positions,
+            quaternions,
+            np.array(self.motion.parents),
+            self._rest_frames,
+            centres,
+            frames,
+        )
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
@@ -190,7 +199,7 @@ class Body:
 
 
 @compiled(fastmath={"contract"})
-def _stand(positions, quaternions, parents, rest, centres, frames):  # type: ignore[no-untyped-def]
+def _stand(positions, quaternions, parents, rest, centres, frames):
     """Fill ``centres (time, part, 3)`` and ``frames (time, part, 3, 3)`` from joints (time, joint, 3).
 
     Frames are rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last. The first joint is the root, which has

@@ -37,7 +37,9 @@ class Ellipsoids:
     semi_axes: NDArray[np.float64]
 
     def __init__(self, centres: ArrayLike, frames: ArrayLike, semi_axes: ArrayLike) -> None:
-        centre_array, frame_array, axis_array = (np.asarray(value, dtype=np.float64) for value in (centres, frames, semi_axes))
+        centre_array, frame_array, axis_array = (
+            np.asarray(value, dtype=np.float64) for value in (centres, frames, semi_axes)
+        )
         parts = centre_array.shape[:1]
         for name, array, shape in (
             ("centres", centre_array, (*parts, 3)),
@@ -49,13 +51,19 @@ class Ellipsoids:
                     f"Ellipsoids.{name} has shape {array.shape}; it must be {('part', *shape[1:])}, alike and at least 1 in part"
                 )
             if not np.isfinite(array).all():
-                raise InputError(f"Ellipsoids.{name} holds NaN or infinity; every value must be finite")
+                raise InputError(
+                    f"Ellipsoids.{name} holds NaN or infinity; every value must be finite"
+                )
             object.__setattr__(self, name, array)
         if not (axis_array > 0).all():
-            raise InputError(f"Ellipsoids.semi_axes: the least is {axis_array.min()} m; every semi-axis must be positive")
+            raise InputError(
+                f"Ellipsoids.semi_axes: the least is {axis_array.min()} m; every semi-axis must be positive"
+            )
         error = np.abs(np.swapaxes(frame_array, 1, 2) @ frame_array - np.eye(3)).max(initial=0.0)
         if error > 1e-6 or (np.linalg.det(frame_array) < 0).any():
-            raise InputError("Ellipsoids.frames: not proper rotations; columns must be orthonormal and right-handed")
+            raise InputError(
+                "Ellipsoids.frames: not proper rotations; columns must be orthonormal and right-handed"
+            )
 
     def without_repeats(self) -> Ellipsoids:
         """The parts but those that fill the same place as one before them.
@@ -70,10 +78,16 @@ class Ellipsoids:
         stretch = self.frames * self.semi_axes[:, None]
         shape = stretch @ np.swapaxes(stretch, 1, 2)
         kept: list[int] = []
-        for part, (centre, own, least) in enumerate(zip(self.centres, shape, self.semi_axes.min(axis=1), strict=True)):
+        for part, (centre, own, least) in enumerate(
+            zip(self.centres, shape, self.semi_axes.min(axis=1), strict=True)
+        ):
             away = np.linalg.norm(self.centres[kept] - centre, axis=-1)
             # S differs by 2 a da where a semi-axis a differs by da.
             differs = np.abs(shape[kept] - own).max(axis=(1, 2), initial=0.0)
             if not ((away <= _SAME * least) & (differs <= 2 * _SAME * least**2)).any():
                 kept.append(part)
-        return self if len(kept) == len(self.centres) else Ellipsoids(self.centres[kept], self.frames[kept], self.semi_axes[kept])
+        return (
+            self
+            if len(kept) == len(self.centres)
+            else Ellipsoids(self.centres[kept], self.frames[kept], self.semi_axes[kept])
+        )

@@ -38,11 +38,16 @@ def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int6
         Where ``subdivisions`` is out of range.
     """
     if not 0 <= subdivisions <= MAXIMUM_SUBDIVISIONS:
-        raise InputError(f"unit_sphere: subdivisions = {subdivisions}; allowed are 0 to {MAXIMUM_SUBDIVISIONS}")
+        raise InputError(
+            f"unit_sphere: subdivisions = {subdivisions}; allowed are 0 to {MAXIMUM_SUBDIVISIONS}"
+        )
     import trimesh  # slow to import
 
     sphere = trimesh.creation.icosphere(subdivisions=subdivisions, radius=1.0)
-    vertices, faces = np.array(sphere.vertices, dtype=np.float64), np.array(sphere.faces, dtype=np.int64)
+    vertices, faces = (
+        np.array(sphere.vertices, dtype=np.float64),
+        np.array(sphere.faces, dtype=np.int64),
+    )
     vertices /= np.linalg.norm(vertices, axis=1, keepdims=True)
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
@@ -54,7 +59,9 @@ def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int6
     return vertices, faces
 
 
-def ellipsoid_meshes(ellipsoids: Ellipsoids, subdivisions: int = 3) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def ellipsoid_meshes(
+    ellipsoids: Ellipsoids, subdivisions: int = 3
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """One closed mesh a part, all with the same faces.
 
     Parameters

@@ -47,7 +47,9 @@ class Store:
     def look(cls, found: Sequence[Recipe], folder: Path) -> Store:
         """Read every sample that is there."""
         missing, damaged = [], 0
-        for recipe in tqdm(found, desc="looking for samples", unit="sample", disable=None, leave=False):
+        for recipe in tqdm(
+            found, desc="looking for samples", unit="sample", disable=None, leave=False
+        ):
             path = sample_path(folder, recipe.identity)
             if not is_whole(path):
                 missing.append(recipe)
@@ -56,7 +58,12 @@ class Store:
 
 
 def build_dataset(
-    spec: Path, out: Path, *, plan_only: bool = False, workers: int | None = None, scheduler: str | None = None
+    spec: Path,
+    out: Path,
+    *,
+    plan_only: bool = False,
+    workers: int | None = None,
+    scheduler: str | None = None,
 ) -> dict[str, Any]:
     """Make the samples of a data set that are missing or damaged.
 
@@ -92,7 +99,9 @@ def build_dataset(
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot make folder '{out}': {error.strerror}; give another one (--out)") from None
+        raise InputError(
+            f"cannot make folder '{out}': {error.strerror}; give another one (--out)"
+        ) from None
     with alone_in(folder):
         sweep(folder)
         store = Store.look(found, folder)
@@ -112,7 +121,9 @@ def build_dataset(
             try:
                 with leftovers, dask_client(workers, scheduler) as client:
                     count = len(client.scheduler_info(n_workers=-1)["workers"])
-                    chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
+                    chosen = (
+                        _first_of_each_kind(store.missing, count) if plan_only else store.missing
+                    )
                     done = work(client, chosen, folder, made=make)
             except BaseException:
                 if scheduler is None:

@@ -51,19 +51,27 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
             "install the extra 'campaign' of rtradar, in a checkout: pip install -e '.[campaign]'"
         ) from None
     # What goes wrong is said in one line, and once. Loggers of Dask and of what it talks through have levels of their own.
-    for name in [name for name in logging.root.manager.loggerDict if name.split(".")[0] in ("asyncio", "distributed", "tornado")]:
+    for name in [
+        name
+        for name in logging.root.manager.loggerDict
+        if name.split(".")[0] in ("asyncio", "distributed", "tornado")
+    ]:
         logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
         except (OSError, ValueError, TypeError) as error:
             why = str(error).splitlines()[0] if str(error) else type(error).__name__
-            raise InputError(f"--scheduler {scheduler}: nothing answers there ({why}); start one: dask scheduler") from None
+            raise InputError(
+                f"--scheduler {scheduler}: nothing answers there ({why}); start one: dask scheduler"
+            ) from None
         with client:
             try:
                 client.wait_for_workers(1, timeout=_PATIENCE_S)
             except TimeoutError:
-                raise InputError(f"--scheduler {scheduler} has no workers; start some: dask worker {scheduler}") from None
+                raise InputError(
+                    f"--scheduler {scheduler} has no workers; start some: dask worker {scheduler}"
+                ) from None
             yield client
         return
     check_cache()
@@ -134,7 +142,9 @@ def _can_be_written(folder: str) -> bool:
 @contextmanager
 def _silent_tracker() -> Iterator[None]:
     """Have semaphores that a killed build leaves taken away without a word: Python's process for that starts with this."""
-    os.environ["PYTHONWARNINGS"] = ",".join(filter(None, (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker")))
+    os.environ["PYTHONWARNINGS"] = ",".join(
+        filter(None, (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"))
+    )
     yield
 
 

@@ -58,19 +58,40 @@ def recipes(spec: Spec) -> list[Recipe]:
     """
     intervals = [*(interval for actor in spec.actors for interval in _takes(spec, actor))]
     # Reading takes a second for a long recording.
-    for recorded in tqdm(spec.recordings, desc="reading recordings", unit="file", disable=None if spec.recordings else True):
+    for recorded in tqdm(
+        spec.recordings,
+        desc="reading recordings",
+        unit="file",
+        disable=None if spec.recordings else True,
+    ):
         motion = load_motion(recorded.path, skeleton=recorded.skeleton)
-        check_samples(len(intervals) + recorded.windows.count(motion.duration_s), len(spec.settings))
+        check_samples(
+            len(intervals) + recorded.windows.count(motion.duration_s), len(spec.settings)
+        )
         intervals += _intervals(spec, recorded, motion)
     common = {"pfa": spec.pfa, "clutter_removal": spec.clutter_removal, "version": __version__}
     combinations = ((interval, setting) for interval in intervals for setting in spec.settings)
     total = len(intervals) * len(spec.settings)
-    bar = tqdm(combinations, desc="planning samples", unit="sample", total=total, disable=None, leave=False, delay=_PATIENCE_S)
+    bar = tqdm(
+        combinations,
+        desc="planning samples",
+        unit="sample",
+        total=total,
+        disable=None,
+        leave=False,
+        delay=_PATIENCE_S,
+    )
     found = [_recipe(interval, setting, common) for interval, setting in bar]
-    twice = [identity for identity, count in Counter(recipe.identity for recipe in found).items() if count > 1]
+    twice = [
+        identity
+        for identity, count in Counter(recipe.identity for recipe in found).items()
+        if count > 1
+    ]
     if twice:
         told = next(recipe.parameters for recipe in found if recipe.identity == twice[0])
-        raise InputError(f"recording '{told['recording']}' from {told['start_s']:g} s stands there twice; leave one out")
+        raise InputError(
+            f"recording '{told['recording']}' from {told['start_s']:g} s stands there twice; leave one out"
+        )
     return sorted(found, key=lambda recipe: recipe.identity)
 
 
@@ -88,7 +109,10 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
     for take in actor.seeds:
         subject = actor.subjects[take % len(actor.subjects)]
         seed = _seed(spec.seed, actor.label, take)
-        drawn = {**_draw(spec, seed), **{key: _draw(spec, _seed("subject", subject))[key] for key in _BODY}}
+        drawn = {
+            **_draw(spec, seed),
+            **{key: _draw(spec, _seed("subject", subject))[key] for key in _BODY},
+        }
         name = f"synthetic:{actor.label}:{spec.seed}:{take}"
         motion: dict[str, Any] = {
             "recording": name,
@@ -104,7 +128,9 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
             "seed": seed,
         }
         for start_s, duration_s in spec.windows.of(name, take_s):
-            yield _Interval(actor.label, {**motion, "start_s": start_s, "duration_s": duration_s}, drawn, None)
+            yield _Interval(
+                actor.label, {**motion, "start_s": start_s, "duration_s": duration_s}, drawn, None
+            )
 
 
 def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Interval]:
@@ -126,7 +152,10 @@ def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Inte
 
 def _recipe(interval: _Interval, setting: Setting, common: Mapping[str, Any]) -> Recipe:
     drawn, scene = interval.drawn, setting.scene
-    place = scene.person_position_m[0] + drawn["offset_x_m"], scene.person_position_m[1] + drawn["offset_y_m"]
+    place = (
+        scene.person_position_m[0] + drawn["offset_x_m"],
+        scene.person_position_m[1] + drawn["offset_y_m"],
+    )
     scene = replace(scene, person_position_m=place)
     radar = setting.radar
     parameters = {
@@ -149,7 +178,9 @@ def _recipe(interval: _Interval, setting: Setting, common: Mapping[str, Any]) ->
 def _radar_parameters(radar: Radar) -> dict[str, Any]:
     told = asdict(radar)
     later = {field.name: field.default for field in fields(radar) if field.name in _LATER}
-    told = {name: value for name, value in told.items() if name not in later or value != later[name]}
+    told = {
+        name: value for name, value in told.items() if name not in later or value != later[name]
+    }
     return told | {"position_m": list(told["position_m"])}
 
 

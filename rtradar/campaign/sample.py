@@ -29,7 +29,9 @@ SPATIAL_POINTS = 3000
 """Most points kept of the spatial cloud, as many as the RDT cloud has; of more a uniform sample."""
 
 _ID_DIGITS = 20  # 80 bits: two of a million samples share an id once in 2e12 collections
-_SPATIAL_STREAM = 2  # apart from the random streams of noise and of the RDT cloud, which have the same seed
+_SPATIAL_STREAM = (
+    2  # apart from the random streams of noise and of the RDT cloud, which have the same seed
+)
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,12 @@ class Recipe:
             return self
         start_s = self.parameters["start_s"]
         # An interval to the end is rounded, and may be a little longer than what is there.
-        return replace(self, motion=cut(self.motion, start_s, min(self.interval_s, self.motion.duration_s - start_s)))
+        return replace(
+            self,
+            motion=cut(
+                self.motion, start_s, min(self.interval_s, self.motion.duration_s - start_s)
+            ),
+        )
 
 
 class Made(NamedTuple):
@@ -102,7 +109,9 @@ def make(recipe: Recipe) -> Made:
         # The actor moves from the beginning of the take, as long as the take is: a walk's way depends on it.
         keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
         actor = {key: told[key] for key in keys}
-        motion = synthetic_motion(recipe.label, seed=told["subject_seed"], duration_s=told["take_s"], **actor)
+        motion = synthetic_motion(
+            recipe.label, seed=told["subject_seed"], duration_s=told["take_s"], **actor
+        )
         start_s = told["start_s"]
     else:
         motion, start_s = recipe.motion, 0.0
@@ -125,7 +134,13 @@ def make(recipe: Recipe) -> Made:
         "detections": clouds.rdt.n_voxels,
         "rdt_triangles": clouds.rdt.n_triangles,
         "xyz_points_found": clouds.n_spatial,
-        "limits": sorted({str(warning.message) for warning in caught if issubclass(warning.category, ValidityWarning)}),
+        "limits": sorted(
+            {
+                str(warning.message)
+                for warning in caught
+                if issubclass(warning.category, ValidityWarning)
+            }
+        ),
     }
     places = clouds.spatial.points
     if len(places) > SPATIAL_POINTS:
@@ -141,7 +156,9 @@ def scene_digest(scene: Scene) -> str:
     def content(value: object) -> str:
         return digest([value]) if isinstance(value, Path) else str(value)
 
-    return hashlib.sha256(json.dumps(asdict(scene), sort_keys=True, default=content).encode()).hexdigest()[:_ID_DIGITS]
+    return hashlib.sha256(
+        json.dumps(asdict(scene), sort_keys=True, default=content).encode()
+    ).hexdigest()[:_ID_DIGITS]
 
 
 def digest(paths: list[Path]) -> str:

@@ -23,7 +23,17 @@ from rtradar.system.checks import check_number, check_text, check_vector, inside
 from rtradar.system.seeds import check_seed
 from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
-_TOP = ("seed", "pfa", "clutter_removal", "folder", "windows", "each", "drawn", "synthetic", "recordings")
+_TOP = (
+    "seed",
+    "pfa",
+    "clutter_removal",
+    "folder",
+    "windows",
+    "each",
+    "drawn",
+    "synthetic",
+    "recordings",
+)
 _EACH: Mapping[str, list[Any]] = {
     "radar": ["paper-12ghz"],
     "scene": ["free-space"],
@@ -71,25 +81,37 @@ def _spec(table: Table, folder: Path) -> Spec:
     windows = Windows.read("[windows]", windows_table)
     actors = _actors(table)
     beside = _folder(table, folder)
-    recordings = tuple(_recorded(where, piece, windows_table, beside) for where, piece in tables_at("recordings", table))
+    recordings = tuple(
+        _recorded(where, piece, windows_table, beside)
+        for where, piece in tables_at("recordings", table)
+    )
     if not actors and not recordings:
         raise InputError("there is neither [[synthetic]] nor [[recordings]]; give one of them")
     if actors and windows.needed_s is None:
-        raise InputError("[windows] duration_s is missing; synthetic actors have no end of their own")
+        raise InputError(
+            "[windows] duration_s is missing; synthetic actors have no end of their own"
+        )
     lists = {key: _several(each, key, usual) for key, usual in _EACH.items()}
     takes = sum(len(actor.seeds) for actor in actors)
-    intervals = takes * windows.count(windows.needed_s) + sum(recorded.windows.count() for recorded in recordings)
+    intervals = takes * windows.count(windows.needed_s) + sum(
+        recorded.windows.count() for recorded in recordings
+    )
     check_samples(intervals, math.prod(map(len, lists.values())))  # before combinations are made
     removal = table.get("clutter_removal", "none")
     if removal not in CLUTTER_REMOVALS:
-        raise InputError(f"clutter_removal = {shown(removal)}; allowed: {', '.join(CLUTTER_REMOVALS)}")
+        raise InputError(
+            f"clutter_removal = {shown(removal)}; allowed: {', '.join(CLUTTER_REMOVALS)}"
+        )
     return Spec(
         seed=check_seed("", table.get("seed", 0)),
         pfa=check_number("data set", "pfa", table.get("pfa", 1e-6), 1e-15, 0.5),
         clutter_removal=removal,
         windows=windows,
         settings=_settings(lists, folder),
-        drawn={key: _range(key, drawn_table.get(key, usual), least, most) for key, (usual, least, most) in DRAWN.items()},
+        drawn={
+            key: _range(key, drawn_table.get(key, usual), least, most)
+            for key, (usual, least, most) in DRAWN.items()
+        },
         actors=actors,
         recordings=recordings,
     )
@@ -101,7 +123,9 @@ def _folder(table: Table, beside: Path) -> Path:
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
-            raise InputError(f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings")
+            raise InputError(
+                f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings"
+            )
         allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
     there = inside(allowed, below)
     if there is None:
@@ -120,13 +144,21 @@ def _settings(each: Mapping[str, list[Any]], folder: Path) -> tuple[Setting, ...
     models = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
     for model in models:
         if model not in MODELS:
-            raise InputError(f"[each] fidelity = {shown(model)} is unknown; allowed: {', '.join(MODELS)}")
+            raise InputError(
+                f"[each] fidelity = {shown(model)} is unknown; allowed: {', '.join(MODELS)}"
+            )
     numbers: dict[str, list[float | None]] = {}
     for key in ("heading_deg", "snr_db"):
         _, least, most = DRAWN[key]
-        numbers[key] = [None if value is None else check_number("[each]", key, value, least, most) for value in each[key]]
+        numbers[key] = [
+            None if value is None else check_number("[each]", key, value, least, most)
+            for value in each[key]
+        ]
     people, radar_places = (
-        [None if value is None else check_vector("[each]", key, value, size, 100.0) for value in each[key]]
+        [
+            None if value is None else check_vector("[each]", key, value, size, 100.0)
+            for value in each[key]
+        ]
         for key, size in (("person_position_m", 2), ("radar_position_m", 3))
     )
     placed = [
@@ -137,7 +169,9 @@ def _settings(each: Mapping[str, list[Any]], folder: Path) -> tuple[Setting, ...
         )
         for scene, person, place in itertools.product(scenes, people, radar_places)
     ]
-    combinations = itertools.product(radars, placed, models, numbers["heading_deg"], numbers["snr_db"])
+    combinations = itertools.product(
+        radars, placed, models, numbers["heading_deg"], numbers["snr_db"]
+    )
     return tuple(Setting(*combination) for combination in combinations)
 
 
@@ -145,7 +179,10 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
     values = each.get(key, usual)
     if not isinstance(values, list) or not values:
         raise InputError(f"[each] {key} = {shown(values)}; it must be a list, not empty")
-    different = {tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value) for value in values}
+    different = {
+        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
+        for value in values
+    }
     if len(different) < len(values):
         raise InputError(f"[each] {key} = {shown(values)}; a value stands there twice")
     return values
@@ -159,7 +196,9 @@ def _comparable(value: object) -> object:
 def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     source = check_text("[each]", key, value)
     if source.endswith(".toml") and inside(folder, source) is None:
-        raise InputError(f"[each] {key} = {shown(source)} leaves the folder of the file; put it beside it or below")
+        raise InputError(
+            f"[each] {key} = {shown(source)} leaves the folder of the file; put it beside it or below"
+        )
     try:
         return load(folder / source if source.endswith(".toml") else source)
     except InputError as error:
@@ -171,7 +210,9 @@ def _actors(table: Table) -> tuple[Actor, ...]:
     for where, piece in tables_at("synthetic", table):
         actor = _actor(where, piece)
         if actor.label in found:
-            raise InputError(f"[[synthetic]] label = '{actor.label}' stands there twice; give its takes together")
+            raise InputError(
+                f"[[synthetic]] label = '{actor.label}' stands there twice; give its takes together"
+            )
         found[actor.label] = actor
     return tuple(found.values())
 
@@ -180,7 +221,9 @@ def _actor(where: str, table: Table) -> Actor:
     check_keys(where, table, *_SYNTHETIC)
     label = check_text(where.strip(), "label", table["label"])
     if label not in ACTIVITIES:
-        raise InputError(f"{where}label = {shown(label)} is unknown; allowed: {', '.join(ACTIVITIES)}")
+        raise InputError(
+            f"{where}label = {shown(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+        )
     if ("count" in table) == ("seeds" in table):
         raise InputError(f"{where}: give count or seeds, one of them")
     seeds = _numbers(where, "seeds" if "seeds" in table else "count", table)
@@ -193,7 +236,9 @@ def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
     if isinstance(value, list) and value and len(set(map(str, value))) == len(value):
         return tuple(_whole(where, key, number) for number in value)
     if isinstance(value, list):
-        raise InputError(f"{where}{key} = {shown(value)}; it must be a list of different whole numbers, not empty")
+        raise InputError(
+            f"{where}{key} = {shown(value)}; it must be a list of different whole numbers, not empty"
+        )
     count = _whole(where, key, value)
     if count == 0:
         raise InputError(f"{where}{key} = 0; it must be at least 1")
@@ -202,11 +247,18 @@ def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
 
 def _recorded(where: str, table: Table, windows: Table, folder: Path) -> Recorded:
     check_keys(where, table, *_RECORDING)
-    texts = {key: check_text(where.strip(), key, table[key]) for key in ("file", "label", "subject", "licence")}
-    skeleton = check_text(where.strip(), "skeleton", table["skeleton"]) if "skeleton" in table else None
+    texts = {
+        key: check_text(where.strip(), key, table[key])
+        for key in ("file", "label", "subject", "licence")
+    }
+    skeleton = (
+        check_text(where.strip(), "skeleton", table["skeleton"]) if "skeleton" in table else None
+    )
     for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
         if name is not None and inside(folder, name) is None:
-            raise InputError(f"{where}{key} = {shown(name)} leaves the folder of recordings; name files in it or below")
+            raise InputError(
+                f"{where}{key} = {shown(name)} leaves the folder of recordings; name files in it or below"
+            )
         if name is not None and not (folder / name).is_file():
             raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")
     own = {key: value for key, value in table.items() if key in WINDOW_KEYS}
@@ -232,5 +284,7 @@ def _range(key: str, value: object, least: float, most: float) -> tuple[float, f
 
 def _whole(where: str, key: str, value: object) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _MOST:
-        raise InputError(f"{where}{key} = {shown(value)}; it must be a whole number from 0 to {_MOST}")
+        raise InputError(
+            f"{where}{key} = {shown(value)}; it must be a whole number from 0 to {_MOST}"
+        )
     return value

@@ -46,11 +46,22 @@ class Windows:
             Where a value has no meaning, or they contradict each other.
         """
         least = {"start_s": 0.0, "duration_s": 1e-3, "hop_s": 1e-3, "end_s": 1e-3}
-        windows = cls(**{key: check_number(where, key, table[key], least[key], 1e5) for key in WINDOW_KEYS if key in table})
+        windows = cls(
+            **{
+                key: check_number(where, key, table[key], least[key], 1e5)
+                for key in WINDOW_KEYS
+                if key in table
+            }
+        )
         if windows.hop_s is not None and windows.duration_s is None:
             raise InputError(f"{where}: hop_s needs duration_s; give both")
-        if windows.end_s is not None and windows.end_s < windows.start_s + (windows.duration_s or 1e-3) - _SLACK_S:
-            raise InputError(f"{where}: end_s = {windows.end_s:g} leaves no room for one interval from {windows.start_s:g} s on")
+        if (
+            windows.end_s is not None
+            and windows.end_s < windows.start_s + (windows.duration_s or 1e-3) - _SLACK_S
+        ):
+            raise InputError(
+                f"{where}: end_s = {windows.end_s:g} leaves no room for one interval from {windows.start_s:g} s on"
+            )
         return windows
 
     @property
@@ -84,5 +95,7 @@ class Windows:
             )
         if self.duration_s is None:
             return [(self.start_s, round(end - self.start_s, 6))]
-        starts = (self.start_s + number * (self.hop_s or 0.0) for number in range(self.count(length_s)))
+        starts = (
+            self.start_s + number * (self.hop_s or 0.0) for number in range(self.count(length_s))
+        )
         return [(round(start, 6), self.duration_s) for start in starts]

@@ -36,7 +36,9 @@ class Outcome(NamedTuple):
     trouble: str = ""
 
 
-def work(client: Client, missing: Sequence[Recipe], folder: Path, made: Callable[[Recipe], Made]) -> list[Outcome]:
+def work(
+    client: Client, missing: Sequence[Recipe], folder: Path, made: Callable[[Recipe], Made]
+) -> list[Outcome]:
     """Make and store samples on a cluster, in whatever order.
 
     Raises
@@ -86,14 +88,21 @@ def make_and_store(recipe: Recipe, folder: str, made: Callable[[Recipe], Made]) 
     """Make one sample where this runs, and store it: what a worker does."""
     told = recipe.parameters.get("version")
     if told != __version__:
-        return Outcome(recipe.identity, 0.0, 0, f"this worker has rtradar {__version__}, not {told}: install the same everywhere")
+        return Outcome(
+            recipe.identity,
+            0.0,
+            0,
+            f"this worker has rtradar {__version__}, not {told}: install the same everywhere",
+        )
     # Two at a time in one process would share Mitsuba, and what it says of the other's warnings.
     with _one_at_a_time:
         try:
             sample, spatial, work_s = made(recipe)
         except (InputError, OSError) as error:  # such as a mesh file that this machine has not
             return Outcome(recipe.identity, 0.0, 0, str(error))
-    return Outcome(recipe.identity, work_s, write_sample(Path(folder), recipe.identity, sample, spatial))
+    return Outcome(
+        recipe.identity, work_s, write_sample(Path(folder), recipe.identity, sample, spatial)
+    )
 
 
 def _kept(done: Sequence[Outcome], missing: Sequence[Recipe]) -> str:

@@ -11,7 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 from rtradar.errors import InputError
 
-if missing := [name for package, name in (("torch", "torch"), ("sklearn", "scikit-learn")) if find_spec(package) is None]:
+if missing := [
+    name
+    for package, name in (("torch", "torch"), ("sklearn", "scikit-learn"))
+    if find_spec(package) is None
+]:
     raise InputError(
         f"the classifier needs {' and '.join(missing)}; "
         "install the extra 'learn' of rtradar, in a checkout: pip install -e '.[learn]'"

@@ -31,7 +31,9 @@ def _forest(seed: int) -> BaseEstimator:
     return RandomForestClassifier(n_estimators=300, random_state=word(seed))
 
 
-BASELINES: dict[str, tuple[Callable[[Clouds], NDArray[np.float64]], Callable[[int], BaseEstimator]]] = {
+BASELINES: dict[
+    str, tuple[Callable[[Clouds], NDArray[np.float64]], Callable[[int], BaseEstimator]]
+] = {
     "nearest centroid, RDT cloud": (rdt_features, _centroid),
     "random forest, RDT cloud": (rdt_features, _forest),
     "nearest centroid, spatial cloud": (spatial_features, _centroid),
@@ -62,7 +64,9 @@ def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
     """
     plan = study.plan
     if not learnt_from(plan, clouds):
-        raise InputError(f"the clouds are not those that '{study.folder}' learnt from; name their folder (--data)")
+        raise InputError(
+            f"the clouds are not those that '{study.folder}' learnt from; name their folder (--data)"
+        )
     trained = {outcome.name for outcome in study.outcomes}
     splits = make_splits(clouds, plan["split"], folds=plan["folds"], seed=plan["seed"])
     splits = [split for split in splits if split.name in trained]
@@ -81,7 +85,11 @@ def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
                 model = make(plan["seed"])
                 with warnings.catch_warnings():
                     # The nearest centroid asks for the spread in a class only where it shrinks, which it does not here.
-                    warnings.filterwarnings("ignore", message=".*within_class_std_dev_", category=UserWarning)
-                    predicted = model.fit(features[split.train], truth[split.train]).predict(features[split.test])
+                    warnings.filterwarnings(
+                        "ignore", message=".*within_class_std_dev_", category=UserWarning
+                    )
+                    predicted = model.fit(features[split.train], truth[split.train]).predict(
+                        features[split.test]
+                    )
                 found[name].append(outcome_of(clouds, split, values, truth, predicted))
     return found

@@ -60,7 +60,9 @@ def load_checkpoint(path: Path) -> Checkpoint:
     try:
         with open_regular(path) as file:
             if os.fstat(file.fileno()).st_size > _MOST_BYTES:
-                raise InputError(f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}")
+                raise InputError(
+                    f"'{path}' is larger than the {_MOST_BYTES / 1e6:.0f} MB that are allowed; {cure}"
+                )
             _check_archive(file)
             file.seek(0)
             content = torch.load(file, map_location="cpu", weights_only=True)
@@ -69,11 +71,21 @@ def load_checkpoint(path: Path) -> Checkpoint:
     except OSError as error:
         raise InputError(f"cannot read '{path}': {error.strerror}; {cure}") from None
     except Exception as error:  # torch raises whatever its archive reader and unpickler do
-        why = str(error).strip().splitlines()[0][:80] if str(error).strip() else type(error).__name__
-        raise InputError(f"'{path}' is no checkpoint that can be read safely, or is damaged ({why}); {cure}") from None
+        why = (
+            str(error).strip().splitlines()[0][:80] if str(error).strip() else type(error).__name__
+        )
+        raise InputError(
+            f"'{path}' is no checkpoint that can be read safely, or is damaged ({why}); {cure}"
+        ) from None
     kinds = dict, dict, int, list
-    if not isinstance(content, dict) or set(content) != set(_KEYS) or not all(map(isinstance, map(content.get, _KEYS), kinds)):
-        raise InputError(f"'{path}' is no checkpoint of rtradar: it must hold {', '.join(_KEYS)}; {cure}")
+    if (
+        not isinstance(content, dict)
+        or set(content) != set(_KEYS)
+        or not all(map(isinstance, map(content.get, _KEYS), kinds))
+    ):
+        raise InputError(
+            f"'{path}' is no checkpoint of rtradar: it must hold {', '.join(_KEYS)}; {cure}"
+        )
     return Checkpoint(**content)
 
 

@@ -62,7 +62,9 @@ def _metadata(clouds: Clouds, name: str) -> list[NDArray[np.float64]]:
     except (KeyError, InputError):
         return []
     try:
-        numbers = np.array([np.nan if value is None else value for value in column], dtype=np.float64)
+        numbers = np.array(
+            [np.nan if value is None else value for value in column], dtype=np.float64
+        )
     except (TypeError, ValueError):  # names, or lists of several lengths
         names = np.array([str(value) for value in column])
         return [(names == value).astype(np.float64) for value in np.unique(names)]
@@ -80,7 +82,11 @@ def _rdt(points: NDArray[np.float64]) -> NDArray[np.float64]:
     edges = np.linspace(time.min(), time.max(), _TIME_BINS + 1)
     place = np.clip(np.searchsorted(edges, time, side="right") - 1, 0, _TIME_BINS - 1)
     in_bins = [velocity[place == number] for number in range(_TIME_BINS)]
-    moments = [value for some in in_bins for value in ((some.mean(), some.std()) if len(some) else (0.0, 0.0))]
+    moments = [
+        value
+        for some in in_bins
+        for value in ((some.mean(), some.std()) if len(some) else (0.0, 0.0))
+    ]
     return np.concatenate([_shape(centred), [np.mean(np.abs(velocity) < 0.5)], moments])
 
 
@@ -89,7 +95,9 @@ def _spatial(points: NDArray[np.float64]) -> NDArray[np.float64]:
     points = np.where(np.isnan(points), 0.0, points)
     if not number:
         points = np.zeros((1, 3))
-    return np.append(_shape(points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]), np.log(number + 1))
+    return np.append(
+        _shape(points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]), np.log(number + 1)
+    )
 
 
 def _shape(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -98,5 +106,11 @@ def _shape(points: NDArray[np.float64]) -> NDArray[np.float64]:
     unit = (points - points.mean(axis=0)) / safe
     pairs: Sequence[tuple[int, int]] = ((0, 1), (0, 2), (1, 2))
     correlations = [float(np.mean(unit[:, one] * unit[:, other])) for one, other in pairs]
-    values = [spread, points.min(axis=0), points.max(axis=0), *np.percentile(points, _PERCENTILES, axis=0), correlations]
+    values = [
+        spread,
+        points.min(axis=0),
+        points.max(axis=0),
+        *np.percentile(points, _PERCENTILES, axis=0),
+        correlations,
+    ]
     return np.concatenate(values)

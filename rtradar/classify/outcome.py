@@ -64,7 +64,10 @@ class Outcome:
     def as_dict(self) -> dict[str, Any]:
         """Plain values by the names of the fields."""
         fields = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        return {name: value.tolist() if isinstance(value, np.ndarray) else value for name, value in fields.items()}
+        return {
+            name: value.tolist() if isinstance(value, np.ndarray) else value
+            for name, value in fields.items()
+        }
 
 
 def outcome_of(
@@ -78,7 +81,16 @@ def outcome_of(
     """Answers ``predicted (test,)`` to a split; ``truth (cloud,)``, ``values (cloud,)`` as of `values_of`."""
     test = split.test
     recordings = clouds.column("recording")[test].astype(str)
-    return Outcome(split.name, split.trained_on, test, truth[test], predicted, values[test], recordings, list(history))
+    return Outcome(
+        split.name,
+        split.trained_on,
+        test,
+        truth[test],
+        predicted,
+        values[test],
+        recordings,
+        list(history),
+    )
 
 
 def save_outcome(path: Path, outcome: Outcome) -> None:
@@ -91,7 +103,13 @@ def load_outcome(path: Path) -> Outcome:
     """Read it; InputError where that is not possible."""
     try:
         content = read_json(path)
-        kinds = {"indices": np.int64, "truth": np.int64, "predicted": np.int64, "tested_on": np.str_, "recordings": np.str_}
+        kinds = {
+            "indices": np.int64,
+            "truth": np.int64,
+            "predicted": np.int64,
+            "tested_on": np.str_,
+            "recordings": np.str_,
+        }
         for name, kind in kinds.items():
             content[name] = _column(content[name], kind)
         outcome = Outcome(**content)
@@ -99,12 +117,16 @@ def load_outcome(path: Path) -> Outcome:
             raise ValueError
         return outcome
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
-        raise InputError(f"'{path}' is damaged; remove it and train again: what is done is kept in its checkpoint") from None
+        raise InputError(
+            f"'{path}' is damaged; remove it and train again: what is done is kept in its checkpoint"
+        ) from None
 
 
 def _column(values: Any, kind: Any) -> NDArray[Any]:
     """One value a cloud; TypeError or ValueError where they are of another kind, or a name so long that it is none."""
-    if not isinstance(values, list) or not all(type(one) is (str if kind is np.str_ else int) for one in values):
+    if not isinstance(values, list) or not all(
+        type(one) is (str if kind is np.str_ else int) for one in values
+    ):
         raise TypeError
     # NumPy takes as much memory for each name as for the longest.
     if kind is np.str_ and len(values) * max(map(len, values), default=0) > _MOST_CHARACTERS:
@@ -119,7 +141,10 @@ def _is_number(value: Any) -> bool:
 
 def _is_whole(outcome: Outcome) -> bool:
     """Whether everything is there and of its kind."""
-    columns = [getattr(outcome, name) for name in ("indices", "truth", "predicted", "tested_on", "recordings")]
+    columns = [
+        getattr(outcome, name)
+        for name in ("indices", "truth", "predicted", "tested_on", "recordings")
+    ]
     return (
         isinstance(outcome.name, str)
         and isinstance(outcome.trained_on, str)

@@ -12,7 +12,17 @@ from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json
 
 PLAN = "plan.json"
-_PLAN_KEYS = ("data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings")
+_PLAN_KEYS = (
+    "data",
+    "clouds",
+    "fingerprint",
+    "classes",
+    "recipe",
+    "split",
+    "folds",
+    "seed",
+    "trainings",
+)
 _MOST_NAMES = 10_000  # of classes, and of trainings
 
 
@@ -22,19 +32,26 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
     try:
         if not os.path.lexists(path):
             if found := sorted(out.glob("training-*")):
-                raise InputError(f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; give another folder (--out)")
+                raise InputError(
+                    f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; give another folder (--out)"
+                )
             return
     except OSError as error:  # such as a name that is too long
         raise _unwritable(out, error) from None
     try:
         there = read_json(path)
         free = {"data"} | ({"made"} - there.keys())
-        other = next((name for name, value in plan.items() if name not in free and there.get(name) != value), None)
+        other = next(
+            (name for name, value in plan.items() if name not in free and there.get(name) != value),
+            None,
+        )
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
     if other is not None:
         was, now = _difference(there.get(other), plan[other])
-        raise InputError(f"'{out}' holds other trainings ({other}: {was}, not {now}); give another folder (--out)")
+        raise InputError(
+            f"'{out}' holds other trainings ({other}: {was}, not {now}); give another folder (--out)"
+        )
 
 
 def write_plan(out: Path, plan: dict[str, Any]) -> None:
@@ -61,13 +78,17 @@ def read_plan(folder: Path) -> dict[str, Any]:
                 raise ValueError
         return {name: plan[name] for name in _PLAN_KEYS} | {"made": plan.get("made")}
     except OSError as error:
-        raise InputError(f"'{folder}' holds no trainings ({PLAN}: {error.strerror}); make them with: rtradar train") from None
+        raise InputError(
+            f"'{folder}' holds no trainings ({PLAN}: {error.strerror}); make them with: rtradar train"
+        ) from None
     except (ValueError, KeyError, TypeError):
         raise InputError(f"'{folder / PLAN}' is damaged; train into another folder") from None
 
 
 def _unwritable(out: Path, error: OSError) -> InputError:
-    return InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)")
+    return InputError(
+        f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+    )
 
 
 def _difference(was: Any, now: Any) -> tuple[Any, Any]:

@@ -136,7 +136,11 @@ class TransformNet(nn.Module):
     def __init__(self, size: int, search: torch.dtype) -> None:
         super().__init__()
         self._size = size
-        self.points = nn.Sequential(PointwiseLayer(size, 64), PointwiseLayer(64, 128), PooledLayer(128, _GLOBAL_FEATURES, search))
+        self.points = nn.Sequential(
+            PointwiseLayer(size, 64),
+            PointwiseLayer(64, 128),
+            PooledLayer(128, _GLOBAL_FEATURES, search),
+        )
         self.cloud = nn.Sequential(_dense(_GLOBAL_FEATURES, 512), _dense(512, 256))
         self.matrix = nn.Linear(256, size * size)
         nn.init.zeros_(self.matrix.weight)
@@ -166,9 +170,16 @@ class PointNet(nn.Module):
         self.input_transform = TransformNet(3, search) if recipe.input_transform else None
         self.feature_transform = TransformNet(64, search) if recipe.feature_transform else None
         self.low = nn.Sequential(PointwiseLayer(3, 64), PointwiseLayer(64, 64))
-        self.high = nn.Sequential(PointwiseLayer(64, 64), PointwiseLayer(64, 128), PooledLayer(128, _GLOBAL_FEATURES, search))
+        self.high = nn.Sequential(
+            PointwiseLayer(64, 64),
+            PointwiseLayer(64, 128),
+            PooledLayer(128, _GLOBAL_FEATURES, search),
+        )
         self.classifier = nn.Sequential(
-            _dense(_GLOBAL_FEATURES, 512), _dense(512, 256), nn.Dropout(recipe.dropout), nn.Linear(256, n_classes)
+            _dense(_GLOBAL_FEATURES, 512),
+            _dense(512, 256),
+            nn.Dropout(recipe.dropout),
+            nn.Linear(256, n_classes),
         )
 
     def forward(self, points: Tensor) -> tuple[Tensor, Tensor]:

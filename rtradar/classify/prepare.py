@@ -81,13 +81,17 @@ def stack_clouds(clouds: Clouds, *, seed: int = 0) -> Tensor:
     each = [np.asarray(clouds.points(index), dtype=np.float64) for index in range(len(clouds))]
     n_points = max((len(points) for points in each), default=0)
     if not n_points:
-        raise InputError(f"no points in {len(each)} clouds; build the data set anew, with a higher SNR")
+        raise InputError(
+            f"no points in {len(each)} clouds; build the data set anew, with a higher SNR"
+        )
     stacked = np.zeros((len(each), n_points, 3), dtype=np.float32)
     for index, points in enumerate(each):
         if len(points):
             random = np.random.default_rng(stream(seed, index))
             order = random.permutation(len(points))
-            filled = np.concatenate([order, random.integers(len(points), size=n_points - len(points))])
+            filled = np.concatenate(
+                [order, random.integers(len(points), size=n_points - len(points))]
+            )
             stacked[index] = (points - [points[:, 0].mean(), 0, 0])[filled]
     return torch.from_numpy(stacked)
 
@@ -116,7 +120,9 @@ def for_training(points: Tensor, augmentation: Augmentation, scaling: Scaling) -
         return _turned(scaled(points, scaling))
     if augmentation == "none":
         return scaled(points, scaling)
-    shift = torch.tensor([VARIATION.time_shift_s, VARIATION.range_shift_m, 0.0]) * _uniform(len(points), 3)
+    shift = torch.tensor([VARIATION.time_shift_s, VARIATION.range_shift_m, 0.0]) * _uniform(
+        len(points), 3
+    )
     # Shifts come after scaling has taken the middle out, or they would be taken out with it.
     return scaled(_stretched(points), scaling) + (shift / torch.tensor(PHYSICAL_SCALES))[:, None]
 
@@ -130,12 +136,20 @@ def _stretched(points: Tensor) -> Tensor:
     aspect = 1 - VARIATION.aspect * torch.rand(len(points))
     factor = torch.stack([1 / tempo, aspect, tempo * aspect], dim=1)[:, None]
     middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
-    return middle + (points - middle) * factor + torch.randn(points.shape) * torch.tensor(VARIATION.jitter)
+    return (
+        middle
+        + (points - middle) * factor
+        + torch.randn(points.shape) * torch.tensor(VARIATION.jitter)
+    )
 
 
 def _turned(points: Tensor) -> Tensor:
     angle = math.pi * _uniform(len(points))
     cosine, sine = angle.cos()[:, None], angle.sin()[:, None]
     time, distance, velocity = points.unbind(dim=2)
-    turned = torch.stack([cosine * time + sine * velocity, distance, cosine * velocity - sine * time], dim=2)
-    return turned + (_TURNED_JITTER * torch.randn(points.shape)).clamp(-_TURNED_JITTER_LIMIT, _TURNED_JITTER_LIMIT)
+    turned = torch.stack(
+        [cosine * time + sine * velocity, distance, cosine * velocity - sine * time], dim=2
+    )
+    return turned + (_TURNED_JITTER * torch.randn(points.shape)).clamp(
+        -_TURNED_JITTER_LIMIT, _TURNED_JITTER_LIMIT
+    )

@@ -89,14 +89,22 @@ class Recipe:
         for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("halve_every", 1)):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise InputError(f"recipe: {field} = {value!r}; it must be a whole number, at least {least}")
+                raise InputError(
+                    f"recipe: {field} = {value!r}; it must be a whole number, at least {least}"
+                )
         if not (math.isfinite(self.rate) and self.rate > 0):
-            raise InputError(f"recipe: rate = {self.rate!r}; it must be a finite number above 0, such as 1e-4")
+            raise InputError(
+                f"recipe: rate = {self.rate!r}; it must be a finite number above 0, such as 1e-4"
+            )
         for field, value in (("stop_below", self.stop_below), ("weight_decay", self.weight_decay)):
             if not (math.isfinite(value) and value >= 0):
-                raise InputError(f"recipe: {field} = {value!r}; it must be a finite number, not negative")
+                raise InputError(
+                    f"recipe: {field} = {value!r}; it must be a finite number, not negative"
+                )
         if not 0 <= self.dropout < 1:
-            raise InputError(f"recipe: dropout = {self.dropout!r}; it must be at least 0 and below 1")
+            raise InputError(
+                f"recipe: dropout = {self.dropout!r}; it must be at least 0 and below 1"
+            )
         for field, allowed in (
             ("schedule", SCHEDULES),
             ("scaling", SCALINGS),
@@ -104,14 +112,19 @@ class Recipe:
             ("precision", PRECISIONS),
         ):
             if getattr(self, field) not in allowed:
-                raise InputError(f"recipe: {field} = {getattr(self, field)!r}; it must be one of {', '.join(allowed)}")
+                raise InputError(
+                    f"recipe: {field} = {getattr(self, field)!r}; it must be one of {', '.join(allowed)}"
+                )
 
     @property
     def epochs_run(self) -> int:
         """Epochs until the end: all of them, or those before the halved rate falls below ``stop_below``."""
         if self.schedule == "one-cycle":
             return self.epochs
-        return next((epoch for epoch in range(1, self.epochs) if self._halved(epoch) < self.stop_below), self.epochs)
+        return next(
+            (epoch for epoch in range(1, self.epochs) if self._halved(epoch) < self.stop_below),
+            self.epochs,
+        )
 
     def rate_at(self, epoch: int, progress: float) -> float:
         """Learning rate at a step: ``progress``, 0 to 1, is the share of the epoch's steps that are done.
@@ -131,7 +144,11 @@ class Recipe:
             return self._halved(epoch)
         done = (epoch + progress) / self.epochs
         warm = 0.1
-        return self.rate * (max(done, 1e-3) / warm if done < warm else (1 + math.cos(math.pi * (done - warm) / (1 - warm))) / 2)
+        return self.rate * (
+            max(done, 1e-3) / warm
+            if done < warm
+            else (1 + math.cos(math.pi * (done - warm) / (1 - warm))) / 2
+        )
 
     def _halved(self, epoch: int) -> float:
         return self.rate * 0.5 ** (epoch // self.halve_every)
@@ -148,7 +165,9 @@ class Recipe:
         -------
         Recipe
         """
-        return dataclasses.replace(self, **{name: value for name, value in fields.items() if value is not None})
+        return dataclasses.replace(
+            self, **{name: value for name, value in fields.items() if value is not None}
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """The fields by their names, plain values."""

@@ -56,12 +56,16 @@ def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
     """Independent recordings that the test clouds of each class come from, over all trainings."""
     found: list[set[str]] = [set() for _ in range(n_classes)]
     for outcome in outcomes:
-        for shown, recording in zip(outcome.truth.tolist(), outcome.recordings.tolist(), strict=True):
+        for shown, recording in zip(
+            outcome.truth.tolist(), outcome.recordings.tolist(), strict=True
+        ):
             found[shown].add(recording)
     return [len(names) for names in found]
 
 
-def transfer(outcomes: Sequence[Outcome]) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
+def transfer(
+    outcomes: Sequence[Outcome],
+) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
     """Learnt from one value of a column, asked about another.
 
     Parameters
@@ -76,7 +80,10 @@ def transfer(outcomes: Sequence[Outcome]) -> tuple[list[str], NDArray[np.float64
     mean, spread : (trained_on, tested_on) float64
         Accuracy over the folds and its standard deviation; NaN where there is none.
     """
-    values = sorted({outcome.trained_on for outcome in outcomes} | {str(value) for one in outcomes for value in one.tested_on})
+    values = sorted(
+        {outcome.trained_on for outcome in outcomes}
+        | {str(value) for one in outcomes for value in one.tested_on}
+    )
     mean, spread = np.full((2, len(values), len(values)), np.nan)
     for row, trained_on in enumerate(values):
         for column, tested_on in enumerate(values):
@@ -102,34 +109,57 @@ def accuracy_table(rows: Sequence[tuple[str, Sequence[float], str]]) -> str:
     """
     width = max(len("accuracy in %"), *(len(title) for title, _, _ in rows))
     columns = max((len(shares) for _, shares, _ in rows if len(shares) <= _MOST_COLUMNS), default=0)
-    head = f"{'accuracy in %':<{width}}  " + "".join(f"{number:>6}" for number in range(1, columns + 1)) + "    mean  spread"
+    head = (
+        f"{'accuracy in %':<{width}}  "
+        + "".join(f"{number:>6}" for number in range(1, columns + 1))
+        + "    mean  spread"
+    )
     lines = [head]
     for title, shares, remark in rows:
         spread = f"{100 * np.std(shares, ddof=1):8.1f}" if len(shares) > 1 else f"{'-':>8}"
-        each = "".join(f"{100 * share:6.1f}" for share in shares) if len(shares) <= columns else f"  {len(shares)} trainings"
+        each = (
+            "".join(f"{100 * share:6.1f}" for share in shares)
+            if len(shares) <= columns
+            else f"  {len(shares)} trainings"
+        )
         lines.append(
             f"{title:<{width}}  {each:<{6 * columns}}{100 * np.mean(shares):8.1f}{spread}{'  ' + remark if remark else ''}"
         )
     return "\n".join(lines)
 
 
-def confusion_table(counts: NDArray[np.int64], classes: Sequence[str], recordings: Sequence[int]) -> str:
+def confusion_table(
+    counts: NDArray[np.int64], classes: Sequence[str], recordings: Sequence[int]
+) -> str:
     """What clouds show (rows) and what was answered (columns), and how many recordings of it were asked about."""
     width = max(8, *(len(name) for name in classes)) + 2
-    lines = [f"{'shows':<{width}}" + "".join(f"{name:>{width}}" for name in classes) + "  right  recordings"]
+    lines = [
+        f"{'shows':<{width}}"
+        + "".join(f"{name:>{width}}" for name in classes)
+        + "  right  recordings"
+    ]
     for name, row, own, number in zip(classes, counts, np.diag(counts), recordings, strict=True):
         right = f"{own / row.sum():7.1%}" if row.sum() else f"{'-':>7}"
-        lines.append(f"{name:<{width}}" + "".join(f"{count:>{width}}" for count in row) + right + f"{number:>12}")
+        lines.append(
+            f"{name:<{width}}"
+            + "".join(f"{count:>{width}}" for count in row)
+            + right
+            + f"{number:>12}"
+        )
     return "\n".join(lines)
 
 
-def transfer_table(values: Sequence[str], mean: NDArray[np.float64], spread: NDArray[np.float64]) -> str:
+def transfer_table(
+    values: Sequence[str], mean: NDArray[np.float64], spread: NDArray[np.float64]
+) -> str:
     """Trained on (rows), asked about (columns): accuracy and spread over the folds in %."""
     width = max(14, *(len(value) for value in values)) + 2
     lines = [f"{'trained on':<{width}}" + "".join(f"{value:>{width}}" for value in values)]
     for value, shares, errors in zip(values, mean, spread, strict=True):
         cells = [
-            "-" if np.isnan(share) else f"{100 * share:.1f}" + ("" if np.isnan(error) else f" +- {100 * error:.1f}")
+            "-"
+            if np.isnan(share)
+            else f"{100 * share:.1f}" + ("" if np.isnan(error) else f" +- {100 * error:.1f}")
             for share, error in zip(shares, errors, strict=True)
         ]
         lines.append(f"{value:<{width}}" + "".join(f"{cell:>{width}}" for cell in cells))

@@ -46,7 +46,9 @@ class Split:
     trained_on: str = ""
 
 
-def make_splits(clouds: Clouds, scheme: str, *, folds: int | None = None, seed: int = 0) -> list[Split]:
+def make_splits(
+    clouds: Clouds, scheme: str, *, folds: int | None = None, seed: int = 0
+) -> list[Split]:
     """All splits of a scheme.
 
     Parameters
@@ -80,12 +82,20 @@ def make_splits(clouds: Clouds, scheme: str, *, folds: int | None = None, seed: 
         values = values_of(clouds, scheme)
         parts = _folds(clouds, "recording", recordings, folds, _MOST_FOLDS[_ACROSS], seed)
         splits = [
-            Split(f"{value}, fold {number}", part.train[values[part.train] == value], part.test, value)
+            Split(
+                f"{value}, fold {number}", part.train[values[part.train] == value], part.test, value
+            )
             for value in np.unique(values).tolist()
             for number, part in enumerate(parts, start=1)
         ]
     elif scheme in _MOST_FOLDS:
-        groups = moments if scheme == "folds" else recordings if scheme == "recording" else _numbered(clouds.column(scheme))
+        groups = (
+            moments
+            if scheme == "folds"
+            else recordings
+            if scheme == "recording"
+            else _numbered(clouds.column(scheme))
+        )
         splits = _folds(clouds, scheme, groups, folds, _MOST_FOLDS[scheme], seed)
     else:
         raise InputError(f"split '{scheme}' is unknown; give one of {', '.join(SCHEMES)}")
@@ -141,7 +151,9 @@ def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) ->
     """Raise where a split is not one: a side is empty, a moment is on both, or a class is asked about that was not learnt."""
     if not len(split.train) or not len(split.test):
         side = "training" if not len(split.train) else "test"
-        raise InputError(f"split '{split.name}' has no {side} clouds; give fewer folds, or another split")
+        raise InputError(
+            f"split '{split.name}' has no {side} clouds; give fewer folds, or another split"
+        )
     both = np.intersect1d(moments[split.train], moments[split.test])
     if both.size:
         index = split.train[np.isin(moments[split.train], both)][0]
@@ -165,14 +177,20 @@ def _synthetic_to_recorded(clouds: Clouds) -> list[Split]:
     return [Split("synthetic to recorded", known["synthetic"], known["recorded"])]
 
 
-def _folds(clouds: Clouds, what: str, groups: NDArray[np.int64], folds: int | None, most: int, seed: int) -> list[Split]:
+def _folds(
+    clouds: Clouds, what: str, groups: NDArray[np.int64], folds: int | None, most: int, seed: int
+) -> list[Split]:
     from sklearn.model_selection import StratifiedGroupKFold
 
     labels = clouds.labels
     largest = min(len(np.unique(groups)), int(np.unique(labels, return_counts=True)[1].max()))
-    fewest = min((len(np.unique(groups[labels == label])), label) for label in np.unique(labels).tolist())
+    fewest = min(
+        (len(np.unique(groups[labels == label])), label) for label in np.unique(labels).tolist()
+    )
     if folds is not None and not 2 <= folds <= max(2, largest):
-        raise InputError(f"--folds {folds}: split '{what}' of these clouds can have 2 to {max(2, largest)}")
+        raise InputError(
+            f"--folds {folds}: split '{what}' of these clouds can have 2 to {max(2, largest)}"
+        )
     if fewest[0] < 2:
         raise InputError(
             f"split '{what}': {fewest[1]} has one independent group of clouds; it takes two, to learn and to be asked"
@@ -182,7 +200,11 @@ def _folds(clouds: Clouds, what: str, groups: NDArray[np.int64], folds: int | No
 
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class", category=UserWarning)
-        parts = list(StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed)).split(labels, labels, groups))
+        parts = list(
+            StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed)).split(
+                labels, labels, groups
+            )
+        )
     return [
         Split(f"fold {number}", np.sort(train).astype(np.int64), np.sort(test).astype(np.int64))
         for number, (train, test) in enumerate(parts, start=1)
@@ -198,7 +220,9 @@ def _column(clouds: Clouds, name: str) -> NDArray[Any]:
     try:
         return np.asarray(clouds.column(name))
     except KeyError:
-        raise InputError(f"the clouds have no column '{name}' in their provenance; see index of the data set") from None
+        raise InputError(
+            f"the clouds have no column '{name}' in their provenance; see index of the data set"
+        ) from None
 
 
 def chosen(splits: Sequence[Split], numbers: Sequence[int] | None) -> list[int]:
@@ -206,5 +230,7 @@ def chosen(splits: Sequence[Split], numbers: Sequence[int] | None) -> list[int]:
     if numbers is None:
         return list(range(len(splits)))
     if wrong := [number for number in numbers if not 1 <= number <= len(splits)]:
-        raise InputError(f"--fold {wrong[0]}: there are {len(splits)} trainings; give 1 to {len(splits)}")
+        raise InputError(
+            f"--fold {wrong[0]}: there are {len(splits)} trainings; give 1 to {len(splits)}"
+        )
     return sorted({number - 1 for number in numbers})

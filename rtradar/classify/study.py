@@ -126,7 +126,9 @@ def train_study(
     }
     check_plan(out, plan)
     values = values_of(clouds, split)
-    missing = [number for number in numbers if not (training_folder(out, number) / _OUTCOME).exists()]
+    missing = [
+        number for number in numbers if not (training_folder(out, number) / _OUTCOME).exists()
+    ]
     if missing:
         examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
         check_points(examples, recipe)
@@ -143,17 +145,29 @@ def train_study(
             remove_parts(folder, rf"{re.escape(_CHECKPOINT)}|{re.escape(_OUTCOME)}")
             start = bar.n
 
-            def show(epoch: int, row: dict[str, float], start: int = start, name: str = one.name) -> None:
+            def show(
+                epoch: int, row: dict[str, float], start: int = start, name: str = one.name
+            ) -> None:
                 bar.set_description(name)
-                bar.set_postfix_str(f"loss {row['train_loss']:.2f}, test {row['test_accuracy']:.0%}", refresh=False)
+                bar.set_postfix_str(
+                    f"loss {row['train_loss']:.2f}, test {row['test_accuracy']:.0%}", refresh=False
+                )
                 bar.update(start + epoch - bar.n)
 
             train, test = examples.of(one.train), examples.of(one.test)
             network, history = train_network(
-                train, test, recipe, seed=seed, device=device, checkpoint=folder / _CHECKPOINT, on_epoch=show
+                train,
+                test,
+                recipe,
+                seed=seed,
+                device=device,
+                checkpoint=folder / _CHECKPOINT,
+                on_epoch=show,
             )
             predicted = predict(network, test, recipe).argmax(axis=1)
-            save_outcome(folder / _OUTCOME, outcome_of(clouds, one, values, truth, predicted, history))
+            save_outcome(
+                folder / _OUTCOME, outcome_of(clouds, one, values, truth, predicted, history)
+            )
     return load_study(out)
 
 
@@ -179,9 +193,13 @@ def load_study(folder: Path) -> Study:
     paths = [training_folder(folder, number) / _OUTCOME for number in range(len(names))]
     outcomes = [load_outcome(path) for path in paths if path.exists()]
     if any(max(one.truth.max(), one.predicted.max()) >= len(plan["classes"]) for one in outcomes):
-        raise InputError(f"'{folder}': answers name more classes than '{PLAN}' does; train into another folder")
+        raise InputError(
+            f"'{folder}': answers name more classes than '{PLAN}' does; train into another folder"
+        )
     if not outcomes:
-        raise InputError(f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on")
+        raise InputError(
+            f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on"
+        )
     return Study(folder, plan, outcomes)
 
 
@@ -216,7 +234,9 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
     try:
         network.load_state_dict(load_checkpoint(path).network)
     except (RuntimeError, TypeError, AttributeError):
-        raise InputError(f"'{path}' is of another network than '{folder / PLAN}' says; train anew, in another folder") from None
+        raise InputError(
+            f"'{path}' is of another network than '{folder / PLAN}' says; train anew, in another folder"
+        ) from None
     return network.eval(), recipe, classes
 
 
@@ -224,13 +244,20 @@ def classes_of(clouds: Clouds) -> tuple[tuple[str, ...], NDArray[np.int64]]:
     """Names of the classes in alphabetical order, and the place among them of every cloud, (cloud,)."""
     names, places = np.unique(clouds.labels, return_inverse=True)
     if len(names) < 2:
-        raise InputError(f"all {len(clouds)} clouds show the same activity ({', '.join(names)}); it takes two to tell them apart")
+        raise InputError(
+            f"all {len(clouds)} clouds show the same activity ({', '.join(names)}); it takes two to tell them apart"
+        )
     return tuple(names.tolist()), places.astype(np.int64)
 
 
 def fingerprint(clouds: Clouds) -> str:
     """Changes when the clouds, their order, their labels or their intervals do."""
-    return _digest([clouds.labels, *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed"))])
+    return _digest(
+        [
+            clouds.labels,
+            *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed")),
+        ]
+    )
 
 
 def made(clouds: Clouds) -> str:
@@ -244,11 +271,16 @@ def made(clouds: Clouds) -> str:
 
 def learnt_from(plan: dict[str, Any], clouds: Clouds) -> bool:
     """Whether these are the clouds of the plan."""
-    return bool(plan["fingerprint"] == fingerprint(clouds) and plan.get("made") in (None, made(clouds)))
+    return bool(
+        plan["fingerprint"] == fingerprint(clouds) and plan.get("made") in (None, made(clouds))
+    )
 
 
 def _digest(columns: Sequence[NDArray[Any]]) -> str:
-    rows = "\n".join("\t".join(map(str, row)) for row in zip(*(column.tolist() for column in columns), strict=True))
+    rows = "\n".join(
+        "\t".join(map(str, row))
+        for row in zip(*(column.tolist() for column in columns), strict=True)
+    )
     return hashlib.sha256(rows.encode()).hexdigest()[:16]
 
 

@@ -70,14 +70,18 @@ class Examples:
 def check_points(examples: Examples, recipe: Recipe) -> None:
     """Raise where clouds have fewer points than the recipe asks for."""
     if recipe.points > examples.points.shape[1]:
-        raise InputError(f"--points {recipe.points}: the clouds hold {examples.points.shape[1]} points; give no more")
+        raise InputError(
+            f"--points {recipe.points}: the clouds hold {examples.points.shape[1]} points; give no more"
+        )
 
 
 def pick_device(name: str) -> torch.device:
     """``auto``: a CUDA device where there is one. ``cpu``, ``cuda``: that one; BackendError where it is not there."""
     there = torch.cuda.is_available()
     if name == "cuda" and not there:
-        raise BackendError("--device cuda: torch finds no CUDA device here; give --device cpu, or install a CUDA build of torch")
+        raise BackendError(
+            "--device cuda: torch finds no CUDA device here; give --device cpu, or install a CUDA build of torch"
+        )
     return torch.device("cuda" if there and name != "cpu" else "cpu")
 
 
@@ -139,7 +143,9 @@ def train_network(
     with _random_numbers(device):
         torch.manual_seed(_number(seed, 0))
         network = PointNet(len(train.names), recipe).to(device)
-        optimiser = torch.optim.AdamW(network.parameters(), lr=recipe.rate, weight_decay=recipe.weight_decay, fused=True)
+        optimiser = torch.optim.AdamW(
+            network.parameters(), lr=recipe.rate, weight_decay=recipe.weight_decay, fused=True
+        )
         history: list[Row] = []
         finished = False
         if checkpoint is not None and checkpoint.exists():
@@ -152,10 +158,14 @@ def train_network(
         for epoch in range(len(history), recipe.epochs_run):
             began = time.perf_counter()
             torch.manual_seed(_number(seed, 1 + epoch))
-            row = _epoch(network, optimiser, train, recipe, epoch, device) | _watch(network, watched, recipe)
+            row = _epoch(network, optimiser, train, recipe, epoch, device) | _watch(
+                network, watched, recipe
+            )
             history.append(row | {"seconds": time.perf_counter() - began})
             if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY_S:
-                state = Checkpoint(network.state_dict(), optimiser.state_dict(), len(history), history)
+                state = Checkpoint(
+                    network.state_dict(), optimiser.state_dict(), len(history), history
+                )
                 save_checkpoint(checkpoint, state)
                 saved = time.monotonic()
             on_epoch(len(history), history[-1])
@@ -185,12 +195,20 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
     with torch.no_grad():
         points = drawn(examples.points, recipe.points, redraw=False)
         # One scaled cloud does not depend on the others: batches are only for the memory.
-        found = [network(scaled(some, recipe.scaling).to(device))[0].cpu() for some in torch.split(points, 32)]
+        found = [
+            network(scaled(some, recipe.scaling).to(device))[0].cpu()
+            for some in torch.split(points, 32)
+        ]
     return torch.cat(found).numpy()
 
 
 def _epoch(
-    network: PointNet, optimiser: torch.optim.Optimizer, train: Examples, recipe: Recipe, epoch: int, device: torch.device
+    network: PointNet,
+    optimiser: torch.optim.Optimizer,
+    train: Examples,
+    recipe: Recipe,
+    epoch: int,
+    device: torch.device,
 ) -> Row:
     network.train()
     n_clouds = len(train.points)
@@ -216,10 +234,15 @@ def _epoch(
 def _watch(network: PointNet, test: Examples, recipe: Recipe) -> Row:
     log_probabilities = torch.from_numpy(predict(network, test, recipe))
     right = (log_probabilities.argmax(dim=1) == test.classes).float().mean()
-    return {"test_loss": functional.nll_loss(log_probabilities, test.classes).item(), "test_accuracy": right.item()}
+    return {
+        "test_loss": functional.nll_loss(log_probabilities, test.classes).item(),
+        "test_accuracy": right.item(),
+    }
 
 
-def _restore(path: Path, network: PointNet, optimiser: torch.optim.Optimizer, recipe: Recipe) -> list[Row]:
+def _restore(
+    path: Path, network: PointNet, optimiser: torch.optim.Optimizer, recipe: Recipe
+) -> list[Row]:
     """Put the state of a checkpoint in place; its history is returned."""
     state = load_checkpoint(path)
     try:
@@ -227,9 +250,15 @@ def _restore(path: Path, network: PointNet, optimiser: torch.optim.Optimizer, re
         if state.optimiser:
             optimiser.load_state_dict(state.optimiser)
     except (RuntimeError, ValueError, KeyError, TypeError, AttributeError):
-        raise InputError(f"'{path}' is of another network than recipe '{recipe.name}' makes; give another folder") from None
-    if state.epochs != len(state.history) or not (state.optimiser or state.epochs == recipe.epochs_run):
-        raise InputError(f"'{path}' holds {state.epochs} epochs of another recipe; give another folder")
+        raise InputError(
+            f"'{path}' is of another network than recipe '{recipe.name}' makes; give another folder"
+        ) from None
+    if state.epochs != len(state.history) or not (
+        state.optimiser or state.epochs == recipe.epochs_run
+    ):
+        raise InputError(
+            f"'{path}' holds {state.epochs} epochs of another recipe; give another folder"
+        )
     return list(state.history)
 
 

@@ -36,7 +36,9 @@ def main(arguments: list[str] | None = None) -> int:
     options = argparse.Namespace(stopped=_WHOLE)
     if arguments is None:
         if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(errors="backslashreplace")  # as stderr: names of files may be any bytes
+            sys.stdout.reconfigure(
+                errors="backslashreplace"
+            )  # as stderr: names of files may be any bytes
         end_well(lambda: options.stopped.format(**vars(options)))
     status = _flushed(_main(arguments, options))
     stay_if_ending()
@@ -55,7 +57,10 @@ def _flushed(status: int) -> int:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):
-            fail(1, f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}")
+            fail(
+                1,
+                f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}",
+            )
         return status or 1
     return status
 
@@ -120,7 +125,8 @@ def _parser() -> argparse.ArgumentParser:
     from rtradar.cli.values import OneLineParser
 
     parser = OneLineParser(
-        prog="rtradar", description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds."
+        prog="rtradar",
+        description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds.",
     )
     parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)

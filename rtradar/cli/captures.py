@@ -18,7 +18,9 @@ _SYNTHETIC = "synthetic:"
 
 def add(commands: Subcommands) -> None:
     """Add both commands."""
-    run = commands.add_parser("run", help="one recording in; maps, clouds, pictures and a summary out")
+    run = commands.add_parser(
+        "run", help="one recording in; maps, clouds, pictures and a summary out"
+    )
     run.add_argument(
         "--fidelity",
         default="specular",
@@ -26,10 +28,16 @@ def add(commands: Subcommands) -> None:
         "(default: specular)",
     )
     run.add_argument(
-        "--tolerance-db", type=number, metavar="X", help="of auto: error of a frame's power that will do [dB] (default: 0.5)"
+        "--tolerance-db",
+        type=number,
+        metavar="X",
+        help="of auto: error of a frame's power that will do [dB] (default: 0.5)",
     )
     run.add_argument(
-        "--tolerance-complex", type=number, metavar="X", help="of auto: rms error of the field that will do, over its rms"
+        "--tolerance-complex",
+        type=number,
+        metavar="X",
+        help="of auto: rms error of the field that will do, over its rms",
     )
     run.add_argument(
         "--model-option",
@@ -46,16 +54,36 @@ def add(commands: Subcommands) -> None:
         help="what takes static clutter out before Doppler (default: none)",
     )
     run.add_argument(
-        "--body-material", choices=("perfect-conductor", "skin"), default="perfect-conductor", help="(default: perfect-conductor)"
+        "--body-material",
+        choices=("perfect-conductor", "skin"),
+        default="perfect-conductor",
+        help="(default: perfect-conductor)",
     )
-    run.add_argument("--detector", default="os-cfar", metavar="NAME", help="os-cfar, ca-cfar, or of a package (default: os-cfar)")
-    run.add_argument("--order", type=whole, default=1, metavar="N", help="most walls on the way of an echo, 0 to 3 (default: 1)")
-    run.add_argument("--keep-all", action="store_true", help="model walls, furniture and paths though they stay below the noise")
+    run.add_argument(
+        "--detector",
+        default="os-cfar",
+        metavar="NAME",
+        help="os-cfar, ca-cfar, or of a package (default: os-cfar)",
+    )
+    run.add_argument(
+        "--order",
+        type=whole,
+        default=1,
+        metavar="N",
+        help="most walls on the way of an echo, 0 to 3 (default: 1)",
+    )
+    run.add_argument(
+        "--keep-all",
+        action="store_true",
+        help="model walls, furniture and paths though they stay below the noise",
+    )
     run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
     _add_capture(run)
     run.set_defaults(command=_run)
 
-    compare = commands.add_parser("compare", help="one recording by several models, with the same noise, and what differs")
+    compare = commands.add_parser(
+        "compare", help="one recording by several models, with the same noise, and what differs"
+    )
     compare.add_argument(
         "--fidelities",
         default="analytic-paper,analytic,specular",
@@ -69,7 +97,9 @@ def add(commands: Subcommands) -> None:
 def _add_capture(run: argparse.ArgumentParser) -> None:
     """What every command that simulates a capture asks for."""
     run.add_argument(
-        "motion", metavar="MOTION", help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack"
+        "motion",
+        metavar="MOTION",
+        help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack",
     )
     run.add_argument("--skeleton", type=path, metavar="ASF", help="the .asf of an .amc recording")
     run.add_argument(
@@ -79,12 +109,30 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
         help=f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: paper-12ghz)",
     )
     run.add_argument(
-        "--scene", default="free-space", metavar="NAME|TOML", help="a scene by name, or a TOML file (default: free-space)"
+        "--scene",
+        default="free-space",
+        metavar="NAME|TOML",
+        help="a scene by name, or a TOML file (default: free-space)",
     )
-    run.add_argument("--start", type=seconds, default=0.0, metavar="S", help="where the interval begins [s] (default: 0)")
-    run.add_argument("--duration", type=seconds, metavar="S", help="how long it is [s] (default: to the end; synthetic: 3)")
     run.add_argument(
-        "--heading", type=number, default=0.0, metavar="DEG", help="turn the person, anticlockwise from above (default: 0)"
+        "--start",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="where the interval begins [s] (default: 0)",
+    )
+    run.add_argument(
+        "--duration",
+        type=seconds,
+        metavar="S",
+        help="how long it is [s] (default: to the end; synthetic: 3)",
+    )
+    run.add_argument(
+        "--heading",
+        type=number,
+        default=0.0,
+        metavar="DEG",
+        help="turn the person, anticlockwise from above (default: 0)",
     )
     run.add_argument(
         "--snr-db",
@@ -93,17 +141,35 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
         metavar="X|inf|physical",
         help="echo power over noise power per sample, or by the radar's watts (default: 20)",
     )
-    run.add_argument("--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)")
-    run.add_argument("--seed", type=whole, default=0, metavar="N", help="of synthetic motion, noise and sampling (default: 0)")
+    run.add_argument(
+        "--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)"
+    )
+    run.add_argument(
+        "--seed",
+        type=whole,
+        default=0,
+        metavar="N",
+        help="of synthetic motion, noise and sampling (default: 0)",
+    )
     run.add_argument(
         "--variant",
         choices=("auto", "cpu", "llvm", "scalar", "cuda"),
         default="auto",
         help="where to compute, and Mitsuba's backend; cpu: llvm or else scalar, auto: a GPU where it is faster (default: auto)",
     )
-    run.add_argument("--no-spreading", action="store_true", help="leave out the loss with distance, as the paper does")
-    run.add_argument("--out", type=path, required=True, metavar="DIR", help="folder for the results")
-    run.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
+    run.add_argument(
+        "--no-spreading",
+        action="store_true",
+        help="leave out the loss with distance, as the paper does",
+    )
+    run.add_argument(
+        "--out", type=path, required=True, metavar="DIR", help="folder for the results"
+    )
+    run.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="replace files of others that have the names of new ones",
+    )
     run.add_argument("--json", type=path, metavar="FILE", help="write the summary there too")
 
 
@@ -159,7 +225,9 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
     radar, scene = Radar.load(options.radar), Scene.load(options.scene)
     if options.motion.startswith(_SYNTHETIC):
         if options.skeleton is not None:
-            raise InputError(f"{options.motion}: a synthetic actor has its own skeleton; leave --skeleton out")
+            raise InputError(
+                f"{options.motion}: a synthetic actor has its own skeleton; leave --skeleton out"
+            )
         duration = 3.0 if options.duration is None else options.duration
         activity = options.motion.removeprefix(_SYNTHETIC)
         motion = synthetic_motion(activity, seed=options.seed, duration_s=options.start + duration)

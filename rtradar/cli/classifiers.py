@@ -16,17 +16,30 @@ if TYPE_CHECKING:
 def add(commands: Subcommands) -> None:
     """Add both commands."""
     _add_train(
-        commands.add_parser("train", help="learn to tell activities apart from a folder of clouds; started again it goes on")
+        commands.add_parser(
+            "train",
+            help="learn to tell activities apart from a folder of clouds; started again it goes on",
+        )
     )
-    _add_evaluate(commands.add_parser("evaluate", help="how well trained classifiers do: tables and pictures"))
+    _add_evaluate(
+        commands.add_parser("evaluate", help="how well trained classifiers do: tables and pictures")
+    )
 
 
 def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument(
-        "data", type=path, nargs="+", metavar="DIR", help="folders of clouds, as rtradar dataset build leaves them"
+        "data",
+        type=path,
+        nargs="+",
+        metavar="DIR",
+        help="folders of clouds, as rtradar dataset build leaves them",
     )
     train.add_argument(
-        "--out", type=path, required=True, metavar="OUT", help="folder for the trainings; one that is there is gone on with"
+        "--out",
+        type=path,
+        required=True,
+        metavar="OUT",
+        help="folder for the trainings; one that is there is gone on with",
     )
     train.add_argument("--recipe", default="lean", help="lean, our own, or paper (default: lean)")
     train.add_argument(
@@ -36,37 +49,85 @@ def _add_train(train: argparse.ArgumentParser) -> None:
         help="folds (the paper's, over clouds), recording, subject, recorded (learn from synthetic motion), or across:COLUMN, "
         "which learns from one value of a column, such as fidelity, and asks about all (default: folds)",
     )
-    train.add_argument("--folds", type=whole, metavar="N", help="(default: 10; across: 5; fewer where a class has fewer groups)")
-    train.add_argument("--fold", type=numbers, metavar="N,M,...", help="only these trainings, from 1 (default: all)")
+    train.add_argument(
+        "--folds",
+        type=whole,
+        metavar="N",
+        help="(default: 10; across: 5; fewer where a class has fewer groups)",
+    )
+    train.add_argument(
+        "--fold",
+        type=numbers,
+        metavar="N,M,...",
+        help="only these trainings, from 1 (default: all)",
+    )
     train.add_argument("--points", type=whole, metavar="N", help="of each cloud (default: 1000)")
     train.add_argument("--epochs", type=whole, metavar="N", help="(default: lean 30, paper 200)")
-    train.add_argument("--rate", type=number, metavar="X", help="learning rate (default: lean 2e-3, paper 1e-4)")
-    train.add_argument("--all-epochs", action="store_true", help="of paper: go on when the halved rate is below 1e-6")
     train.add_argument(
-        "--augmentation", help="none, physical, or turned, which is the paper's (default: lean physical, paper none)"
+        "--rate", type=number, metavar="X", help="learning rate (default: lean 2e-3, paper 1e-4)"
+    )
+    train.add_argument(
+        "--all-epochs",
+        action="store_true",
+        help="of paper: go on when the halved rate is below 1e-6",
+    )
+    train.add_argument(
+        "--augmentation",
+        help="none, physical, or turned, which is the paper's (default: lean physical, paper none)",
     )
     train.add_argument(
         "--scaling",
         help="of the axes of a cloud: physical, each by its own number, or unit-sphere, all by one (default: physical)",
     )
-    train.add_argument("--precision", help="of the search for maxima: bfloat16 or float32 (default: what is faster here)")
-    train.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto", help="where to compute (default: auto)")
-    train.add_argument("--seed", type=whole, default=0, metavar="N", help="of splits and trainings (default: 0)")
-    train.set_defaults(command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is")
+    train.add_argument(
+        "--precision",
+        help="of the search for maxima: bfloat16 or float32 (default: what is faster here)",
+    )
+    train.add_argument(
+        "--device",
+        choices=("auto", "cpu", "cuda"),
+        default="auto",
+        help="where to compute (default: auto)",
+    )
+    train.add_argument(
+        "--seed", type=whole, default=0, metavar="N", help="of splits and trainings (default: 0)"
+    )
+    train.set_defaults(
+        command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is"
+    )
 
 
 def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
     evaluate.add_argument(
-        "trained", type=path, nargs="+", metavar="OUT", help="folders that rtradar train made, of the same clouds"
+        "trained",
+        type=path,
+        nargs="+",
+        metavar="OUT",
+        help="folders that rtradar train made, of the same clouds",
     )
     evaluate.add_argument(
-        "--baselines", action="store_true", help="also simple classifiers, on the clouds and the split of the first"
+        "--baselines",
+        action="store_true",
+        help="also simple classifiers, on the clouds and the split of the first",
     )
     evaluate.add_argument(
-        "--data", type=path, nargs="+", metavar="DIR", help="of --baselines: the clouds (default: where they were)"
+        "--data",
+        type=path,
+        nargs="+",
+        metavar="DIR",
+        help="of --baselines: the clouds (default: where they were)",
     )
-    evaluate.add_argument("--out", type=path, metavar="DIR", help="folder for tables and pictures (default: the first OUT)")
-    evaluate.add_argument("--overwrite", action="store_true", help="replace files of others that have the names of new ones")
+    evaluate.add_argument(
+        "--out",
+        type=path,
+        metavar="DIR",
+        help="folder for tables and pictures (default: the first OUT)",
+    )
+    evaluate.add_argument(
+        "--overwrite",
+        action="store_true",
+        help="replace files of others that have the names of new ones",
+    )
     evaluate.add_argument("--json", type=path, metavar="FILE", help="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
 
@@ -78,7 +139,9 @@ def _train(options: argparse.Namespace) -> int:
     from rtradar.clouds.collection import Collection
 
     if options.recipe not in RECIPES:
-        raise InputError(f"--recipe {options.recipe}: there is none of that name; give one of {', '.join(RECIPES)}")
+        raise InputError(
+            f"--recipe {options.recipe}: there is none of that name; give one of {', '.join(RECIPES)}"
+        )
     device = pick_device(options.device)
     recipe = RECIPES[options.recipe].changed(
         points=options.points,
@@ -117,7 +180,9 @@ def _evaluate(options: argparse.Namespace) -> int:
         from rtradar.classify.baselines import judge_baselines
         from rtradar.clouds.collection import Collection
 
-        baselines = judge_baselines(Collection(*(options.data or studies[0].plan["data"])), studies[0])
+        baselines = judge_baselines(
+            Collection(*(options.data or studies[0].plan["data"])), studies[0]
+        )
     elif options.data is not None:
         raise InputError("--data: only --baselines reads clouds again; give both or neither")
     out = options.out or options.trained[0]

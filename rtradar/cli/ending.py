@@ -21,7 +21,11 @@ from pathlib import Path
 
 from rtradar.system.files import discard_unfinished
 
-_SIGNALS = {"SIGINT": "stopped by the user", "SIGTERM": "ended by SIGTERM", "SIGHUP": "its terminal was closed"}
+_SIGNALS = {
+    "SIGINT": "stopped by the user",
+    "SIGTERM": "ended by SIGTERM",
+    "SIGHUP": "its terminal was closed",
+}
 _KILL = getattr(signal, "SIGKILL", signal.SIGTERM)
 _PATIENCE_S = 0.5
 """Waited, at the end, until children are gone."""
@@ -41,7 +45,9 @@ def end_well(told: Callable[[], str]) -> None:
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     for name in _SIGNALS:
         number = getattr(signal, name, None)
-        if number is not None and signal.getsignal(number) is not signal.SIG_IGN:  # as nohup and "&" ask for
+        if (
+            number is not None and signal.getsignal(number) is not signal.SIG_IGN
+        ):  # as nohup and "&" ask for
             signal.signal(number, lambda *_: None)
     threading.Thread(target=_wait, args=(reader, told), name="rtradar-ending", daemon=True).start()
 
@@ -58,7 +64,9 @@ def _wait(reader: int, told: Callable[[], str]) -> None:
     _end_children()
     discard_unfinished()
     line = f"rtradar: {_SIGNALS.get(number.name, number.name)}; {' '.join(told().split())}\n"
-    flushed = threading.Thread(target=sys.stdout.flush, daemon=True)  # the main thread may be in the midst of writing
+    flushed = threading.Thread(
+        target=sys.stdout.flush, daemon=True
+    )  # the main thread may be in the midst of writing
     flushed.start()
     flushed.join(0.2)
     with contextlib.suppress(OSError, ValueError):
@@ -79,7 +87,11 @@ def _end_children() -> None:
     killed: set[int] = set()
     # Again, for others may be starting some by other ways.
     while (
-        children := (_descendants() or {child.pid for child in multiprocessing.active_children() if child.pid}) - spared
+        children := (
+            _descendants()
+            or {child.pid for child in multiprocessing.active_children() if child.pid}
+        )
+        - spared
     ) - killed:
         for child in children:
             with contextlib.suppress(OSError):

@@ -10,7 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NoReturn
 
 if TYPE_CHECKING:
-    Subcommands = argparse._SubParsersAction[argparse.ArgumentParser]  # argparse gives it no public name
+    Subcommands = argparse._SubParsersAction[
+        argparse.ArgumentParser
+    ]  # argparse gives it no public name
 
 
 class OneLineParser(argparse.ArgumentParser):

@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 def add(commands: Subcommands) -> None:
     """Add the command."""
-    view = commands.add_parser("view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser")
+    view = commands.add_parser(
+        "view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser"
+    )
     view.add_argument("folder", type=path, metavar="DIR", help="what 'rtradar run --out DIR' left")
     view.add_argument(
         "--out",
@@ -25,13 +27,27 @@ def add(commands: Subcommands) -> None:
         metavar="FILE.html",
         help="write the page there, and open nothing (default: DIR/view.html, opened)",
     )
-    view.add_argument("--no-browser", action="store_true", help="write the page, but do not open it")
     view.add_argument(
-        "--colour", choices=("part", "power", "velocity"), default="part", help="what colours mean at first (default: part)"
+        "--no-browser", action="store_true", help="write the page, but do not open it"
     )
-    view.add_argument("--still", type=path, metavar="FILE.png", help="draw one moment; without --out there is no page then")
-    view.add_argument("--time", type=seconds, metavar="S", help="of the still [s] (default: the middle)")
-    view.add_argument("--json", type=path, metavar="FILE", help="write what was shown and written there")
+    view.add_argument(
+        "--colour",
+        choices=("part", "power", "velocity"),
+        default="part",
+        help="what colours mean at first (default: part)",
+    )
+    view.add_argument(
+        "--still",
+        type=path,
+        metavar="FILE.png",
+        help="draw one moment; without --out there is no page then",
+    )
+    view.add_argument(
+        "--time", type=seconds, metavar="S", help="of the still [s] (default: the middle)"
+    )
+    view.add_argument(
+        "--json", type=path, metavar="FILE", help="write what was shown and written there"
+    )
     view.set_defaults(command=_view)
 
 
@@ -42,7 +58,9 @@ def _view(options: argparse.Namespace) -> int:
     from rtradar.pipeline.pictures.run_view import view
 
     page = options.out or (None if options.still else _own_page(options.folder))
-    told = view(options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour)
+    told = view(
+        options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour
+    )
     if options.json is not None:
         write_json(options.json, told)
     for kind in ("page", "still"):
@@ -62,5 +80,7 @@ def _own_page(folder: Path) -> Path:
 
     page = folder / "view.html"
     if os.path.lexists(page) and not is_page(page):
-        raise InputError(f"'{page}' is there, and no page of rtradar view; name another file (--out)")
+        raise InputError(
+            f"'{page}' is there, and no page of rtradar view; name another file (--out)"
+        )
     return page

@@ -35,19 +35,27 @@ class Collection:
 
     def __init__(self, *folders: str | Path) -> None:
         if not folders:
-            raise InputError("no folder of clouds; give at least one that rtradar dataset build made")
+            raise InputError(
+                "no folder of clouds; give at least one that rtradar dataset build made"
+            )
         found = {Path(folder): read_index(Path(folder)) for folder in folders}
         self._name = ", ".join(f"'{folder}'" for folder in found)
-        self._paths = [sample_path(folder, identity) for folder, ids in found.items() for identity in ids]
+        self._paths = [
+            sample_path(folder, identity) for folder, ids in found.items() for identity in ids
+        ]
         self._ids = tuple(path.stem for path in self._paths)
         for folder, ids in found.items():
-            if missing := [identity for identity in ids if not sample_path(folder, identity).is_file()]:
+            if missing := [
+                identity for identity in ids if not sample_path(folder, identity).is_file()
+            ]:
                 raise InputError(
                     f"collection '{folder}': {len(missing)} of {len(ids)} samples are missing; "
                     "finish it with: rtradar dataset build"
                 )
         if len(once := set(self._ids)) < len(self._ids):
-            raise InputError(f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; leave one out")
+            raise InputError(
+                f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; leave one out"
+            )
         self._about = [read_sample(path, "about") for path in self._paths]
 
     def __len__(self) -> int:
@@ -86,11 +94,15 @@ class Collection:
         """
         if not any(name in about["provenance"] for about in self._about):
             known = sorted({key for about in self._about for key in about["provenance"]})
-            raise InputError(f"collection {self._name}: no sample has '{name}'; there are: {', '.join(known)}")
+            raise InputError(
+                f"collection {self._name}: no sample has '{name}'; there are: {', '.join(known)}"
+            )
         values = [about["provenance"].get(name) for about in self._about]
         if all(isinstance(value, int | float | str) for value in values):
             return np.array(values)
-        column = np.empty(len(values), dtype=object)  # else lists of one length would become an axis
+        column = np.empty(
+            len(values), dtype=object
+        )  # else lists of one length would become an axis
         column[:] = values
         return column
 

@@ -34,7 +34,9 @@ def write_index(folder: Path, identities: Iterable[str]) -> None:
     """
     path = folder / INDEX
     if os.path.lexists(path) and not _is_index(path):
-        raise InputError(f"'{path}' is there, and no index of a collection; move it away, or give another folder (--out)")
+        raise InputError(
+            f"'{path}' is there, and no index of a collection; move it away, or give another folder (--out)"
+        )
     content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
     with atomic_file(path) as file:
         file.write(content.encode() + b"\n")
@@ -48,7 +50,11 @@ def _is_index(path: Path) -> bool:
         content = read_json(path)
     except (OSError, ValueError):
         return False
-    return isinstance(content, dict) and "format" in content and isinstance(content.get("samples"), list)
+    return (
+        isinstance(content, dict)
+        and "format" in content
+        and isinstance(content.get("samples"), list)
+    )
 
 
 def read_index(folder: Path) -> tuple[str, ...]:
@@ -64,11 +70,21 @@ def read_index(folder: Path) -> tuple[str, ...]:
         content = read_json(path)
     except OSError as error:
         why = error.strerror
-        raise InputError(f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build") from None
+        raise InputError(
+            f"'{folder}' holds no collection ({INDEX}: {why}); make one with: rtradar dataset build"
+        ) from None
     except ValueError:
-        raise InputError(f"'{path}' is damaged; move it away and mend the collection with: rtradar dataset build") from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT or not isinstance(content.get("samples"), list):
-        raise InputError(f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build")
+        raise InputError(
+            f"'{path}' is damaged; move it away and mend the collection with: rtradar dataset build"
+        ) from None
+    if (
+        not isinstance(content, dict)
+        or content.get("format") != FORMAT
+        or not isinstance(content.get("samples"), list)
+    ):
+        raise InputError(
+            f"'{path}' is no index of format {FORMAT}; build the collection anew with: rtradar dataset build"
+        )
     identities = content["samples"]
     for identity in identities:
         if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):

@@ -51,7 +51,10 @@ def save_ply(path: str | os.PathLike[str], points: ArrayLike) -> None:
         As in `save_cloud_npz`.
     """
     places = _checked(points)
-    meaning = ", ".join(f"{letter} = {axis} [{unit}]" for letter, axis, unit in zip("xyz", RDT_AXES, RDT_UNITS, strict=True))
+    meaning = ", ".join(
+        f"{letter} = {axis} [{unit}]"
+        for letter, axis, unit in zip("xyz", RDT_AXES, RDT_UNITS, strict=True)
+    )
     header = (
         f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {meaning}\nelement vertex {len(places)}\n"
         "property double x\nproperty double y\nproperty double z\nend_header\n"

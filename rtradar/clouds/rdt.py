@@ -86,17 +86,25 @@ class RdtCloud:
         InputError
             Where the mask is no two-dimensional array of booleans or not of the shape of the last, or time does not advance.
         """
-        cells = np.array(mask)  # a copy: the slab to come needs it after the caller may have reused the array
+        cells = np.array(
+            mask
+        )  # a copy: the slab to come needs it after the caller may have reused the array
         if cells.ndim != 2 or cells.dtype != np.bool_ or 0 in cells.shape:
-            raise InputError(f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; it must be (range, velocity) bool")
+            raise InputError(
+                f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; it must be (range, velocity) bool"
+            )
         if not np.isfinite(time_s):
             raise InputError(f"RDT cloud: time_s = {time_s!r}; it must be finite")
         if self._last is None:
             self._slab(np.zeros_like(cells), cells, time_s - self._radar.frame_hop_s, time_s)
         elif cells.shape != self._last.shape:
-            raise InputError(f"RDT cloud: mask has shape {cells.shape}; those before it have {self._last.shape}")
+            raise InputError(
+                f"RDT cloud: mask has shape {cells.shape}; those before it have {self._last.shape}"
+            )
         elif time_s <= self._last_time:
-            raise InputError(f"RDT cloud: time_s = {time_s}; it must be later than that of the last mask, {self._last_time}")
+            raise InputError(
+                f"RDT cloud: time_s = {time_s}; it must be later than that of the last mask, {self._last_time}"
+            )
         else:
             self._slab(self._last, cells, self._last_time, time_s)
         self._last, self._last_time = cells, float(time_s)
@@ -105,17 +113,28 @@ class RdtCloud:
     def finish(self) -> RdtCloudResult:
         """Close the surface behind the last window and give the cloud."""
         if self._last is not None:
-            self._slab(self._last, np.zeros_like(self._last), self._last_time, self._last_time + self._radar.frame_hop_s)
+            self._slab(
+                self._last,
+                np.zeros_like(self._last),
+                self._last_time,
+                self._last_time + self._radar.frame_hop_s,
+            )
             self._last = None
         return RdtCloudResult(self._sample.filled(), self._sample.n_seen, self._n_voxels)
 
-    def _slab(self, first: NDArray[np.bool_], second: NDArray[np.bool_], start_s: float, end_s: float) -> None:
-        vertices, faces = _surface(np.stack([first, second]), np.array([start_s, end_s]), self._radar)
+    def _slab(
+        self, first: NDArray[np.bool_], second: NDArray[np.bool_], start_s: float, end_s: float
+    ) -> None:
+        vertices, faces = _surface(
+            np.stack([first, second]), np.array([start_s, end_s]), self._radar
+        )
         if len(faces):
             self._sample.add(_centres(vertices, faces))
 
 
-def rdt_isosurface(volume: ArrayLike, times: ArrayLike, radar: Radar) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def rdt_isosurface(
+    volume: ArrayLike, times: ArrayLike, radar: Radar
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Closed surface of a whole volume of detections.
 
     Parameters
@@ -141,17 +160,29 @@ def rdt_isosurface(volume: ArrayLike, times: ArrayLike, radar: Radar) -> tuple[N
     """
     cells, centres = np.asarray(volume), np.asarray(times, dtype=np.float64)
     if cells.ndim != 3 or cells.dtype != np.bool_ or 0 in cells.shape:
-        raise InputError(f"RDT volume has shape {cells.shape}, type {cells.dtype}; it must be (time, range, velocity) bool")
-    if centres.shape != cells.shape[:1] or not np.isfinite(centres).all() or (np.diff(centres) <= 0).any():
-        raise InputError(f"RDT volume of {cells.shape[0]} windows: times must be as many finite, ascending numbers")
+        raise InputError(
+            f"RDT volume has shape {cells.shape}, type {cells.dtype}; it must be (time, range, velocity) bool"
+        )
+    if (
+        centres.shape != cells.shape[:1]
+        or not np.isfinite(centres).all()
+        or (np.diff(centres) <= 0).any()
+    ):
+        raise InputError(
+            f"RDT volume of {cells.shape[0]} windows: times must be as many finite, ascending numbers"
+        )
     empty = np.zeros_like(cells[:1])
     hop = radar.frame_hop_s
     return _surface(
-        np.concatenate([empty, cells, empty]), np.concatenate([[centres[0] - hop], centres, [centres[-1] + hop]]), radar
+        np.concatenate([empty, cells, empty]),
+        np.concatenate([[centres[0] - hop], centres, [centres[-1] + hop]]),
+        radar,
     )
 
 
-def sample_centres(vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, seed: int = 0) -> NDArray[np.float64]:
+def sample_centres(
+    vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, seed: int = 0
+) -> NDArray[np.float64]:
     """A uniform random sample of the centres of triangles; the same as `RdtCloud` draws of the same triangles.
 
     Parameters
@@ -176,7 +207,12 @@ def sample_centres(vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, 
         Where ``n_points`` or ``seed`` is out of its range.
     """
     sample = UniformSample(n_points, seed)
-    sample.add(_centres(np.asarray(vertices, dtype=np.float64).reshape(-1, 3), np.asarray(faces, dtype=np.int64).reshape(-1, 3)))
+    sample.add(
+        _centres(
+            np.asarray(vertices, dtype=np.float64).reshape(-1, 3),
+            np.asarray(faces, dtype=np.int64).reshape(-1, 3),
+        )
+    )
     return sample.filled()
 
 
@@ -184,7 +220,9 @@ def _centres(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray
     return vertices[faces].mean(axis=1)
 
 
-def _surface(cells: NDArray[np.bool_], times: NDArray[np.float64], radar: Radar) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def _surface(
+    cells: NDArray[np.bool_], times: NDArray[np.float64], radar: Radar
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Isosurface of slices at these times, closed in range and velocity but not in time, in physical coordinates."""
     occupied: NDArray[np.bool_] = np.any(cells, axis=0)
     rows, columns = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))

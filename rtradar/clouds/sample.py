@@ -69,7 +69,9 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
         Where it cannot be written; the folder is then as it was.
     """
     about = json.dumps(
-        {"format": FORMAT, "label": sample.label, "provenance": sample.provenance}, sort_keys=True, allow_nan=False
+        {"format": FORMAT, "label": sample.label, "provenance": sample.provenance},
+        sort_keys=True,
+        allow_nan=False,
     )
     arrays = {
         "points": np.asarray(sample.points, dtype="<f8").reshape(-1, 3),
@@ -99,4 +101,7 @@ def is_whole(path: Path) -> bool:
             whole = file.read()
     except OSError:
         return False
-    return len(whole) > DIGEST and hashlib.sha256(whole[:-DIGEST]).hexdigest().encode() == whole[-DIGEST:]
+    return (
+        len(whole) > DIGEST
+        and hashlib.sha256(whole[:-DIGEST]).hexdigest().encode() == whole[-DIGEST:]
+    )

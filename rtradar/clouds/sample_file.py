@@ -50,9 +50,15 @@ def read_sample(path: Path, name: str) -> Any:
             if size <= _MOST_BYTES:
                 array = _array(file, name)
                 return _about(array) if name == "about" else array.reshape(-1, 3).astype(np.float64)
-    except Exception:  # what readers of archives and of headers raise at damaged ones is of any type
-        raise InputError(f"sample '{path}' is damaged; mend the collection with: rtradar dataset build") from None
-    raise InputError(f"sample '{path}' has {size / 1e6:.0f} MB; {_MOST_BYTES / 1e6:.0f} MB are allowed: it is none of rtradar's")
+    except (
+        Exception
+    ):  # what readers of archives and of headers raise at damaged ones is of any type
+        raise InputError(
+            f"sample '{path}' is damaged; mend the collection with: rtradar dataset build"
+        ) from None
+    raise InputError(
+        f"sample '{path}' has {size / 1e6:.0f} MB; {_MOST_BYTES / 1e6:.0f} MB are allowed: it is none of rtradar's"
+    )
 
 
 def _array(file: BinaryIO, name: str) -> NDArray[Any]:
@@ -72,6 +78,10 @@ def _array(file: BinaryIO, name: str) -> NDArray[Any]:
 
 def _about(data: NDArray[np.uint8]) -> dict[str, Any]:
     about: dict[str, Any] = json.loads(data.tobytes())
-    if about["format"] != FORMAT or not isinstance(about["label"], str) or not isinstance(about["provenance"], dict):
+    if (
+        about["format"] != FORMAT
+        or not isinstance(about["label"], str)
+        or not isinstance(about["provenance"], dict)
+    ):
         raise ValueError
     return about

@@ -72,4 +72,8 @@ class UniformSample:
         rows = self.rows()
         if not 0 < len(rows) < self._n_rows:
             return rows
-        return rows[np.random.default_rng(stream(self._seed, _WITH_REPLACEMENT)).integers(len(rows), size=self._n_rows)]
+        return rows[
+            np.random.default_rng(stream(self._seed, _WITH_REPLACEMENT)).integers(
+                len(rows), size=self._n_rows
+            )
+        ]

@@ -58,8 +58,12 @@ class SpatialCloud:
         for field in ("points", "velocity", "power", "time"):
             values = np.asarray(getattr(self, field), dtype=np.float64)
             object.__setattr__(self, field, values)
-            if values.shape != ((len(self.points), 3) if field == "points" else (len(self.points),)):
-                raise InputError(f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)")
+            if values.shape != (
+                (len(self.points), 3) if field == "points" else (len(self.points),)
+            ):
+                raise InputError(
+                    f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)"
+                )
             if not (measured_alone(values) if field == "points" else np.isfinite(values).all()):
                 raise InputError(
                     f"spatial cloud: {field} holds NaN or infinity; every value must be finite, but for y or z not measured"
@@ -73,7 +77,9 @@ class SpatialCloud:
     def strongest(self) -> SpatialCloud:
         """Points at most `SHOWN_DB` below the strongest, which pictures show."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
-        return SpatialCloud(self.points[kept], self.velocity[kept], self.power[kept], self.time[kept])
+        return SpatialCloud(
+            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept]
+        )
 
 
 def measured_alone(points: NDArray[np.float64]) -> bool:
@@ -110,7 +116,9 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
     y, z = _peaks(spectra)
     forward = 1 - y.sine**2 - z.sine**2
     cell, rank = np.nonzero((y.real | z.real) & (forward >= 0))
-    direction = np.stack([np.sqrt(forward[cell, rank]), y.sine[cell, rank], z.sine[cell, rank]], axis=1)
+    direction = np.stack(
+        [np.sqrt(forward[cell, rank]), y.sine[cell, rank], z.sine[cell, rank]], axis=1
+    )
     for axis, power in ((1, spectra.y), (2, spectra.z)):
         if power is None:
             direction[:, axis] = np.nan
@@ -153,9 +161,14 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
 
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:
     """Peaks of both lines; a line that is not there has sine 0 and the power of the other."""
-    y, z = (None if power is None else find_peaks(spectra.sines, power) for power in (spectra.y, spectra.z))
+    y, z = (
+        None if power is None else find_peaks(spectra.sines, power)
+        for power in (spectra.y, spectra.z)
+    )
     known = y or z
     if known is None:
-        raise InputError("spatial cloud: the spectra are of no line at all; take them from angle_spectra")
+        raise InputError(
+            "spatial cloud: the spectra are of no line at all; take them from angle_spectra"
+        )
     flat = Peaks(np.zeros_like(known.sine), known.power, known.real)
     return y or flat, z or flat

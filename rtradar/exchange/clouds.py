@@ -52,7 +52,9 @@ class CloudTable:
         table = zip(self._fields(), self.names, self.units, strict=True)
         meaning = ", ".join(f"{field} = {name} [{unit}]" for field, name, unit in table)
         missing = np.flatnonzero(np.isnan(self.values).any(axis=0))
-        return meaning + "".join(f"; {self.names[column]} is not measured: NaN" for column in missing)
+        return meaning + "".join(
+            f"; {self.names[column]} is not measured: NaN" for column in missing
+        )
 
 
 def write_npz(path: Path, cloud: CloudTable) -> dict[str, Any]:
@@ -60,7 +62,9 @@ def write_npz(path: Path, cloud: CloudTable) -> dict[str, Any]:
     extra = {name: cloud.values[:, 3 + k] for k, name in enumerate(cloud.names[3:])}
     with atomic_file(path) as file:
         axes, units = np.array(cloud.names[:3]), np.array(cloud.units[:3])
-        np.savez_compressed(file, allow_pickle=False, points=cloud.values[:, :3], axes=axes, units=units, **extra)
+        np.savez_compressed(
+            file, allow_pickle=False, points=cloud.values[:, :3], axes=axes, units=units, **extra
+        )
     return {"type": "float64"}
 
 
@@ -96,13 +100,17 @@ def read_npz(path: Path) -> CloudTable:
     """A cloud of a run or a collection; errors of many kinds where it is none."""
     arrays = read_arrays(path)
     points = np.asarray(arrays["points"], dtype=np.float64)
-    known = [name for name in _EXTRA_UNITS if name in arrays and arrays[name].shape == points.shape[:1]]
+    known = [
+        name for name in _EXTRA_UNITS if name in arrays and arrays[name].shape == points.shape[:1]
+    ]
     axes = tuple(map(str, arrays["axes"])) if "axes" in arrays else RDT_AXES
     units = tuple(map(str, arrays["units"])) if "units" in arrays else RDT_UNITS
     columns = [np.asarray(arrays[name], dtype=np.float64) for name in known]
     if points.ndim != 2 or points.shape[1] != 3 or len(axes) != 3 or len(units) != 3:
         raise ValueError(f"points have shape {points.shape}")
-    if not all(_MEANING.fullmatch(f"x = {axis} [{unit}]") for axis, unit in zip(axes, units, strict=True)):
+    if not all(
+        _MEANING.fullmatch(f"x = {axis} [{unit}]") for axis, unit in zip(axes, units, strict=True)
+    ):
         raise ValueError("axes or units are no short words")
     extra_units = tuple(_EXTRA_UNITS[name] for name in known)
     return CloudTable((*axes, *known), (*units, *extra_units), np.column_stack([points, *columns]))
@@ -132,20 +140,29 @@ def read_pcd(path: Path) -> CloudTable:
     if not end or any(count != "1" for count in told.get("COUNT", [])):
         raise ValueError("no header of a binary PCD with one number a field")
     letters = {"F": "f", "I": "i", "U": "u"}
-    kinds = [f"<{letters[letter]}{int(size)}" for letter, size in zip(told["TYPE"], told["SIZE"], strict=True)]
+    kinds = [
+        f"<{letters[letter]}{int(size)}"
+        for letter, size in zip(told["TYPE"], told["SIZE"], strict=True)
+    ]
     return _table(head, list(zip(told["FIELDS"], kinds, strict=True)), int(told["POINTS"][0]), body)
 
 
 def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) -> CloudTable:
     kind = np.dtype(fields)
     if count < 0 or len(body) < count * kind.itemsize:
-        raise ValueError(f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; it is cut off")
+        raise ValueError(
+            f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; it is cut off"
+        )
     rows = np.frombuffer(body, dtype=kind, count=count)
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
     meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
     names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)
-    with np.errstate(invalid="ignore"):  # a signalling NaN, which is a NaN afterwards and told of as such
-        return CloudTable(names, units, np.column_stack([rows[field].astype(np.float64) for field in order]))
+    with np.errstate(
+        invalid="ignore"
+    ):  # a signalling NaN, which is a NaN afterwards and told of as such
+        return CloudTable(
+            names, units, np.column_stack([rows[field].astype(np.float64) for field in order])
+        )
 
 
 def checked(cloud: CloudTable, path: Path) -> CloudTable:
@@ -156,7 +173,9 @@ def checked(cloud: CloudTable, path: Path) -> CloudTable:
     InputError
     """
     places, rest = cloud.values[:, :3], cloud.values[:, 3:]
-    whole = np.isfinite(places).all() or (cloud.names[:3] == SPATIAL_AXES and measured_alone(places))
+    whole = np.isfinite(places).all() or (
+        cloud.names[:3] == SPATIAL_AXES and measured_alone(places)
+    )
     if not (whole and np.isfinite(rest).all()):
         raise InputError(f"'{path}' holds NaN or infinity; every value of a cloud must be finite")
     return cloud

@@ -11,7 +11,16 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from rtradar.errors import InputError
-from rtradar.exchange.clouds import CloudTable, checked, read_npz, read_pcd, read_ply, write_npz, write_pcd, write_ply
+from rtradar.exchange.clouds import (
+    CloudTable,
+    checked,
+    read_npz,
+    read_pcd,
+    read_ply,
+    write_npz,
+    write_pcd,
+    write_ply,
+)
 from rtradar.exchange.int16 import read_int16, write_int16
 from rtradar.exchange.mat import read_mat, write_mat
 from rtradar.exchange.netcdf import read_netcdf, write_netcdf
@@ -20,14 +29,18 @@ from rtradar.system.output_folder import check_whole
 
 _T = TypeVar("_T")
 
-IF_FORMATS: Mapping[str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], IfCube]]] = {
+IF_FORMATS: Mapping[
+    str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], IfCube]]
+] = {
     ".mat": (write_mat, read_mat),
     ".nc": (write_netcdf, read_netcdf),
     ".bin": (write_int16, read_int16),
 }
 """What writes and reads IF samples, by the suffix of the file."""
 
-CLOUD_FORMATS: Mapping[str, tuple[Callable[[Path, CloudTable], dict[str, Any]], Callable[[Path], CloudTable]]] = {
+CLOUD_FORMATS: Mapping[
+    str, tuple[Callable[[Path, CloudTable], dict[str, Any]], Callable[[Path], CloudTable]]
+] = {
     ".npz": (write_npz, read_npz),
     ".ply": (write_ply, read_ply),
     ".pcd": (write_pcd, read_pcd),
@@ -79,16 +92,24 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
         )
     if os.path.isdir(origin):
         if suffix in CLOUD_FORMATS:
-            raise InputError(f"'{origin}' is a folder; name the cloud in it, such as {origin / 'cloud_xyz.npz'}")
+            raise InputError(
+                f"'{origin}' is a folder; name the cloud in it, such as {origin / 'cloud_xyz.npz'}"
+            )
         recording = open_recording(origin)
-        said = {"axes": list(IF_AXES), "shape": list(recording.shape)} | IF_FORMATS[suffix][0](target, recording)
+        said = {"axes": list(IF_AXES), "shape": list(recording.shape)} | IF_FORMATS[suffix][0](
+            target, recording
+        )
     elif suffix in IF_FORMATS:
-        raise InputError(f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made")
+        raise InputError(
+            f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made"
+        )
     else:
         if os.path.isdir(origin.parent):
             check_whole(origin.parent)
         cloud = read_cloud(origin)
-        said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[suffix][0](target, cloud)
+        said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[
+            suffix
+        ][0](target, cloud)
     return {"file": str(target)} | said
 
 
@@ -114,7 +135,9 @@ def read_if(path: str | Path) -> IfCube:
         recording = open_recording(place)
         tx, (chirps, *rest) = recording.radar.n_tx, recording.shape
         return IfCube(recording.read(0, chirps * tx).reshape(chirps, *rest), recording.radar)
-    return _read(place, {suffix: reader for suffix, (_, reader) in IF_FORMATS.items()}, "IF samples")
+    return _read(
+        place, {suffix: reader for suffix, (_, reader) in IF_FORMATS.items()}, "IF samples"
+    )
 
 
 def read_cloud(path: str | Path) -> CloudTable:
@@ -135,7 +158,10 @@ def read_cloud(path: str | Path) -> CloudTable:
         Where it cannot be read.
     """
     place = Path(path)
-    return checked(_read(place, {suffix: reader for suffix, (_, reader) in CLOUD_FORMATS.items()}, "a cloud"), place)
+    return checked(
+        _read(place, {suffix: reader for suffix, (_, reader) in CLOUD_FORMATS.items()}, "a cloud"),
+        place,
+    )
 
 
 def _read(path: Path, readers: Mapping[str, Callable[[Path], _T]], what: str) -> _T:
@@ -145,5 +171,11 @@ def _read(path: Path, readers: Mapping[str, Callable[[Path], _T]], what: str) ->
     try:
         return reader(path)
     except _DAMAGE as error:
-        why = getattr(error, "strerror", None) or " ".join(str(error).split())[:100] or type(error).__name__
-        raise InputError(f"cannot read {what} from '{path}': {why}; give a file that rtradar wrote") from None
+        why = (
+            getattr(error, "strerror", None)
+            or " ".join(str(error).split())[:100]
+            or type(error).__name__
+        )
+        raise InputError(
+            f"cannot read {what} from '{path}': {why}; give a file that rtradar wrote"
+        ) from None

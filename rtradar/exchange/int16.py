@@ -11,7 +11,16 @@ from typing import Any
 import numpy as np
 
 from rtradar.errors import InputError
-from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+from rtradar.exchange.recording import (
+    IF_AXES,
+    IF_UNIT,
+    IfCube,
+    IfRecording,
+    quantities,
+    radar_of,
+    radar_text,
+    scalars,
+)
 from rtradar.system.files import atomic_file, open_regular, read_json
 
 _LARGEST = 32767
@@ -33,12 +42,16 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
         if file.is_dir():
             raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
     if os.path.lexists(beside) and not _ours(beside):
-        raise InputError(f"'{beside}' is there, and something else; it would be replaced: give another file (--out)")
+        raise InputError(
+            f"'{beside}' is there, and something else; it would be replaced: give another file (--out)"
+        )
     peak = 0.0
     for _, block in recording.blocks("finding the peak"):
         largest = float(np.abs(block.view(np.float32)).max())
         if not np.isfinite(largest):
-            raise InputError(f"{recording.name}: a sample is not finite, and has no place in 16 bits; run it again")
+            raise InputError(
+                f"{recording.name}: a sample is not finite, and has no place in 16 bits; run it again"
+            )
         peak = max(peak, largest)
     scale = peak / _LARGEST if peak else 1.0
     about = {
@@ -59,8 +72,12 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
         text.write((json.dumps(about, indent=1) + "\n").encode("utf-8"))
         for _, block in recording.blocks("writing"):
             # In float64: the quotient of two float32 could round to the wrong side of a half.
-            raw.write(np.rint(block.view(np.float32).astype(np.float64) / scale).astype("<i2").tobytes())
-        beside.unlink(missing_ok=True)  # of another cube: never beside this one, wherever the next steps end
+            raw.write(
+                np.rint(block.view(np.float32).astype(np.float64) / scale).astype("<i2").tobytes()
+            )
+        beside.unlink(
+            missing_ok=True
+        )  # of another cube: never beside this one, wherever the next steps end
     return {"beside": str(beside), "scale": scale, "quantisation": scale / 2, "type": "int16"}
 
 

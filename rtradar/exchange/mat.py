@@ -12,7 +12,14 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike
 
-from rtradar.exchange.recording import IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+from rtradar.exchange.recording import (
+    IfCube,
+    IfRecording,
+    quantities,
+    radar_of,
+    radar_text,
+    scalars,
+)
 from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
 
 _HEADER = b"MATLAB 7.3 MAT-file, Platform: rtradar, Created on: Thu Jan  1 00:00:00 1970 HDF5 schema 1.00 ."
@@ -34,16 +41,24 @@ def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
     chunk = (*rest[::-1], recording.step)
     with atomic_file(path) as raw, LastingFile(raw) as written:
         # MATLAB reads no newer layout than that of HDF5 1.8.
-        with h5py.File(written, "w", userblock_size=_HEADER_BYTES, libver=("earliest", "v108")) as file:
+        with h5py.File(
+            written, "w", userblock_size=_HEADER_BYTES, libver=("earliest", "v108")
+        ) as file:
             data = file.create_dataset("if_samples", (*rest[::-1], chirps), _COMPLEX, chunks=chunk)
             data.attrs["MATLAB_class"] = np.bytes_("single")
             for first, block in recording.blocks("writing"):
-                turned = np.zeros(chunk, dtype=np.complex64)  # whole, as chunks at the end of an axis are in the file
+                turned = np.zeros(
+                    chunk, dtype=np.complex64
+                )  # whole, as chunks at the end of an axis are in the file
                 turned[..., : len(block)] = block.T
                 data.id.write_direct_chunk((0, 0, 0, first), turned.tobytes())
                 written.check()
             for name, quantity in quantities(recording.radar, chirps).items():
-                _put(file, name, quantity.values if quantity.values.ndim > 1 else quantity.values[None])
+                _put(
+                    file,
+                    name,
+                    quantity.values if quantity.values.ndim > 1 else quantity.values[None],
+                )
             struct = file.create_group("radar")
             struct.attrs["MATLAB_class"] = np.bytes_("struct")
             for name, value in scalars(recording.radar).items():
@@ -70,7 +85,9 @@ def read_mat(path: Path) -> IfCube:
 
 
 def _put(place: Any, name: str, values: ArrayLike) -> None:
-    place.create_dataset(name, data=np.asarray(values, dtype="<f8").T).attrs["MATLAB_class"] = np.bytes_("double")
+    place.create_dataset(name, data=np.asarray(values, dtype="<f8").T).attrs["MATLAB_class"] = (
+        np.bytes_("double")
+    )
 
 
 def _put_text(place: Any, name: str, text: str) -> None:

@@ -8,7 +8,16 @@ from typing import Any
 import h5py
 import numpy as np
 
-from rtradar.exchange.recording import IF_AXES, IF_UNIT, IfCube, IfRecording, quantities, radar_of, radar_text, scalars
+from rtradar.exchange.recording import (
+    IF_AXES,
+    IF_UNIT,
+    IfCube,
+    IfRecording,
+    quantities,
+    radar_of,
+    radar_text,
+    scalars,
+)
 from rtradar.system.files import LastingFile, atomic_file, open_regular, stored
 
 _PARTS = ("if_real", "if_imag")
@@ -26,7 +35,11 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
     shape = recording.shape
     chunk = (recording.step, *shape[1:])
     layout: dict[str, Any] = {"libver": ("earliest", "v108"), "track_order": True}
-    with atomic_file(path) as raw, LastingFile(raw) as written, h5py.File(written, "w", **layout) as file:
+    with (
+        atomic_file(path) as raw,
+        LastingFile(raw) as written,
+        h5py.File(written, "w", **layout) as file,
+    ):
         for name, length in (*zip(IF_AXES, shape, strict=True), ("xyz", 3)):
             axis = file.create_dataset(name, data=np.arange(length))
             axis.make_scale(name)
@@ -37,7 +50,9 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         parts = []
         for name, meaning in zip(_PARTS, ("real (I)", "imaginary (Q)"), strict=True):
             part = file.create_dataset(name, shape, "<f4", chunks=chunk)
-            parts.append(_described(file, part, IF_AXES, IF_UNIT, f"{meaning} part of the IF samples"))
+            parts.append(
+                _described(file, part, IF_AXES, IF_UNIT, f"{meaning} part of the IF samples")
+            )
         for name, quantity in quantities(recording.radar, shape[0]).items():
             data = file.create_dataset(name, data=quantity.values)
             _described(file, data, quantity.axes, quantity.unit, quantity.meaning)
@@ -48,7 +63,9 @@ def write_netcdf(path: Path, recording: IfRecording) -> dict[str, Any]:
         file.attrs["title"], file.attrs["radar"] = recording.name, radar_text(recording.radar)
         for first, block in recording.blocks("writing"):
             for part, values in zip(parts, (block.real, block.imag), strict=True):
-                whole = np.zeros(chunk, dtype=np.float32)  # as chunks at the end of an axis are in the file
+                whole = np.zeros(
+                    chunk, dtype=np.float32
+                )  # as chunks at the end of an axis are in the file
                 whole[: len(block)] = values
                 part.id.write_direct_chunk((first, 0, 0, 0), whole.tobytes())
             written.check()

@@ -81,7 +81,9 @@ class IfRecording:
     def blocks(self, doing: str) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         """First chirp and samples (chirp, tx, rx, sample) of one stretch after the other, with a bar on a terminal."""
         chirps, tx, rx, samples = self.shape
-        for first in tqdm(range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None):
+        for first in tqdm(
+            range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None
+        ):
             last = min(first + self.step, chirps)
             yield first, self.read(first * tx, last * tx).reshape(last - first, tx, rx, samples)
 
@@ -118,12 +120,16 @@ def open_recording(folder: Path) -> IfRecording:
 
     check_whole(folder)
     if not os.path.isdir(folder / "if.zarr"):
-        raise InputError(f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if")
+        raise InputError(
+            f"'{folder}' holds no IF samples (if.zarr); give the folder of rtradar run --save-if"
+        )
     try:
         summary = read_json(folder / "summary.json")
         radar = Radar(**summary["parameters"]["radar"])
     except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
-        raise InputError(f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again") from None
+        raise InputError(
+            f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again"
+        ) from None
     if not summary["parameters"].get("save_if", True):
         raise InputError(
             f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, which kept none; "
@@ -139,15 +145,25 @@ def open_recording(folder: Path) -> IfRecording:
         stored = zarr.open_array(folder / "if.zarr", mode="r")
         shape, kind = stored.shape, np.dtype(stored.dtype)
     except Exception as error:  # zarr fails in many ways on a damaged folder
-        raise InputError(f"'{folder / 'if.zarr'}' cannot be read ({_short(error)}); run it again") from None
-    fits = len(shape) == 3 and shape[1:] == (radar.n_rx, radar.samples_per_chirp) and shape[0] >= radar.n_tx
+        raise InputError(
+            f"'{folder / 'if.zarr'}' cannot be read ({_short(error)}); run it again"
+        ) from None
+    fits = (
+        len(shape) == 3
+        and shape[1:] == (radar.n_rx, radar.samples_per_chirp)
+        and shape[0] >= radar.n_tx
+    )
     if not fits or kind != np.complex64:
         raise InputError(
             f"'{folder / 'if.zarr'}' holds {kind} {shape}; the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
             f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
         )
     chunk_bytes = math.prod(stored.chunks) * kind.itemsize
-    if stored.nbytes > _MOST_BYTES or chunk_bytes > _MOST_CHUNK_BYTES or largest > 2 * chunk_bytes + _MOST_TEXT_BYTES:
+    if (
+        stored.nbytes > _MOST_BYTES
+        or chunk_bytes > _MOST_CHUNK_BYTES
+        or largest > 2 * chunk_bytes + _MOST_TEXT_BYTES
+    ):
         raise InputError(
             f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, as no run writes; run it again"
         )
@@ -166,7 +182,9 @@ def _largest_file(store: Path) -> int:
     for folder, folders, names in os.walk(store):
         for name in (*folders, *names):
             status = os.lstat(os.path.join(folder, name))
-            if not (stat.S_ISREG(status.st_mode) or (name in folders and stat.S_ISDIR(status.st_mode))):
+            if not (
+                stat.S_ISREG(status.st_mode) or (name in folders and stat.S_ISDIR(status.st_mode))
+            ):
                 raise ValueError(f"'{name}' in it is a link, a pipe or a device")
             if stat.S_ISREG(status.st_mode):
                 largest = max(largest, status.st_size)
@@ -204,9 +222,16 @@ def quantities(radar: Radar, chirps: int) -> dict[str, Quantity]:
             "s",
             "centre of each chirp since the start of the capture",
         ),
-        "sample_time": Quantity(("sample",), samples, "s", "time of each sample since the chirp began"),
+        "sample_time": Quantity(
+            ("sample",), samples, "s", "time of each sample since the chirp began"
+        ),
         "tx_position": Quantity(("tx", "xyz"), radar.tx, "m", "place of each Tx, world axes"),
-        "rx_position": Quantity(("tx", "rx", "xyz"), radar.rx[radar.rx_of_tx], "m", "place of each Rx that listens to a Tx"),
+        "rx_position": Quantity(
+            ("tx", "rx", "xyz"),
+            radar.rx[radar.rx_of_tx],
+            "m",
+            "place of each Rx that listens to a Tx",
+        ),
     }
 
 

@@ -94,24 +94,49 @@ def _described(value: Any, names: Iterable[str], seen: dict[int, int]) -> _Descr
     if isinstance(value, set | frozenset):
         return "set", *sorted(_described(item, names, seen) for item in value)
     if isinstance(value, dict):
-        return "dict", *((key, _described(item, names, seen)) for key, item in sorted(value.items()))
+        return "dict", *(
+            (key, _described(item, names, seen)) for key, item in sorted(value.items())
+        )
     if isinstance(value, np.ndarray):
-        return "array", value.dtype.str, value.shape, value.strides, hashlib.sha256(value.tobytes()).hexdigest()
+        return (
+            "array",
+            value.dtype.str,
+            value.shape,
+            value.strides,
+            hashlib.sha256(value.tobytes()).hexdigest(),
+        )
     if isinstance(value, CodeType):
         return "code", _code_digest(value)
-    home = value.__name__ if isinstance(value, ModuleType) else str(getattr(value, "__module__", None))
-    if isinstance(value, ModuleType | type | FunctionType | BuiltinFunctionType) and home.partition(".")[0] in _LIBRARIES:
+    home = (
+        value.__name__ if isinstance(value, ModuleType) else str(getattr(value, "__module__", None))
+    )
+    if (
+        isinstance(value, ModuleType | type | FunctionType | BuiltinFunctionType)
+        and home.partition(".")[0] in _LIBRARIES
+    ):
         return "library", home, getattr(value, "__qualname__", "")
     # Functions may call themselves and each other.
     if id(value) in seen:
         return "again", seen[id(value)]
     seen[id(value)] = len(seen)
     if isinstance(value, ModuleType):
-        return "module", *((name, _described(getattr(value, name), names, seen)) for name in names if hasattr(value, name))
+        return "module", *(
+            (name, _described(getattr(value, name), names, seen))
+            for name in names
+            if hasattr(value, name)
+        )
     if isinstance(value, FunctionType):
-        return "function", _described(_options.get(value), (), seen), _described_function(value, seen)
+        return (
+            "function",
+            _described(_options.get(value), (), seen),
+            _described_function(value, seen),
+        )
     if is_jitted(value):
-        return "compiled", _described(value.targetoptions, (), seen), _described(value.py_func, (), seen)
+        return (
+            "compiled",
+            _described(value.targetoptions, (), seen),
+            _described(value.py_func, (), seen),
+        )
     raise UnknownCodeError(f"a compiled function uses what has no stamp: {value!r:.80}")
 
 
@@ -119,19 +144,30 @@ def _described_function(function: FunctionType, seen: dict[int, int]) -> _Descri
     code = function.__code__
     # Of attributes, too, which share names with globals now and then: then the stamp covers more than it must.
     names = sorted(_names(code))
-    used: dict[str, Any] = {name: function.__globals__[name] for name in names if name in function.__globals__}
-    used |= {name: cell.cell_contents for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True)}
+    used: dict[str, Any] = {
+        name: function.__globals__[name] for name in names if name in function.__globals__
+    }
+    used |= {
+        name: cell.cell_contents
+        for name, cell in zip(code.co_freevars, function.__closure__ or (), strict=True)
+    }
     return _described((code, function.__defaults__, function.__kwdefaults__, used), names, seen)
 
 
 @cache
 def _code_digest(code: CodeType) -> str:
     """Of bytecode and of the constants in it; not of line numbers and file names, which do not go into machine code."""
-    parts = *(getattr(code, name) for name in _CODE), code.co_flags & _CODE_FLAGS, _described(code.co_consts, (), {})
+    parts = (
+        *(getattr(code, name) for name in _CODE),
+        code.co_flags & _CODE_FLAGS,
+        _described(code.co_consts, (), {}),
+    )
     return hashlib.sha256(repr(parts).encode()).hexdigest()
 
 
 @cache
 def _names(code: CodeType) -> frozenset[str]:
     """Names of globals and attributes in a function and in those inside it."""
-    return frozenset(code.co_names).union(*(_names(item) for item in code.co_consts if isinstance(item, CodeType)))
+    return frozenset(code.co_names).union(
+        *(_names(item) for item in code.co_consts if isinstance(item, CodeType))
+    )

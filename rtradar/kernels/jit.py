@@ -24,7 +24,9 @@ class CacheWarning(UserWarning):
     """Compiled code cannot be kept on disk: what is done is right, but the next process compiles again."""
 
 
-def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
+def compiled(
+    *, parallel: bool = False, fastmath: bool | set[str] = False
+) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
     It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code is loaded again for as long as
@@ -42,7 +44,9 @@ def compiled(*, parallel: bool = False, fastmath: bool | set[str] = False) -> Ca
     -------
     decorator
     """
-    numba_decorator: Callable[[_Function], Any] = njit(nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath)
+    numba_decorator: Callable[[_Function], Any] = njit(
+        nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
+    )
 
     def decorator(function: _Function) -> _Function:
         dispatcher = numba_decorator(function)
@@ -80,7 +84,7 @@ def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Func
 
 
 @inlined()
-def on_cache_lines(count, like):  # type: ignore[no-untyped-def]
+def on_cache_lines(count, like):
     """An array (count,) of the kind of ``like`` that begins where a cache line does.
 
     From elsewhere, every load of 64 bytes would touch two lines.
@@ -129,7 +133,9 @@ class _CodeOnDisk(NullCache):
         try:
             return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
         except Exception as error:
-            self._tell("no folder for it can be written" if "no locator available" in str(error) else error)
+            self._tell(
+                "no folder for it can be written" if "no locator available" in str(error) else error
+            )
             return None
 
     @property
@@ -145,7 +151,11 @@ class _CodeOnDisk(NullCache):
                 return None
             # Processes that compile for other arguments, or from another text, may have written the same file at the same time.
             stamp, arguments, code = found
-            return self._format.rebuild(target_context, code) if (stamp, arguments) == (self._stamp, sig) else None
+            return (
+                self._format.rebuild(target_context, code)
+                if (stamp, arguments) == (self._stamp, sig)
+                else None
+            )
         except Exception:  # a damaged file raises almost anything
             return None
 
@@ -181,7 +191,9 @@ class _CodeOnDisk(NullCache):
             try:
                 self._stamp = stamp_of(self._dispatcher)
                 self._file = IndexDataCacheFile(  # type: ignore[no-untyped-call]
-                    cache_path=self.cache_path, filename_base=self._format.filename_base, source_stamp=self._stamp
+                    cache_path=self.cache_path,
+                    filename_base=self._format.filename_base,
+                    source_stamp=self._stamp,
                 )
             except Exception as error:
                 self._tell(error)
@@ -197,7 +209,11 @@ class _CodeOnDisk(NullCache):
         self.trouble = " ".join(told.split()) or type(why).__name__
         if not _told and multiprocessing.parent_process() is None:
             _told = True
-            warnings.warn(f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}", CacheWarning, stacklevel=2)
+            warnings.warn(
+                f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}",
+                CacheWarning,
+                stacklevel=2,
+            )
 
 
 _told = False
@@ -240,7 +256,10 @@ def try_cache() -> tuple[str, str]:
     """
     dispatcher: Any = compiled()(_increment)
     if not hasattr(dispatcher, "compile"):
-        return "nothing is compiled", "NUMBA_DISABLE_JIT is set, which makes all of it very slow: unset it"
+        return (
+            "nothing is compiled",
+            "NUMBA_DISABLE_JIT is set, which makes all of it very slow: unset it",
+        )
     cache, sig = dispatcher._cache, (types.int64,)
     cache.load_overload(sig, dispatcher.targetctx)  # as Numba does first
     dispatcher._cache = NullCache()  # whatever is there, it is compiled
@@ -254,7 +273,7 @@ def try_cache() -> tuple[str, str]:
     return f"kept, for one in {cache.cache_path}", ""
 
 
-def _increment(number):  # type: ignore[no-untyped-def]
+def _increment(number):
     return number + 1
 
 

@@ -8,13 +8,13 @@ from rtradar.kernels.jit import inlined
 
 
 @inlined()
-def dot(a, b):  # type: ignore[no-untyped-def]
+def dot(a, b):
     """Product of two vectors."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @inlined()
-def apply(matrix, vector, out):  # type: ignore[no-untyped-def]
+def apply(matrix, vector, out):
     """Fill ``out`` with the matrix times the vector."""
     x, y, z = vector[0], vector[1], vector[2]
     for i in range(3):
@@ -22,7 +22,7 @@ def apply(matrix, vector, out):  # type: ignore[no-untyped-def]
 
 
 @inlined()
-def apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
+def apply_transposed(matrix, vector, out):
     """Fill ``out`` with the transpose of the matrix times the vector."""
     x, y, z = vector[0], vector[1], vector[2]
     for i in range(3):
@@ -30,14 +30,14 @@ def apply_transposed(matrix, vector, out):  # type: ignore[no-untyped-def]
 
 
 @inlined()
-def subtract(a, b, out):  # type: ignore[no-untyped-def]
+def subtract(a, b, out):
     """Fill ``out`` with a - b."""
     for i in range(3):
         out[i] = a[i] - b[i]
 
 
 @inlined()
-def normalize(vector):  # type: ignore[no-untyped-def]
+def normalize(vector):
     """Make a unit vector of it; its length is returned."""
     length = math.sqrt(dot(vector, vector))
     for i in range(3):

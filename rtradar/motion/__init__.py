@@ -5,4 +5,12 @@ from rtradar.motion.motion import Motion
 from rtradar.motion.placement import cut, place
 from rtradar.motion.synthetic.actor import ACTIVITIES, synthetic_motion
 
-__all__ = ["ACTIVITIES", "Motion", "cut", "load_motion", "place", "register_reader", "synthetic_motion"]
+__all__ = [
+    "ACTIVITIES",
+    "Motion",
+    "cut",
+    "load_motion",
+    "place",
+    "register_reader",
+    "synthetic_motion",
+]

@@ -17,14 +17,20 @@ from rtradar.system.registry import Registry
 READERS = Registry(
     "rtradar.readers",
     "motion reader",
-    {"amc": "rtradar.motion.load:read_amc", "bvh": "rtradar.motion.load:read_bvh", "c3d": "rtradar.motion.load:read_c3d"},
+    {
+        "amc": "rtradar.motion.load:read_amc",
+        "bvh": "rtradar.motion.load:read_bvh",
+        "c3d": "rtradar.motion.load:read_c3d",
+    },
 )
 """What reads motion files, by their ending without the dot."""
 
 register_reader = READERS.register
 
 
-def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m: float | None = None) -> Motion:
+def load_motion(
+    path: str | Path, skeleton: str | Path | None = None, *, unit_m: float | None = None
+) -> Motion:
     """Read a motion-capture recording.
 
     Parameters
@@ -53,7 +59,9 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
     name = file.suffix.lower().removeprefix(".")
     if name not in READERS:
         known = ", ".join(f".{known}" for known in READERS)
-        raise InputError(f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc with its .asf)")
+        raise InputError(
+            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc with its .asf)"
+        )
     if kind := special_kind(file):
         # Readers of other packages may take folders, and names of what is no file; nobody's may wait.
         raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
@@ -73,7 +81,9 @@ def load_motion(path: str | Path, skeleton: str | Path | None = None, *, unit_m:
 def read_amc(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
     """The reader of ``.amc``."""
     if skeleton is None:
-        raise InputError(f"{file}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)")
+        raise InputError(
+            f"{file}: an AMC file needs its skeleton; give the subject's .asf (--skeleton)"
+        )
     if unit_m is not None:
         raise InputError(f"{file}: unit_m belongs to BVH files; an ASF skeleton states its unit")
     return load_amc(file, load_skeleton(skeleton))
@@ -89,5 +99,7 @@ def read_bvh(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
 def read_c3d(file: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
     """The reader of ``.c3d``."""
     if skeleton is not None:
-        raise InputError(f"{file}: a C3D file holds markers, from which joints are found; leave {skeleton} out")
+        raise InputError(
+            f"{file}: a C3D file holds markers, from which joints are found; leave {skeleton} out"
+        )
     return load_c3d(file, unit_m)

@@ -80,16 +80,32 @@ class Motion:
         for field in ("offsets", "root_positions", "rotations"):
             array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
             if not all(np.isfinite(rows).all() for (rows,) in in_blocks(array)):
-                raise InputError(f"Motion {self.name}: {field} holds NaN or infinity; every value must be finite")
+                raise InputError(
+                    f"Motion {self.name}: {field} holds NaN or infinity; every value must be finite"
+                )
             object.__setattr__(self, field, array)
         count, frames = len(self.joints), len(self.root_positions)
-        for field, shape in (("offsets", (count, 3)), ("root_positions", (frames, 3)), ("rotations", (frames, count, 4))):
+        for field, shape in (
+            ("offsets", (count, 3)),
+            ("root_positions", (frames, 3)),
+            ("rotations", (frames, count, 4)),
+        ):
             if getattr(self, field).shape != shape or not frames or not count:
-                raise InputError(f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must be {shape}")
+                raise InputError(
+                    f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must be {shape}"
+                )
         if len(set(self.joints)) != count:
-            raise InputError(f"Motion {self.name}: joint names repeat; every joint needs its own name")
-        if len(self.parents) != count or self.parents[0] != -1 or any(not 0 <= p < j for j, p in enumerate(self.parents) if j):
-            raise InputError(f"Motion {self.name}: parents must name one root first (-1), and stand before their children")
+            raise InputError(
+                f"Motion {self.name}: joint names repeat; every joint needs its own name"
+            )
+        if (
+            len(self.parents) != count
+            or self.parents[0] != -1
+            or any(not 0 <= p < j for j, p in enumerate(self.parents) if j)
+        ):
+            raise InputError(
+                f"Motion {self.name}: parents must name one root first (-1), and stand before their children"
+            )
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
             raise InputError(f"Motion {self.name}: rate_hz = {self.rate_hz}; it must be positive")
         object.__setattr__(self, "rotations", sign_continuous(self.rotations))
@@ -97,9 +113,13 @@ class Motion:
         extremes = np.array([(norm.min(), norm.max()) for norm in norms])
         least, largest = extremes[:, 0].min(), extremes[:, 1].max()
         if least < 1 - 1e-6 or largest > 1 + 1e-6:
-            raise InputError(f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})")
+            raise InputError(
+                f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})"
+            )
         last = self.first_frame_s + (frames - 1) / self.rate_hz
-        if self.first_frame_s > 0 or (self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S):
+        if self.first_frame_s > 0 or (
+            self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S
+        ):
             raise InputError(
                 f"Motion {self.name}: frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to {self.length_s} s"
             )
@@ -121,7 +141,9 @@ class Motion:
     @cached_property
     def positions(self) -> NDArray[np.float64]:
         """Joints at the frames, (frame, joint, 3) [m], world."""
-        return file_backed(self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations))
+        return file_backed(
+            self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations)
+        )
 
     # -- at any time -----------------------------------------------------------------------------------------------
 
@@ -153,28 +175,49 @@ class Motion:
         InputError
             Where a time lies outside [0, duration_s].
         """
-        from rtradar.motion.posing import pose  # Numba is loaded when poses are asked for, not to read a file
+        from rtradar.motion.posing import (
+            pose,
+        )  # Numba is loaded when poses are asked for, not to read a file
 
         instants = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if instants.ndim != 1:
-            raise InputError(f"Motion.at: times have shape {instants.shape}; they must be one-dimensional")
+            raise InputError(
+                f"Motion.at: times have shape {instants.shape}; they must be one-dimensional"
+            )
         ok = (instants >= -_TIME_SLACK_S) & (instants <= self.duration_s + _TIME_SLACK_S)
         if not ok.all():
             wrong = instants[~ok][0]
-            raise InputError(f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to {self.duration_s:.6g} s")
+            raise InputError(
+                f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to {self.duration_s:.6g} s"
+            )
         instants = np.clip(instants, 0.0, self.duration_s)
         if len(self.root_positions) == 1:
             quaternions = np.repeat(self.rotations, len(instants), axis=0)
-            return self._forward(np.repeat(self.root_positions, len(instants), axis=0), quaternions), quaternions
+            return self._forward(
+                np.repeat(self.root_positions, len(instants), axis=0), quaternions
+            ), quaternions
         positions = np.empty((len(instants), len(self.joints), 3))
         quaternions = np.empty((len(instants), len(self.joints), 4))
-        stretches = np.floor((instants - self.first_frame_s) * self.rate_hz / _STRETCH_FRAMES).astype(np.int64)
-        skeleton = np.ascontiguousarray(self.offsets, dtype=np.float64), np.asarray(self.parents, dtype=np.int64)
+        stretches = np.floor(
+            (instants - self.first_frame_s) * self.rate_hz / _STRETCH_FRAMES
+        ).astype(np.int64)
+        skeleton = (
+            np.ascontiguousarray(self.offsets, dtype=np.float64),
+            np.asarray(self.parents, dtype=np.int64),
+        )
         for stretch in sorted(set(stretches.tolist())):
             here = np.flatnonzero(stretches == stretch)
             root, rotation = self._splines(stretch)
             cubics = root.c, rotation.c.reshape(*rotation.c.shape[:2], -1)
-            pose(instants, here, root.x, *cubics, *skeleton, positions, quaternions.reshape(len(instants), -1))
+            pose(
+                instants,
+                here,
+                root.x,
+                *cubics,
+                *skeleton,
+                positions,
+                quaternions.reshape(len(instants), -1),
+            )
         return positions, quaternions
 
     def _splines(self, stretch: int) -> tuple[PPoly, PPoly]:
@@ -184,8 +227,14 @@ class Motion:
             if found is None:
                 first = max(0, stretch * _STRETCH_FRAMES - _STRETCH_MARGIN)
                 frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
-                times = self.first_frame_s + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
-                found = PchipInterpolator(times, self.root_positions[frames]), CubicSpline(times, self.rotations[frames])
+                times = (
+                    self.first_frame_s
+                    + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
+                )
+                found = (
+                    PchipInterpolator(times, self.root_positions[frames]),
+                    CubicSpline(times, self.rotations[frames]),
+                )
                 release_pages(self.root_positions, self.rotations)
                 while len(self._kept_splines) >= _STRETCHES_KEPT:
                     self._kept_splines.pop(next(iter(self._kept_splines)))
@@ -196,7 +245,9 @@ class Motion:
     def _kept_splines(self) -> dict[int, tuple[PPoly, PPoly]]:
         return {}
 
-    def _forward(self, roots: NDArray[np.float64], quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _forward(
+        self, roots: NDArray[np.float64], quaternions: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         positions = rotate(quaternions, self.offsets)
         positions[:, 0] = roots
         for joint, parent in enumerate(self.parents[1:], start=1):
@@ -220,7 +271,9 @@ class Motion:
         if not (math.isfinite(factor) and factor > 0):
             raise InputError(f"Motion.scaled: factor = {factor}; it must be positive")
         moved = file_backed(roots * factor for (roots,) in in_blocks(self.root_positions))
-        return dataclasses.replace(self, offsets=self.offsets * factor, root_positions=moved, girth=self.girth * factor)
+        return dataclasses.replace(
+            self, offsets=self.offsets * factor, root_positions=moved, girth=self.girth * factor
+        )
 
     def turned(self, yaw_rad: float) -> Motion:
         """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above.
@@ -243,7 +296,9 @@ class Motion:
 
         return dataclasses.replace(
             self,
-            root_positions=file_backed(rotate(half, roots) for (roots,) in in_blocks(self.root_positions)),
+            root_positions=file_backed(
+                rotate(half, roots) for (roots,) in in_blocks(self.root_positions)
+            ),
             rotations=file_backed(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
         )
 
@@ -259,5 +314,8 @@ class Motion:
         -------
         Motion
         """
-        moved = file_backed(roots + np.asarray(by_m, dtype=np.float64) for (roots,) in in_blocks(self.root_positions))
+        moved = file_backed(
+            roots + np.asarray(by_m, dtype=np.float64)
+            for (roots,) in in_blocks(self.root_positions)
+        )
         return dataclasses.replace(self, root_positions=moved)

@@ -61,7 +61,11 @@ def place(
         Where the interval is not inside the recording.
     """
     _check(motion, start_s, duration_s, heading_deg)
-    length = motion.duration_s - start_s if duration_s is None else min(duration_s, motion.duration_s - start_s)
+    length = (
+        motion.duration_s - start_s
+        if duration_s is None
+        else min(duration_s, motion.duration_s - start_s)
+    )
     part = cut(motion, start_s, length)
     nodes = to_nodes(part)
     inside = (part.frame_times >= -1e-9) & (part.frame_times <= length + 1e-9)
@@ -127,7 +131,9 @@ def hip_headings(nodes: Motion) -> NDArray[np.float64]:
     """Horizontal unit vectors (frame, 2) that the hips face: from right to left hip, turned clockwise by 90 degrees."""
     hips = [column(nodes.positions, NODES.index(hip)) for hip in ("l_hip", "r_hip")]
     left = hips[0][:, :2] - hips[1][:, :2]
-    return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
+    return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(
+        np.linalg.norm(left, axis=1, keepdims=True), 1e-9
+    )
 
 
 def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -139,11 +145,15 @@ def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
     # Where the headings cancel out their mean says nothing, and the first frame stands for it.
     along = mean if float(np.linalg.norm(mean)) > 1e-6 else headings[0]
     to_the_left = along[0] * headings[:, 1] - along[1] * headings[:, 0]
-    angle = math.atan2(along[1], along[0]) + float(np.median(np.arctan2(to_the_left, headings @ along)))
+    angle = math.atan2(along[1], along[0]) + float(
+        np.median(np.arctan2(to_the_left, headings @ along))
+    )
     return np.array([math.cos(angle), math.sin(angle)])
 
 
-def walk_direction(roots: NDArray[np.float64], headings: NDArray[np.float64]) -> NDArray[np.float64] | None:
+def walk_direction(
+    roots: NDArray[np.float64], headings: NDArray[np.float64]
+) -> NDArray[np.float64] | None:
     """Direction (2,) of a walk, or None where it is none.
 
     It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a way not longer than

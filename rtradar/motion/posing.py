@@ -8,7 +8,7 @@ from rtradar.kernels.jit import compiled
 
 
 @compiled(fastmath={"contract"})
-def pose(times, which, knots, root, rotation, offsets, parents, positions, quaternions):  # type: ignore[no-untyped-def]
+def pose(times, which, knots, root, rotation, offsets, parents, positions, quaternions):
     """Fill ``positions (time, joint, 3)`` and ``quaternions (time, joint * 4)`` for those of ``times`` that are ``which``.
 
     ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power, interval, joint * 4)`` are the
@@ -20,7 +20,12 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
         interval = min(max(int((times[which[k]] - knots[0]) * rate), 0), last)
         t = times[which[k]] - knots[interval]
         own, place = quaternions[which[k]], positions[which[k]]
-        c3, c2, c1, c0 = rotation[0, interval], rotation[1, interval], rotation[2, interval], rotation[3, interval]
+        c3, c2, c1, c0 = (
+            rotation[0, interval],
+            rotation[1, interval],
+            rotation[2, interval],
+            rotation[3, interval],
+        )
         for i in range(len(own)):
             own[i] = c0[i] + t * (c1[i] + t * (c2[i] + t * c3[i]))
         r3, r2, r1, r0 = root[0, interval], root[1, interval], root[2, interval], root[3, interval]
@@ -28,7 +33,9 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
             place[0, axis] = r0[axis] + t * (r1[axis] + t * (r2[axis] + t * r3[axis]))
         for joint in range(len(parents)):
             four = own[4 * joint : 4 * joint + 4]
-            scale = 1 / math.sqrt(four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3])
+            scale = 1 / math.sqrt(
+                four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]
+            )
             for i in range(4):
                 four[i] *= scale
             if joint > 0:

@@ -27,7 +27,10 @@ def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
     a, b, c = (vectors[..., k] for k in range(3))
     # Rodrigues' form v + w t + u x t with t = 2 u x v; numpy.cross is several times slower on short last axes.
     tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
-    return np.stack([a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx], axis=-1)
+    return np.stack(
+        [a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx],
+        axis=-1,
+    )
 
 
 def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -45,7 +48,9 @@ def _turned_over(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float6
         yield frames * signs[..., None]
 
 
-def _sides(quaternions: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+def _sides(
+    quaternions: NDArray[np.float64],
+) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
     """Some frames at a time, and whether each is in the half-space of the frame before it; the first frame is in its own."""
     before = quaternions[:1]
     for (frames,) in in_blocks(quaternions):

@@ -64,13 +64,21 @@ def to_nodes(motion: Motion) -> Motion:
     bones |= _spine(motion, joints["root"], joints["thorax"])
     if convention.open_ended:
         for side in ("l", "r"):
-            bones[f"{side}_toe"] = _foot(motion, joints[f"{side}_ankle"], bones[f"{side}_toe"], joints[f"{side}_toe"])
+            bones[f"{side}_toe"] = _foot(
+                motion, joints[f"{side}_ankle"], bones[f"{side}_toe"], joints[f"{side}_toe"]
+            )
             forearm = bones[f"{side}_wrist"].length
-            bones[f"{side}_hand"] = _extended(motion, bones[f"{side}_hand"], joints, f"{side}_wrist", forearm * HAND_OF_FOREARM)
-        bones["head"] = _extended(motion, bones["head"], joints, "neck", bones["l_knee"].length * HEAD_OF_THIGH)
+            bones[f"{side}_hand"] = _extended(
+                motion, bones[f"{side}_hand"], joints, f"{side}_wrist", forearm * HAND_OF_FOREARM
+            )
+        bones["head"] = _extended(
+            motion, bones["head"], joints, "neck", bones["l_knee"].length * HEAD_OF_THIGH
+        )
     for node in NODES[1:]:
         if bones[node].length < MINIMUM_PART_M:
-            ends = [motion.joints[joints[end]] for end in (NODE_PARENT[node], node) if end in joints]
+            ends = [
+                motion.joints[joints[end]] for end in (NODE_PARENT[node], node) if end in joints
+            ]
             raise InputError(
                 f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} mm long ({' to '.join(ends)}); "
                 f"every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, mend the skeleton"
@@ -95,7 +103,12 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
     there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
     best: tuple[int, str] | None = None
     for convention in CONVENTIONS:
-        found = {node: there[name] for node, names in convention.joints.items() for name in reversed(names) if name in there}
+        found = {
+            node: there[name]
+            for node, names in convention.joints.items()
+            for name in reversed(names)
+            if name in there
+        }
         missing = [node for node in convention.joints if node not in found]
         if convention.open_ended:
             # No end site at all: the part starts and ends in one joint, and is extended from there.
@@ -108,14 +121,19 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
             return convention, found
         if best is None or len(missing) < best[0]:
             wanted = " or ".join(convention.joints[missing[0]])
-            best = (len(missing), f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name} skeleton")
+            best = (
+                len(missing),
+                f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name} skeleton",
+            )
     if best is None or best[0] > len(NODES) / 2:
         known = "; ".join(convention.name for convention in CONVENTIONS)
         raise InputError(
             f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no kind of skeleton that is "
             f"known: {known}; rename them after one of these"
         )
-    raise InputError(f"{motion.name}: {best[1]}; {len(NODES)} nodes are needed, rename or add the joint")
+    raise InputError(
+        f"{motion.name}: {best[1]}; {len(NODES)} nodes are needed, rename or add the joint"
+    )
 
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:
@@ -127,17 +145,25 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     if motion.parents[last] == first or last == first:
         return _Bone(motion.offsets[last] if last != first else np.zeros(3), carried)
 
-    def chord(positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
-        return rotate(rotations[:, last] * [-1, -1, -1, 1], positions[:, last] - positions[:, first])
+    def chord(
+        positions: NDArray[np.float64], rotations: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        return rotate(
+            rotations[:, last] * [-1, -1, -1, 1], positions[:, last] - positions[:, first]
+        )
 
-    chords = np.concatenate([chord(*frames) for frames in in_blocks(motion.positions, motion.rotations)])
+    chords = np.concatenate(
+        [chord(*frames) for frames in in_blocks(motion.positions, motion.rotations)]
+    )
     length = float(np.median(np.linalg.norm(chords, axis=1)))
     if length < MINIMUM_PART_M:
         return _Bone(np.array([0.0, 0.0, length]), carried)
     rest = np.median(_directions(chords), axis=0)
     rest /= max(float(np.linalg.norm(rest)), 1e-12)
 
-    def pointing(positions: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+    def pointing(
+        positions: NDArray[np.float64], rotations: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
         # The smallest turn that takes the rest direction to where the chord points in this frame.
         directions = _directions(chord(positions, rotations))
         swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
@@ -154,8 +180,14 @@ def _directions(chords: NDArray[np.float64]) -> NDArray[np.float64]:
 
 def multiply(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Product of quaternions (..., 4), scalar last: first ``right``, then ``left``."""
-    vector = left[..., 3:] * right[..., :3] + right[..., 3:] * left[..., :3] + np.cross(left[..., :3], right[..., :3])
-    scalar = left[..., 3:] * right[..., 3:] - np.sum(left[..., :3] * right[..., :3], axis=-1, keepdims=True)
+    vector = (
+        left[..., 3:] * right[..., :3]
+        + right[..., 3:] * left[..., :3]
+        + np.cross(left[..., :3], right[..., :3])
+    )
+    scalar = left[..., 3:] * right[..., 3:] - np.sum(
+        left[..., :3] * right[..., :3], axis=-1, keepdims=True
+    )
     return np.concatenate([vector, scalar], axis=-1)
 
 
@@ -174,12 +206,26 @@ def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
     lengths = np.linalg.norm(motion.offsets[chain[1:]], axis=1)
     heights = np.concatenate([[0.0], np.cumsum(lengths)])
     # Joints that coincide count once; the last of them bends the next bone. The thorax itself always stays.
-    distinct = [0, *(k for k in range(1, len(chain) - 1) if MINIMUM_PART_M < heights[k] < heights[-1] - MINIMUM_PART_M)]
-    distinct = [k for n, k in enumerate(distinct) if n == 0 or heights[k] - heights[distinct[n - 1]] > MINIMUM_PART_M]
+    distinct = [
+        0,
+        *(
+            k
+            for k in range(1, len(chain) - 1)
+            if MINIMUM_PART_M < heights[k] < heights[-1] - MINIMUM_PART_M
+        ),
+    ]
+    distinct = [
+        k
+        for n, k in enumerate(distinct)
+        if n == 0 or heights[k] - heights[distinct[n - 1]] > MINIMUM_PART_M
+    ]
     distinct.append(len(chain) - 1)
     while len(distinct) > 4:
         inner = distinct[1:-1]
-        spare = max(inner, key=lambda k: min(abs(heights[k] / heights[-1] - third) for third in (1 / 3, 2 / 3)))
+        spare = max(
+            inner,
+            key=lambda k: min(abs(heights[k] / heights[-1] - third) for third in (1 / 3, 2 / 3)),
+        )
         distinct.remove(spare)
     pieces = [(chain[a], chain[b], 1.0) for a, b in itertools.pairwise(distinct)]
     spans = [heights[b] - heights[a] for a, b in itertools.pairwise(distinct)]
@@ -201,7 +247,9 @@ def _foot(motion: Motion, ankle: int, foot: _Bone, toe: int) -> _Bone:
     return _Bone(foot.offset * (1 + TOES_OF_FOOT), foot.rotations) if ends_at_ball else foot
 
 
-def _extended(motion: Motion, end: _Bone, joints: Mapping[str, int], base: str, length: float) -> _Bone:
+def _extended(
+    motion: Motion, end: _Bone, joints: Mapping[str, int], base: str, length: float
+) -> _Bone:
     """An end part as it is, or, where the skeleton gives it no length, straight on from the bone before it.
 
     Straight on is meant in the axes of the joint at its base: in the rest pose of a BVH these are the same for both.

@@ -13,7 +13,12 @@ from dataclasses import dataclass
 
 _LEGS_AND_ARMS = {
     side: (
-        {f"{side}_hip": "root", f"{side}_knee": f"{side}_hip", f"{side}_ankle": f"{side}_knee", f"{side}_toe": f"{side}_ankle"},
+        {
+            f"{side}_hip": "root",
+            f"{side}_knee": f"{side}_hip",
+            f"{side}_ankle": f"{side}_knee",
+            f"{side}_toe": f"{side}_ankle",
+        },
         {
             f"{side}_shoulder": "thorax",
             f"{side}_elbow": f"{side}_shoulder",
@@ -68,13 +73,21 @@ CHAIN_24: Mapping[str, str] = {
 }
 """The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) where each stands."""
 
-_NODE_OF_24 = {"pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax", "head": "neck"} | {
-    f"{side}_foot": f"{side}_toe" for side in ("l", "r")
-}
+_NODE_OF_24 = {
+    "pelvis": "root",
+    "spine1": "lowerback",
+    "spine2": "upperback",
+    "spine3": "thorax",
+    "head": "neck",
+} | {f"{side}_foot": f"{side}_toe" for side in ("l", "r")}
 _NOT_SEPARATED = ("neck", "l_collar", "r_collar")
 
 ASF_JOINTS: Mapping[str, str] = {
-    **{_NODE_OF_24.get(name, name): joint for name, joint in CHAIN_24.items() if name not in _NOT_SEPARATED},
+    **{
+        _NODE_OF_24.get(name, name): joint
+        for name, joint in CHAIN_24.items()
+        if name not in _NOT_SEPARATED
+    },
     "head": "head",
 }
 """HDM05 joint of each of the 22 nodes."""
@@ -93,7 +106,9 @@ class Convention:
     open_ended: bool
 
 
-def _both(left: Mapping[str, tuple[str, ...]], left_word: str, right_word: str) -> dict[str, tuple[str, ...]]:
+def _both(
+    left: Mapping[str, tuple[str, ...]], left_word: str, right_word: str
+) -> dict[str, tuple[str, ...]]:
     """Names of both sides from templates with ``@`` where the side stands."""
     return {
         f"{side}_{node}": tuple(name.replace("@", word) for name in names)
@@ -105,7 +120,11 @@ def _both(left: Mapping[str, tuple[str, ...]], left_word: str, right_word: str) 
 CONVENTIONS: tuple[Convention, ...] = (
     Convention(
         "ASF (HDM05, CMU)",
-        {node: (joint,) for node, joint in ASF_JOINTS.items() if node not in ("lowerback", "upperback")},
+        {
+            node: (joint,)
+            for node, joint in ASF_JOINTS.items()
+            if node not in ("lowerback", "upperback")
+        },
         open_ended=False,
     ),
     Convention(
@@ -129,7 +148,12 @@ CONVENTIONS: tuple[Convention, ...] = (
     ),
     Convention(
         "CMU BVH, MotionBuilder, Mixamo",
-        {"root": ("hips",), "thorax": ("neck",), "neck": ("neck1", "head"), "head": ("headtopend", "headend")}
+        {
+            "root": ("hips",),
+            "thorax": ("neck",),
+            "neck": ("neck1", "head"),
+            "head": ("headtopend", "headend"),
+        }
         | _both(
             {
                 "hip": ("@upleg",),
@@ -139,7 +163,14 @@ CONVENTIONS: tuple[Convention, ...] = (
                 "shoulder": ("@arm",),
                 "elbow": ("@forearm",),
                 "wrist": ("@hand",),
-                "hand": ("@handmiddle3", "@handmiddle2", "@handmiddle1", "@handindex1end", "@handindex1", "@handend"),
+                "hand": (
+                    "@handmiddle3",
+                    "@handmiddle2",
+                    "@handmiddle1",
+                    "@handindex1end",
+                    "@handindex1",
+                    "@handend",
+                ),
             },
             "left",
             "right",

@@ -24,7 +24,9 @@ class LevelAgreement(NamedTuple):
     rms_db: float
 
 
-def level_agreement(power: ArrayLike, reference: ArrayLike, where: NDArray[np.bool_]) -> LevelAgreement:
+def level_agreement(
+    power: ArrayLike, reference: ArrayLike, where: NDArray[np.bool_]
+) -> LevelAgreement:
     """Compare two power maps in decibels over the cells that count.
 
     Parameters
@@ -38,19 +40,25 @@ def level_agreement(power: ArrayLike, reference: ArrayLike, where: NDArray[np.bo
     -------
     LevelAgreement
     """
-    ours, other = (10 * np.log10(np.asarray(values)[where].astype(np.float64)) for values in (power, reference))
+    ours, other = (
+        10 * np.log10(np.asarray(values)[where].astype(np.float64)) for values in (power, reference)
+    )
     if not ours.size:
         return LevelAgreement(np.nan, np.nan, np.nan)
     difference = ours - other
     flat = ours.size < 2 or np.ptp(ours) == 0 or np.ptp(other) == 0
     correlation = np.nan if flat else float(np.corrcoef(ours, other)[0, 1])
-    return LevelAgreement(correlation, float(difference.mean()), float(np.sqrt((difference**2).mean())))
+    return LevelAgreement(
+        correlation, float(difference.mean()), float(np.sqrt((difference**2).mean()))
+    )
 
 
 def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
     """Cells 10 dB or more above the median, which is noise in a map of one person, and at most 60 dB below the peak."""
     values = np.asarray(power)
-    return np.asarray(values > max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0))))
+    return np.asarray(
+        values > max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0)))
+    )
 
 
 def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: ArrayLike) -> float:
@@ -73,6 +81,8 @@ def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: A
 
     if not len(points) or not len(reference):
         return 0.0 if len(points) == len(reference) else np.inf
-    ours, other = (np.asarray(cloud) / np.asarray(bins, dtype=np.float64) for cloud in (points, reference))
+    ours, other = (
+        np.asarray(cloud) / np.asarray(bins, dtype=np.float64) for cloud in (points, reference)
+    )
     there, back = KDTree(other).query(ours)[0], KDTree(ours).query(other)[0]
     return float(there.mean() + back.mean()) / 2

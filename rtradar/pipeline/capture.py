@@ -120,21 +120,34 @@ class Capture:
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
                 apart = separate(received, radar, first)
-                return with_cpu_fallback(partial(range_spectrum, apart, radar, out=transformed[:n]), self.fft_devices.range)
+                return with_cpu_fallback(
+                    partial(range_spectrum, apart, radar, out=transformed[:n]),
+                    self.fft_devices.range,
+                )
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):
                 echoes = self.model.echoes(chirps)
             for begin in range(0, len(chirps), piece):
-                taker.take(spectra(chirps_of(echoes, begin, begin + piece), int(chirps[begin])), int(chirps[begin]))
+                taker.take(
+                    spectra(chirps_of(echoes, begin, begin + piece), int(chirps[begin])),
+                    int(chirps[begin]),
+                )
 
         # In functions, for what a loop leaves bound would still be held while the next block is made.
         silent = None if progress else True  # None: where there is no terminal
-        for first in tqdm(range(0, self.n_chirps, self.block), desc=self.title, unit="block", disable=silent):
+        for first in tqdm(
+            range(0, self.n_chirps, self.block), desc=self.title, unit="block", disable=silent
+        ):
             take(np.arange(first, min(first + self.block, self.n_chirps)))
 
 
 def chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     """Those of some chirps of the block."""
     chirps = slice(begin, end)
-    return dataclasses.replace(echoes, length=echoes.length[chirps], amplitude=echoes.amplitude[:, chirps], tx=echoes.tx[chirps])
+    return dataclasses.replace(
+        echoes,
+        length=echoes.length[chirps],
+        amplitude=echoes.amplitude[:, chirps],
+        tx=echoes.tx[chirps],
+    )

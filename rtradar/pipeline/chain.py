@@ -175,8 +175,17 @@ def run(
         keep_all=keep_all,
     )
     radar, body, inside = capture.radar, capture.body, capture.inside
-    windows, n_chirps, warmup_s, title = capture.windows, capture.n_chirps, capture.warmup_s, capture.title
-    received = ReceivedWindow(radar, int(windows[len(windows) // 2])) if clutter_removal != "none" else None
+    windows, n_chirps, warmup_s, title = (
+        capture.windows,
+        capture.n_chirps,
+        capture.warmup_s,
+        capture.title,
+    )
+    received = (
+        ReceivedWindow(radar, int(windows[len(windows) // 2]))
+        if clutter_removal != "none"
+        else None
+    )
     give_back_memory()  # what compiling and the pass over the whole recording took
     with atomic_folder(Path(out), RUN_FILES, overwrite=overwrite) as folder:
         products = Products(
@@ -199,7 +208,9 @@ def run(
         del products  # its windows are the largest arrays, and pictures need room
         give_back_memory()
         if not len(clouds.rdt.points):
-            warnings.warn("nothing was detected: the clouds are empty", ValidityWarning, stacklevel=2)
+            warnings.warn(
+                "nothing was detected: the clouds are empty", ValidityWarning, stacklevel=2
+            )
         with stages.time("write"):
             save_cloud_npz(folder / "cloud_rdt.npz", clouds.rdt.points)
             save_ply(folder / "cloud_rdt.ply", clouds.rdt.points)
@@ -211,7 +222,12 @@ def run(
         give_back_memory()  # what pictures took, before the view and the report take theirs
 
         def spent() -> dict[str, Any]:
-            return cost(stages, time.perf_counter() - began - warmup_s, warmup_s, n_chirps * radar.chirp_interval_s)
+            return cost(
+                stages,
+                time.perf_counter() - began - warmup_s,
+                warmup_s,
+                n_chirps * radar.chirp_interval_s,
+            )
 
         parameters = {
             "motion": motion.name,
@@ -236,7 +252,9 @@ def run(
         summary = summary_of(capture, clouds, parameters, seed, spent())
         # After the model has given its account, for looking at it once more is no part of the capture.
         with stages.time("view"):
-            save_moments(folder / "view.npz", moments(capture.model, radar, body, scene, windows, n_chirps))
+            save_moments(
+                folder / "view.npz", moments(capture.model, radar, body, scene, windows, n_chirps)
+            )
         with stages.time("report"):
             write_report(
                 folder / "report.html",

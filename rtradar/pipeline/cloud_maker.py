@@ -80,12 +80,22 @@ class CloudMaker:
     """
 
     def __init__(
-        self, radar: Radar, *, detect: Detector, seed: int, stages: Stages, removal: ClutterRemoval, doppler_device: str = "cpu"
+        self,
+        radar: Radar,
+        *,
+        detect: Detector,
+        seed: int,
+        stages: Stages,
+        removal: ClutterRemoval,
+        doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._removal = radar, detect, stages, removal
         self._doppler_device = doppler_device
         self._sliding = SlidingWindows(radar)
-        self._rdt, self._spatial = RdtCloud(radar, CLOUD_POINTS, seed), UniformSample(SPATIAL_POINTS, seed, columns=6)
+        self._rdt, self._spatial = (
+            RdtCloud(radar, CLOUD_POINTS, seed),
+            UniformSample(SPATIAL_POINTS, seed, columns=6),
+        )
         step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
         step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
         self.piece = step * max(1, int(_PIECE_BYTES / step_bytes))
@@ -118,7 +128,9 @@ class CloudMaker:
                 with stages.time("angle"):
                     angles = window_angles(cube, mask, radar)
                     found = spatial_points(angles, radar, middle)
-                    self._spatial.add(np.column_stack([found.points, found.velocity, found.power, found.time]))
+                    self._spatial.add(
+                        np.column_stack([found.points, found.velocity, found.power, found.time])
+                    )
             yield Window(middle, power, mask, angles)
 
     def finish(self) -> Clouds:
@@ -127,10 +139,14 @@ class CloudMaker:
             rdt = self._rdt.finish()
             rows = self._spatial.rows()
             rows = rows[np.argsort(rows[:, 5], kind="stable")]
-        return Clouds(rdt, SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5]), self._spatial.n_seen)
+        return Clouds(
+            rdt, SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5]), self._spatial.n_seen
+        )
 
 
-def window_angles(cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], radar: Radar) -> AngleSpectra:
+def window_angles(
+    cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], radar: Radar
+) -> AngleSpectra:
     """Angle spectra of the detected cells of one window."""
     rows, columns = np.nonzero(mask)
     velocity = radar.velocity_mps(radar.cycles_per_frame)
@@ -147,4 +163,6 @@ def _joined(pieces: list[AngleSpectra]) -> AngleSpectra:
         parts = [getattr(piece, name) for piece in pieces]
         return None if parts[0] is None else np.concatenate(parts)
 
-    return AngleSpectra(pieces[0].sines, column("y"), column("z"), column("range_m"), column("velocity"))
+    return AngleSpectra(
+        pieces[0].sines, column("y"), column("z"), column("range_m"), column("velocity")
+    )

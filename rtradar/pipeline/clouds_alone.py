@@ -69,6 +69,8 @@ def clouds_of(
         keep_all=False,
     )
     detect = build_detector("os-cfar", pfa=pfa, looks=radar.n_channels)
-    maker = CloudMaker(capture.radar, detect=detect, seed=seed, stages=capture.stages, removal=removal)
+    maker = CloudMaker(
+        capture.radar, detect=detect, seed=seed, stages=capture.stages, removal=removal
+    )
     capture.stream(maker, progress=False)
     return maker.finish(), capture.warmup_s

@@ -20,7 +20,12 @@ from rtradar.pipeline.output.output_files import comparison_files
 from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
 from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
-from rtradar.report.figures.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
+from rtradar.report.figures.side_by_side import (
+    draw_maps,
+    draw_part_power,
+    draw_power_over_time,
+    draw_rdt_clouds,
+)
 from rtradar.report.pages.comparison import write_comparison
 from rtradar.scatter import MODELS
 from rtradar.scene import Scene
@@ -67,7 +72,12 @@ class Comparison:
         rows = comparison_rows(self.summary)
         widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
         return "\n".join(
-            "  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))])
+            "  ".join(
+                [
+                    row[0].ljust(widths[0]),
+                    *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
+                ]
+            )
             for row in rows
         )
 
@@ -116,52 +126,85 @@ def compare(
     names = list(fidelities)
     for name in names:
         if name not in MODELS:
-            raise InputError(f"fidelity '{name}' is unknown; allowed: {', '.join(MODELS)} (--fidelities)")
+            raise InputError(
+                f"fidelity '{name}' is unknown; allowed: {', '.join(MODELS)} (--fidelities)"
+            )
     if len(names) < 2 or len(set(names)) < len(names):
-        raise InputError(f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)")
+        raise InputError(
+            f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)"
+        )
     kind = comparison_files(list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         for name in names:
-            shared = {"noise_power_m2": results[names[0]].summary["noise_power_m2"]} if results else {}
-            results[name] = run(motion, radar, scene, out=folder / name, fidelity=name, **options, **shared)
+            shared = (
+                {"noise_power_m2": results[names[0]].summary["noise_power_m2"]} if results else {}
+            )
+            results[name] = run(
+                motion, radar, scene, out=folder / name, fidelity=name, **options, **shared
+            )
         summary = _summary(results, folder, radar, names[-1])
         mean_power = {name: result.survey.power_at.mean(axis=0) for name, result in results.items()}
         unit = _unit(radar, summary, mean_power.values())
         pictures = _draw(results, mean_power, unit, folder, radar, names[-1])
         write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures, unit)
         summary["files"] = kind.list_of(folder)
-        (folder / "compare.json").write_text(json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        (folder / "compare.json").write_text(
+            json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8"
+        )
     return Comparison(summary, Path(out))
 
 
 def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
     """The table of a comparison as text: a heading row, then a row a measure, with a column a model."""
     fidelities = summary["fidelities"]
-    rows = [["", *(f"{name} (reference)" if name == summary["reference"] else name for name in fidelities)]]
+    rows = [
+        [
+            "",
+            *(
+                f"{name} (reference)" if name == summary["reference"] else name
+                for name in fidelities
+            ),
+        ]
+    ]
     for key, heading, digits in _MEASURES:
         values = [found[key] for found in fidelities.values()]
-        rows.append([heading, *("-" if value is None else f"{value:.{digits}f}" for value in values)])
+        rows.append(
+            [heading, *("-" if value is None else f"{value:.{digits}f}" for value in values)]
+        )
     return rows
 
 
-def _summary(results: Mapping[str, Result], folder: Path, radar: Radar, reference: str) -> dict[str, Any]:
+def _summary(
+    results: Mapping[str, Result], folder: Path, radar: Radar, reference: str
+) -> dict[str, Any]:
     first = next(iter(results.values())).summary
     return {
         "reference": reference,
-        "parameters": {key: value for key, value in first["parameters"].items() if key not in ("fidelity", "variant")},
+        "parameters": {
+            key: value
+            for key, value in first["parameters"].items()
+            if key not in ("fidelity", "variant")
+        },
         "seed": first["seed"],
         "noise_power_m2": first["noise_power_m2"],
         "versions": first["versions"],
-        "fidelities": {name: _of_one(result, results[reference], folder, radar) for name, result in results.items()},
+        "fidelities": {
+            name: _of_one(result, results[reference], folder, radar)
+            for name, result in results.items()
+        },
     }
 
 
 def _of_one(result: Result, reference: Result, folder: Path, radar: Radar) -> dict[str, Any]:
     """Every figure of one model; differences from itself are zero, which tells that the comparison works."""
     said, cost = result.summary, result.summary["stages"]
-    power = _level_db(result.survey.power_at.sum(axis=1)) - _level_db(reference.survey.power_at.sum(axis=1))
-    maps, shared, spectrogram = _map_agreement(folder / said["fidelity"], folder / reference.summary["fidelity"])
+    power = _level_db(result.survey.power_at.sum(axis=1)) - _level_db(
+        reference.survey.power_at.sum(axis=1)
+    )
+    maps, shared, spectrogram = _map_agreement(
+        folder / said["fidelity"], folder / reference.summary["fidelity"]
+    )
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     return {
         "power_mean_db": _finite(float(power.mean())),
@@ -182,7 +225,9 @@ def _of_one(result: Result, reference: Result, folder: Path, radar: Radar) -> di
         "stages": cost,
         "limits": said["limits"],
         "part_power_m2": said["part_power_m2"],
-        "part_hidden_share": dict(zip(said["part_power_m2"], result.survey.hidden_at.mean(axis=0).tolist(), strict=True)),
+        "part_hidden_share": dict(
+            zip(said["part_power_m2"], result.survey.hidden_at.mean(axis=0).tolist(), strict=True)
+        ),
     }
 
 
@@ -197,14 +242,22 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
             cells.append([maps["range_doppler"][window][union] for maps in (first, second)])
         power, other = (np.concatenate(column) for column in zip(*cells, strict=True))
         levels = level_agreement(power, other, np.ones(len(power), dtype=bool))
-        spectrogram, its = (thinned(maps, "spectrogram", "spectrogram_time")[0] for maps in (first, second))
+        spectrogram, its = (
+            thinned(maps, "spectrogram", "spectrogram_time")[0] for maps in (first, second)
+        )
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
         return levels, both / either if either else 1.0, alike
 
 
-def _unit(radar: Radar, said: Mapping[str, Any], powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
+def _unit(
+    radar: Radar, said: Mapping[str, Any], powers: Iterable[NDArray[np.floating]]
+) -> FieldUnit:
     """The unit of powers that sum over ranges, by the strongest of them; ``said`` is a summary with the parameters of the run."""
-    return field_unit(radar, spreading=said["parameters"]["spreading"], strongest_m2=max(float(one.max()) for one in powers))
+    return field_unit(
+        radar,
+        spreading=said["parameters"]["spreading"],
+        strongest_m2=max(float(one.max()) for one in powers),
+    )
 
 
 def _draw(
@@ -228,27 +281,55 @@ def _draw(
     paths = iter(drawn.values())
     surveys = {name: result.survey for name, result in results.items()}
     power = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
-    draw_power_over_time(next(paths), any_result.survey.times, power, _unit(radar, said, power.values()), reference, title)
+    draw_power_over_time(
+        next(paths),
+        any_result.survey.times,
+        power,
+        _unit(radar, said, power.values()),
+        reference,
+        title,
+    )
     hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
     draw_part_power(next(paths), list(said["part_power_m2"]), mean_power, hidden, unit, title)
     with h5py.File(folder / reference / "maps.h5") as maps:
         window = busiest_window(maps)
         moment, velocity = float(maps["time"][window]), maps["velocity"][:]
         cleaned = {name: title + removed(maps[name]) for name in ("range_doppler", "spectrogram")}
-        slow, times = maps["spectrogram_velocity"][:], thinned(maps, "spectrogram", "spectrogram_time")[1]
+        slow, times = (
+            maps["spectrogram_velocity"][:],
+            thinned(maps, "spectrogram", "spectrogram_time")[1],
+        )
     range_doppler, spectrogram = {}, {}
     for name in results:
         with h5py.File(folder / name / "maps.h5") as maps:
             range_doppler[name] = maps["range_doppler"][window]
             spectrogram[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / HANN_BINS
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
-    by_range = field_unit(radar, spreading=said["parameters"]["spreading"], range_m=radar.range_m[:, None])
-    levels = {name: by_range.level(power / radar.n_channels) for name, power in range_doppler.items()}
+    by_range = field_unit(
+        radar, spreading=said["parameters"]["spreading"], range_m=radar.range_m[:, None]
+    )
+    levels = {
+        name: by_range.level(power / radar.n_channels) for name, power in range_doppler.items()
+    }
     label = by_range.label("mean of channels")
-    draw_maps(next(paths), levels, label, across, up, f"{cleaned['range_doppler']}, window at {moment:.2f} s")
+    draw_maps(
+        next(paths),
+        levels,
+        label,
+        across,
+        up,
+        f"{cleaned['range_doppler']}, window at {moment:.2f} s",
+    )
     summed = _unit(radar, said, spectrogram.values())
     levels = {name: summed.level(power) for name, power in spectrogram.items()}
-    draw_maps(next(paths), levels, summed.label("one channel"), ("Time [s]", times), (across[0], slow), cleaned["spectrogram"])
+    draw_maps(
+        next(paths),
+        levels,
+        summed.label("one channel"),
+        ("Time [s]", times),
+        (across[0], slow),
+        cleaned["spectrogram"],
+    )
     draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
     return drawn
 

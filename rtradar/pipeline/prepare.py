@@ -61,7 +61,9 @@ def prepare(
     _check(snr_db, pfa, seed, noise_power_m2)
     if isinstance(snr_db, str):
         if not spreading:
-            raise InputError("snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)")
+            raise InputError(
+                "snr_db = physical needs the loss with distance; leave out --no-spreading (spreading=False)"
+            )
         radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
     walled = bool(scene.walls or scene.furniture)
     if variant == "auto" and has_nvidia_gpu() and (walled or takes_backend(fidelity)):
@@ -94,12 +96,27 @@ def prepare(
                     f"fidelity '{fidelity}' has no option '{next(iter(model_options))}' in scene '{scene.name}'; leave it out"
                 )
             paths = Multipath(
-                radar, body, scene, variant=variant, spreading=spreading, order=order, fidelity=fidelity, material=body_material
+                radar,
+                body,
+                scene,
+                variant=variant,
+                spreading=spreading,
+                order=order,
+                fidelity=fidelity,
+                material=body_material,
             )
             model = paths.person
         else:
             of_skin = {} if body_material == "perfect-conductor" else {"material": body_material}
-            model = build_model(fidelity, radar, body, variant=variant, spreading=spreading, **(model_options or {}), **of_skin)
+            model = build_model(
+                fidelity,
+                radar,
+                body,
+                variant=variant,
+                spreading=spreading,
+                **(model_options or {}),
+                **of_skin,
+            )
         echoes = (paths or model).echoes(np.arange(2 * radar.n_tx))
         # Not every model has specular points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
@@ -163,14 +180,24 @@ def _physical_noise(radar: Radar, echo_power_m2: float, seed: int) -> Noise:
     return Noise(power, seed)
 
 
-def _check(snr_db: float | Literal["physical"], pfa: float, seed: int, noise_power_m2: float | None) -> None:
+def _check(
+    snr_db: float | Literal["physical"], pfa: float, seed: int, noise_power_m2: float | None
+) -> None:
     if isinstance(snr_db, str):
         if snr_db != "physical":
-            raise InputError(f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)")
+            raise InputError(
+                f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)"
+            )
     elif not (-_MAX_SNR_DB <= snr_db <= _MAX_SNR_DB or snr_db == math.inf):
-        raise InputError(f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)")
+        raise InputError(
+            f"snr_db = {snr_db}; it must lie within +-{_MAX_SNR_DB:g} dB, or be inf for no noise (--snr-db)"
+        )
     if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
-        raise InputError(f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0")
+        raise InputError(
+            f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0"
+        )
     if not 0 < pfa < 1:
-        raise InputError(f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)")
+        raise InputError(
+            f"pfa = {pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)"
+        )
     check_seed("", seed)

@@ -68,7 +68,14 @@ class Products:
         doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
-        self._clouds = CloudMaker(radar, detect=detect, seed=seed, stages=stages, removal=removal, doppler_device=doppler_device)
+        self._clouds = CloudMaker(
+            radar,
+            detect=detect,
+            seed=seed,
+            stages=stages,
+            removal=removal,
+            doppler_device=doppler_device,
+        )
         self._spectrogram = SlidingSpectrogram(radar, removal=removal)
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.piece = self._clouds.piece
@@ -106,10 +113,18 @@ class Products:
         for window in self._clouds.windows(spectra):
             with stages.time("angle"):
                 angles = {
-                    f"range_{name}": makers[name](window.angles, radar)[None] for name in self._angle_names if window.angles
+                    f"range_{name}": makers[name](window.angles, radar)[None]
+                    for name in self._angle_names
+                    if window.angles
                 }
             with stages.time("write"):
-                store.extend("time", [window.middle_s], range_doppler=window.power[None], detections=window.mask[None], **angles)
+                store.extend(
+                    "time",
+                    [window.middle_s],
+                    range_doppler=window.power[None],
+                    detections=window.mask[None],
+                    **angles,
+                )
 
     def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
         radar = self._radar
@@ -118,7 +133,9 @@ class Products:
             mask = self._detect(power)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:
-                kept["range_azimuth_received"] = range_azimuth(window_angles(cube, mask, radar), radar)
+                kept["range_azimuth_received"] = range_azimuth(
+                    window_angles(cube, mask, radar), radar
+                )
             self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
 
     def finish(self) -> Clouds:

@@ -23,7 +23,9 @@ class ReceivedWindow:
         self._first, self._radar = start_cycle * radar.n_tx, radar
         self._pieces: list[NDArray[np.complexfloating]] = []
 
-    def push(self, spectra: NDArray[np.complexfloating], first: int) -> NDArray[np.complexfloating] | None:
+    def push(
+        self, spectra: NDArray[np.complexfloating], first: int
+    ) -> NDArray[np.complexfloating] | None:
         """Take what belongs to the window of the next chirps; the cube (cycle, tx, rx, range) once, when it is whole."""
         last = self._first + self._radar.chirps_per_frame
         begin, end = max(self._first, first), min(last, first + len(spectra))

@@ -80,7 +80,13 @@ class Survey:
 
 
 def survey(
-    model: EchoModel, radar: Radar, body: Body, n_chirps: int, *, spreading: bool = True, scene: Scene | None = None
+    model: EchoModel,
+    radar: Radar,
+    body: Body,
+    n_chirps: int,
+    *,
+    spreading: bool = True,
+    scene: Scene | None = None,
 ) -> Survey:
     """Look at one chirp every 10 ms.
 
@@ -138,7 +144,9 @@ def survey(
         shares_hidden.append(1 - seen.mean(axis=1))
         small = _small_curvature(radar, body, times)
         concerned["small_curvature"] += float((by_part * small).sum())
-        small_parts |= {body.part_names[part] for part in np.flatnonzero((by_part * small).sum(axis=0))}
+        small_parts |= {
+            body.part_names[part] for part in np.flatnonzero((by_part * small).sum(axis=0))
+        }
         concerned["velocity_ambiguous"] += float((by_part * _too_fast(radar, body, times)).sum())
     if not seen_in_band:
         raise InputError(
@@ -169,7 +177,9 @@ def survey(
         "beyond_range": f"echo power from beyond {radar.max_range_m:.2f} m, removed by the ideal IF low-pass",
     }
     found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
-    limits = tuple(Limit(name, value / power, message) for name, value, message in [*found, *indoors])
+    limits = tuple(
+        Limit(name, value / power, message) for name, value, message in [*found, *indoors]
+    )
     for limit in limits:
         warn_of(limit)
     return Survey(power / len(chirps), True, part_power, looked_at, power_at, hidden_at, limits)
@@ -177,7 +187,11 @@ def survey(
 
 def _and_direction(radar: Radar) -> str:
     angle_deg = folded_angle_deg(radar)
-    return f" and, ahead, {angle_deg:.1f} degrees beside its direction, more to the sides" if angle_deg > 0 else ""
+    return (
+        f" and, ahead, {angle_deg:.1f} degrees beside its direction, more to the sides"
+        if angle_deg > 0
+        else ""
+    )
 
 
 def warn_of(limit: Limit) -> None:
@@ -203,7 +217,9 @@ def _refuse_too_near(radar: Radar, body: Body, times: NDArray[np.float64]) -> No
     reach = semi_axes.max(axis=1)
     gap = np.linalg.norm(centres[:, None] - antennas[:, None], axis=-1) - reach
     for time, antenna, part in np.argwhere(gap < MINIMUM_ANTENNA_DISTANCE_M):
-        distance = _distance(frames[time, part].T @ (antennas[antenna] - centres[time, part]), semi_axes[part])
+        distance = _distance(
+            frames[time, part].T @ (antennas[antenna] - centres[time, part]), semi_axes[part]
+        )
         if distance < MINIMUM_ANTENNA_DISTANCE_M:
             raise InputError(
                 f"at {times[time]:.2f} s the {body.part_names[part]} is {max(distance, 0):.2f} m from an "
@@ -237,7 +253,9 @@ def _small_curvature(radar: Radar, body: Body, times: NDArray[np.float64]) -> ND
     sight /= np.linalg.norm(sight, axis=-1, keepdims=True)
     theta, phi = np.arccos(np.clip(sight[..., 2], -1, 1)), np.arctan2(sight[..., 1], sight[..., 0])
     smaller, _ = ellipsoid_radii(semi_axes[:, 0], semi_axes[:, 1], semi_axes[:, 2], theta, phi)
-    return np.asarray(2 * np.pi * radar.start_frequency_hz / SPEED_OF_LIGHT_MPS * smaller < MINIMUM_KA)
+    return np.asarray(
+        2 * np.pi * radar.start_frequency_hz / SPEED_OF_LIGHT_MPS * smaller < MINIMUM_KA
+    )
 
 
 def _too_fast(radar: Radar, body: Body, times: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -245,5 +263,8 @@ def _too_fast(radar: Radar, body: Body, times: NDArray[np.float64]) -> NDArray[n
     if body.duration_s < _STEP_S:
         return np.zeros((len(times), len(body.part_names)), dtype=bool)
     early = np.minimum(times, body.duration_s - _STEP_S)
-    ranges = [np.linalg.norm(body.at(at).centres - np.asarray(radar.position_m), axis=-1) for at in (early, early + _STEP_S)]
+    ranges = [
+        np.linalg.norm(body.at(at).centres - np.asarray(radar.position_m), axis=-1)
+        for at in (early, early + _STEP_S)
+    ]
     return np.asarray(np.abs(ranges[1] - ranges[0]) / _STEP_S > radar.max_velocity_mps)

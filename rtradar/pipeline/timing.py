@@ -46,7 +46,11 @@ def keep_memory_low() -> None:
     """
     library = _gnu_c_library()
     if library is not None:
-        for option, value in ((_M_ARENA_MAX, 1), (_M_MMAP_THRESHOLD, _HEAP_BYTES), (_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)):
+        for option, value in (
+            (_M_ARENA_MAX, 1),
+            (_M_MMAP_THRESHOLD, _HEAP_BYTES),
+            (_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES),
+        ):
             library.mallopt(option, value)
 
 

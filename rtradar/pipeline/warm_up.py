@@ -17,7 +17,14 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.jit import is_on_disk
 from rtradar.pipeline.capture import chirps_of
 from rtradar.pipeline.cloud_maker import window_angles
-from rtradar.process import measures_angle, os_cfar, power_map, range_azimuth, range_elevation, range_spectrum
+from rtradar.process import (
+    measures_angle,
+    os_cfar,
+    power_map,
+    range_azimuth,
+    range_elevation,
+    range_spectrum,
+)
 from rtradar.radar import Radar
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.signal.tones import add_tones
@@ -37,7 +44,9 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
     radar : Radar
     """
     # A slice of more, as in the stream: code is compiled for how arrays lie in memory.
-    samples = synthesize(chirps_of(echoes, 0, radar.n_tx), radar, radar.chirp_times(radar.n_tx), dtype=np.complex64)
+    samples = synthesize(
+        chirps_of(echoes, 0, radar.n_tx), radar, radar.chirp_times(radar.n_tx), dtype=np.complex64
+    )
     received = receive(samples, radar, 0)
     Noise(1.0, 0).add(received, radar, 0)
     range_spectrum(separate(received, radar, 0), radar)
@@ -59,7 +68,12 @@ def warm_up_usual_processing() -> None:
     amplitude, first = np.ones((1, *shape), dtype=np.complex128), np.zeros(1, dtype=np.int64)
     tx = np.arange(len(amplitude[0])) % radar.n_tx
     echoes = Echoes(
-        length=np.full(shape, 8.0), amplitude=amplitude, frequency=np.array([12e9]), tx=tx, part=first, bounces=first + 1
+        length=np.full(shape, 8.0),
+        amplitude=amplitude,
+        frequency=np.array([12e9]),
+        tx=tx,
+        part=first,
+        bounces=first + 1,
     )
     warm_up_processing(echoes, radar)
 
@@ -79,12 +93,22 @@ def compile_for_another_process() -> None:
 def processing_compiled_beside() -> Iterator[None]:
     """Have another process compile what echoes go through, if none has; it is done when this ends."""
     # Within another program, the interpreter is that program.
-    if is_on_disk(add_tones) or thread_count() < 2 or not Path(sys.executable or "").name.startswith("python"):
+    if (
+        is_on_disk(add_tones)
+        or thread_count() < 2
+        or not Path(sys.executable or "").name.startswith("python")
+    ):
         yield
         return
-    words = [sys.executable, "-c", "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"]
+    words = [
+        sys.executable,
+        "-c",
+        "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()",
+    ]
     environment, nothing = {**os.environ, **environment_of(1)}, subprocess.DEVNULL
-    with subprocess.Popen(words, env=environment, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing) as other:
+    with subprocess.Popen(
+        words, env=environment, stdin=subprocess.PIPE, stdout=nothing, stderr=nothing
+    ) as other:
         try:
             yield
             with suppress(subprocess.TimeoutExpired):

@@ -8,7 +8,12 @@ from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_re
 from rtradar.process.detection.cfar import ca_cfar, os_cfar
 from rtradar.process.detection.cfar_thresholds import ca_scale, os_scale
 from rtradar.process.detection.clutter_map import ClutterMap, clutter_map_scale
-from rtradar.process.detection.detectors import DETECTORS, Detector, build_detector, register_detector
+from rtradar.process.detection.detectors import (
+    DETECTORS,
+    Detector,
+    build_detector,
+    register_detector,
+)
 from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_fallback
 from rtradar.process.frames import SlidingWindows
 from rtradar.process.power_maps import power_map, range_time

@@ -22,7 +22,10 @@ _CACHE_BYTES = 2_500_000
 
 
 def cell_spectra(
-    spectra: NDArray[np.complexfloating], radar: Radar, range_bins: ArrayLike, velocity_bins: ArrayLike
+    spectra: NDArray[np.complexfloating],
+    radar: Radar,
+    range_bins: ArrayLike,
+    velocity_bins: ArrayLike,
 ) -> NDArray[np.complexfloating]:
     """Values of chosen cells in every channel, with those of the range bins beside them.
 
@@ -53,7 +56,12 @@ def cell_spectra(
         that could tell an angle.
     """
     cube = np.asarray(spectra)
-    if cube.ndim != 4 or cube.shape[1:3] != (radar.n_tx, radar.n_rx) or cube.shape[0] < 1 or cube.dtype.kind != "c":
+    if (
+        cube.ndim != 4
+        or cube.shape[1:3] != (radar.n_tx, radar.n_rx)
+        or cube.shape[0] < 1
+        or cube.dtype.kind != "c"
+    ):
         raise InputError(
             f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar '{radar.name}' needs complex "
             f"(cycle, tx, rx, range) = (>= 1, {radar.n_tx}, {radar.n_rx}, any)"
@@ -62,7 +70,9 @@ def cell_spectra(
     rows = _indices(range_bins, n_range, "range_bins")
     columns = _indices(velocity_bins, n_cycles, "velocity_bins")
     if rows.shape != columns.shape:
-        raise InputError(f"cell_spectra: {len(rows)} range_bins and {len(columns)} velocity_bins; give one of each for a cell")
+        raise InputError(
+            f"cell_spectra: {len(rows)} range_bins and {len(columns)} velocity_bins; give one of each for a cell"
+        )
     walk = range_walk(radar)
     steps = (rows[:, None] + np.arange(-walk, walk + 1)) % n_range
     # Index 0 of the map is the DFT bin of the most negative velocity.
@@ -94,6 +104,11 @@ def _indices(bins: ArrayLike, n: int, name: str) -> NDArray[np.int64]:
     indices = np.asarray(bins)
     if indices.ndim == 1 and indices.size == 0:
         return np.zeros(0, dtype=np.int64)
-    if indices.ndim != 1 or indices.dtype.kind not in "iu" or indices.min() < 0 or indices.max() >= n:
+    if (
+        indices.ndim != 1
+        or indices.dtype.kind not in "iu"
+        or indices.min() < 0
+        or indices.max() >= n
+    ):
         raise InputError(f"cell_spectra: {name} must be whole numbers (cell,) from 0 to {n - 1}")
     return indices.astype(np.int64)

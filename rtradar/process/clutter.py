@@ -133,7 +133,9 @@ class ClutterRemoval:
         """
         values = _complex(cycles, "cycles")
         if values.ndim < 1 or len(values) < 1:
-            raise InputError(f"clutter removal: cycles have shape {values.shape}; a window needs at least one cycle")
+            raise InputError(
+                f"clutter removal: cycles have shape {values.shape}; a window needs at least one cycle"
+            )
         return self._window(values)
 
     def description(self, window_cycles: int) -> str:
@@ -160,7 +162,7 @@ class ClutterRemoval:
 
 
 @compiled(parallel=True)
-def _without_mean(cycles, out):  # type: ignore[no-untyped-def]
+def _without_mean(cycles, out):
     """Fill ``out (cycle, cell)`` with what is left of ``cycles`` without their mean."""
     count, cells = cycles.shape
     for block in prange((cells + _CELLS_AT_ONCE - 1) // _CELLS_AT_ONCE):
@@ -189,7 +191,9 @@ class _Mean(ClutterRemoval):
             # Such as a window of the spectrogram: threads would be woken for longer than they work.
             return cycles - cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
         out = np.empty(cycles.shape, dtype=cycles.dtype)
-        _without_mean(np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1))
+        _without_mean(
+            np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1)
+        )
         return out
 
 
@@ -200,7 +204,9 @@ class _Exponential(ClutterRemoval):
         self._share = -math.expm1(-radar.cycle_duration_s / time_constant_s)
         self._count = 0  # cycles in the background
         shape = (radar.n_tx, radar.n_rx, radar.samples_per_chirp)
-        self._background = np.zeros(shape, np.complex128)  # double, for it takes steps of 1e-3 and less
+        self._background = np.zeros(
+            shape, np.complex128
+        )  # double, for it takes steps of 1e-3 and less
 
     def description(self, window_cycles: int) -> str:
         return f"exponential background, time constant {self._time_constant_s:g} s"
@@ -223,8 +229,12 @@ class _Mti(ClutterRemoval):
     def __init__(self, radar: Radar, pulses: int) -> None:
         super().__init__(radar)
         self._order = pulses - 1
-        self._gain = 1 / math.sqrt(math.comb(2 * self._order, self._order))  # the squares of the weights sum to this number
-        self._held = np.empty((0, radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex64)  # the last cycles, as received
+        self._gain = 1 / math.sqrt(
+            math.comb(2 * self._order, self._order)
+        )  # the squares of the weights sum to this number
+        self._held = np.empty(
+            (0, radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex64
+        )  # the last cycles, as received
 
     def description(self, window_cycles: int) -> str:
         return f"MTI canceller of {self._order + 1} pulses"
@@ -279,15 +289,22 @@ def clutter_removal(
     Equation :eq:`clutter-gain` of the theory page has the gains of ``exponential`` and ``mti``.
     """
     if method not in CLUTTER_REMOVALS:
-        raise InputError(f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}")
+        raise InputError(
+            f"clutter removal '{method}' is unknown; allowed: {', '.join(CLUTTER_REMOVALS)}"
+        )
     if method != "none" and radar.multiplexing == "ddm":
         raise InputError(
             f"clutter removal '{method}': under multiplexing = 'ddm' what stands still has a Doppler of its own for each Tx, "
             "which this would leave in; choose 'none', or another multiplexing"
         )
-    for name, value, owner in (("time_constant_s", time_constant_s, "exponential"), ("pulses", pulses, "mti")):
+    for name, value, owner in (
+        ("time_constant_s", time_constant_s, "exponential"),
+        ("pulses", pulses, "mti"),
+    ):
         if value is not None and method != owner:
-            raise InputError(f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'")
+            raise InputError(
+                f"clutter removal '{method}' has no {name}; leave it out, or choose '{owner}'"
+            )
     if method == "mean":
         if radar.cycles_per_frame < 2:
             raise InputError(
@@ -296,7 +313,10 @@ def clutter_removal(
             )
         return _Mean(radar)
     if method == "exponential":
-        return _Exponential(radar, check_time_constant(_TIME_CONSTANT_S if time_constant_s is None else time_constant_s))
+        return _Exponential(
+            radar,
+            check_time_constant(_TIME_CONSTANT_S if time_constant_s is None else time_constant_s),
+        )
     if method == "mti":
         if pulses not in (None, 2, 3):
             raise InputError(f"clutter removal 'mti': pulses = {pulses!r}; allowed: 2, 3")
@@ -306,15 +326,21 @@ def clutter_removal(
 
 def check_time_constant(time_constant_s: float) -> float:
     """The time constant as a float; InputError unless it is positive and finite."""
-    if isinstance(time_constant_s, bool) or not isinstance(time_constant_s, int | float | np.integer | np.floating):
+    if isinstance(time_constant_s, bool) or not isinstance(
+        time_constant_s, int | float | np.integer | np.floating
+    ):
         raise InputError(f"time_constant_s = {time_constant_s!r}; it must be a number of seconds")
     if not 0 < time_constant_s < math.inf:
-        raise InputError(f"time_constant_s = {time_constant_s!r}; it must be positive and finite [s]")
+        raise InputError(
+            f"time_constant_s = {time_constant_s!r}; it must be positive and finite [s]"
+        )
     return float(time_constant_s)
 
 
 def _complex(values: ArrayLike, name: str) -> NDArray[np.complexfloating]:
     array = np.asarray(values)
     if array.dtype.kind not in "fc":
-        raise InputError(f"clutter removal: {name} are of type {array.dtype}; they must be complex numbers")
+        raise InputError(
+            f"clutter removal: {name} are of type {array.dtype}; they must be complex numbers"
+        )
     return array.astype(np.result_type(array.dtype, np.complex64), copy=False)

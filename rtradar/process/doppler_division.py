@@ -30,7 +30,9 @@ _SKIRT = 2
 """Cells on either side of an echo in which Hann windows leave something of it."""
 
 
-def without_copies(band_power: NDArray[np.floating], radar: Radar, receivers: int) -> NDArray[np.floating]:
+def without_copies(
+    band_power: NDArray[np.floating], radar: Radar, receivers: int
+) -> NDArray[np.floating]:
     """Power of all Tx together, each echo at its own Doppler only.
 
     Parameters
@@ -69,7 +71,9 @@ def without_copies(band_power: NDArray[np.floating], radar: Radar, receivers: in
     echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))
     # Its skirts have copies, too, weaker than what passes for an echo by itself.
     echoes = ((place == 0) & echo).reshape(band_power.shape)
-    near = maximum_filter(echoes, size=2 * _SKIRT + 1, mode=("wrap", "nearest")).reshape(power.shape)
+    near = maximum_filter(echoes, size=2 * _SKIRT + 1, mode=("wrap", "nearest")).reshape(
+        power.shape
+    )
     echo = np.take_along_axis(near, begin[None], axis=0)[0]
     # Band by band: how many filled bands of the copy that begins there the echo explains, and with what power.
     explained = np.where(place < n_tx, power - empty, 0)
@@ -90,5 +94,8 @@ def _block_sums(power: NDArray[np.floating], count: int) -> NDArray[np.floating]
 def _about(power: NDArray[np.floating]) -> NDArray[np.floating]:
     """Sum over the cells about each one (doppler, range)."""
     for axis in (0, 1):
-        power = sum((np.roll(power, step, axis=axis) for step in range(-_SKIRT, _SKIRT + 1)), np.zeros_like(power))
+        power = sum(
+            (np.roll(power, step, axis=axis) for step in range(-_SKIRT, _SKIRT + 1)),
+            np.zeros_like(power),
+        )
     return power

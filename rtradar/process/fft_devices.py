@@ -70,7 +70,11 @@ def fastest_fft_devices(radar: Radar, n_chirps: int, n_windows: int) -> FftDevic
         _compare(radar, gpu)
         on_gpu = _seconds(radar, gpu)
     except Exception as error:  # torch says in many ways that memory, or a driver, will not do
-        warnings.warn(f"the GPU fails at FFTs ({first_line(error)}); the CPU does them", ValidityWarning, stacklevel=2)
+        warnings.warn(
+            f"the GPU fails at FFTs ({first_line(error)}); the CPU does them",
+            ValidityWarning,
+            stacklevel=2,
+        )
         return FftDevices()
     return FftDevices(*(gpu if on_gpu[kind] < on_cpu[kind] else "cpu" for kind in range(2)))
 
@@ -123,7 +127,10 @@ def _seconds(radar: Radar, device: str) -> _Seconds:
 def _compare(radar: Radar, gpu: str) -> None:
     chirps, window = _noise(radar)
     # One channel: where Doppler is divided, a map of all has thresholds in it.
-    for transform in (partial(range_spectrum, chirps, radar), partial(power_map, window, radar, channel=0)):
+    for transform in (
+        partial(range_spectrum, chirps, radar),
+        partial(power_map, window, radar, channel=0),
+    ):
         ours, theirs = transform(device="cpu"), transform(device=gpu)
         difference = float(np.abs(theirs - ours).max() / np.abs(ours).max())
         if not difference <= _LARGEST_DIFFERENCE:

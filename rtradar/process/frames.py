@@ -37,7 +37,10 @@ class SlidingWindows:
     def __init__(self, radar: Radar) -> None:
         self._radar = radar
         window = radar.chirps_per_frame
-        self._buffer = np.empty((window + max(2 * radar.n_tx, window // 2), radar.n_rx, radar.samples_per_chirp), np.complex64)
+        self._buffer = np.empty(
+            (window + max(2 * radar.n_tx, window // 2), radar.n_rx, radar.samples_per_chirp),
+            np.complex64,
+        )
         self._first = 0  # chirp at the front of the buffer
         self._held = 0  # chirps in the buffer
         self._candidate = 0  # windows are counted by multiples of the hop ...
@@ -46,7 +49,9 @@ class SlidingWindows:
         self._busy = False
         self.n_chirps = 0
 
-    def push(self, spectra: NDArray[np.complexfloating]) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
+    def push(
+        self, spectra: NDArray[np.complexfloating]
+    ) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
         """Take the next block of chirps and give every window that it completes.
 
         Parameters
@@ -82,7 +87,9 @@ class SlidingWindows:
         self._busy = True
         return self._windows(block)
 
-    def _windows(self, block: NDArray[np.complexfloating]) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
+    def _windows(
+        self, block: NDArray[np.complexfloating]
+    ) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
         taken = 0
         while taken < len(block):
             taken += self._take(block[taken:])
@@ -98,12 +105,16 @@ class SlidingWindows:
 
     def _take(self, block: NDArray[np.complexfloating]) -> int:
         """Copy what fits of the block behind what is still needed; how many chirps were dealt with."""
-        wanted = self._start_of(self._candidate) * self._radar.n_tx  # no later window needs a chirp before this one
+        wanted = (
+            self._start_of(self._candidate) * self._radar.n_tx
+        )  # no later window needs a chirp before this one
         gone = min(max(wanted - self._first, 0), self._held)
         room = len(self._buffer) - self._held
         if self._held == gone:
             self._first, self._held = self._first + gone, 0
-            skip = min(max(wanted - self._first, 0), len(block))  # a hop longer than the window leaves chirps unused
+            skip = min(
+                max(wanted - self._first, 0), len(block)
+            )  # a hop longer than the window leaves chirps unused
             if skip:
                 self._first += skip
                 self.n_chirps += skip

@@ -20,7 +20,11 @@ from rtradar.system.threads import in_threads
 
 
 def range_time(
-    spectra: NDArray[np.complexfloating], radar: Radar, *, first_chirp: int = 0, step_s: float = 5e-3
+    spectra: NDArray[np.complexfloating],
+    radar: Radar,
+    *,
+    first_chirp: int = 0,
+    step_s: float = 5e-3,
 ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
     """Power over slow time and range, averaged over channels and over whole TDM cycles.
 
@@ -54,7 +58,9 @@ def range_time(
         )
     together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
     bounds, times = range_time_steps(len(chirps), radar, first_chirp, step_s)
-    power = in_threads(lambda step: mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds)))
+    power = in_threads(
+        lambda step: mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds))
+    )
     return np.array(power, dtype=chirps.real.dtype).reshape(len(power), chirps.shape[2]), times
 
 
@@ -70,7 +76,9 @@ def range_time_steps(
     rows = step_cycles(radar, step_s) * radar.n_tx
     begins = np.arange(0, n_chirps, rows)
     ends = np.minimum(begins + rows, n_chirps)
-    return list(zip(begins.tolist(), ends.tolist(), strict=True)), (first_chirp + (begins + ends) / 2) * radar.chirp_interval_s
+    return list(zip(begins.tolist(), ends.tolist(), strict=True)), (
+        first_chirp + (begins + ends) / 2
+    ) * radar.chirp_interval_s
 
 
 def mean_power(values: NDArray[np.complexfloating]) -> NDArray[np.floating]:
@@ -122,18 +130,26 @@ def power_map(
             f"(cycle, tx, rx, range) = (>= 1, {radar.n_tx}, {radar.n_rx}, any)"
         )
     if channel is not None and not 0 <= channel < radar.n_channels:
-        raise InputError(f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
+        raise InputError(
+            f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
+        )
     n_cycles, _, _, n_range = cube.shape
     scale = weights(doppler_window, n_cycles, "doppler_window")
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
     divided = channel is None and radar.multiplexing == "ddm"
     # Under DDM the rows of all Tx are the same sum; those of the first are not turned.
-    chosen = range(radar.n_rx if divided else radar.n_channels) if channel is None else range(channel, channel + 1)
+    chosen = (
+        range(radar.n_rx if divided else radar.n_channels)
+        if channel is None
+        else range(channel, channel + 1)
+    )
     power: NDArray[np.floating]
     if device == "cpu":
         power = _doppler_power(channels, chosen, scale, radar.n_rx)
     else:
-        power = torch_transforms.doppler_power(channels[:, chosen.start : chosen.stop], scale.astype(np.float32), device)
+        power = torch_transforms.doppler_power(
+            channels[:, chosen.start : chosen.stop], scale.astype(np.float32), device
+        )
     if divided:
         power = without_copies(power, radar, radar.n_rx)
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
@@ -170,7 +186,7 @@ def _doppler_power(
 
 
 @compiled(fastmath={"contract"})
-def _weigh(values, weights, out):  # type: ignore[no-untyped-def]
+def _weigh(values, weights, out):
     """Fill ``out (cycle, range)``: values times the weight of their cycle."""
     for cycle in range(len(out)):
         for place in range(out.shape[1]):
@@ -178,7 +194,7 @@ def _weigh(values, weights, out):  # type: ignore[no-untyped-def]
 
 
 @compiled(fastmath={"contract"})
-def _add_power(values, total):  # type: ignore[no-untyped-def]
+def _add_power(values, total):
     """Add squared magnitudes to ``total (cycle, range)``."""
     for cycle in range(len(total)):
         for place in range(total.shape[1]):

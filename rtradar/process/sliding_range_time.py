@@ -46,7 +46,9 @@ class SlidingRangeTime:
 
     def __init__(self, radar: Radar, removal: ClutterRemoval, *, step_s: float = 5e-3) -> None:
         self._radar, self._by_windows, self._step_s = radar, removal.works_by_windows, step_s
-        self._steps = max(1, round(radar.cycles_per_frame / step_cycles(radar, step_s)))  # in a window
+        self._steps = max(
+            1, round(radar.cycles_per_frame / step_cycles(radar, step_s))
+        )  # in a window
         self._window: deque[_Step] = deque()
         self._waiting: deque[_Step] = deque()  # steps of which not all of the window was there
         self._sum = np.zeros((radar.n_channels, radar.samples_per_chirp), np.complex128)
@@ -57,7 +59,9 @@ class SlidingRangeTime:
         """Cycles over which the mean is taken where the removal works by windows."""
         return self._steps * step_cycles(self._radar, self._step_s)
 
-    def push(self, spectra: NDArray[np.complexfloating], first_chirp: int) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
+    def push(
+        self, spectra: NDArray[np.complexfloating], first_chirp: int
+    ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
         """Take the next chirps and give the steps that are complete.
 
         Parameters
@@ -112,5 +116,7 @@ class SlidingRangeTime:
     def _map(
         self, steps: list[tuple[float, NDArray[np.floating]]], kind: np.dtype[np.floating]
     ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-        power = np.array([power for _, power in steps], dtype=kind).reshape(len(steps), self._radar.samples_per_chirp)
+        power = np.array([power for _, power in steps], dtype=kind).reshape(
+            len(steps), self._radar.samples_per_chirp
+        )
         return power, np.array([time for time, _ in steps], dtype=np.float64)

@@ -54,7 +54,10 @@ class SlowTimeDft(NamedTuple):
     def multiply_adds(self) -> int:
         """Of one transform: those of terms that have a mirror image, real and imaginary parts."""
         squares = [2 * ((factor - 1) // 2) ** 2 for factor in self.factors]
-        return 2 * sum(len(self.cycle_at) // factor * count for factor, count in zip(self.factors, squares, strict=True))
+        return 2 * sum(
+            len(self.cycle_at) // factor * count
+            for factor, count in zip(self.factors, squares, strict=True)
+        )
 
 
 @lru_cache(maxsize=8)
@@ -69,9 +72,15 @@ def slow_time_dft(n_cycles: int) -> SlowTimeDft | None:
     -------
     SlowTimeDft or None
     """
-    pairs = [(n_cycles // second, second) for second in range(2, _LARGEST + 1) if n_cycles % second == 0]
+    pairs = [
+        (n_cycles // second, second) for second in range(2, _LARGEST + 1) if n_cycles % second == 0
+    ]
     # The least sum is the least work.
-    allowed = [(sum(pair), pair) for pair in pairs if 2 <= pair[0] < pair[1] and max(pair) <= _LARGEST and gcd(*pair) == 1]
+    allowed = [
+        (sum(pair), pair)
+        for pair in pairs
+        if 2 <= pair[0] < pair[1] and max(pair) <= _LARGEST and gcd(*pair) == 1
+    ]
     if not allowed:
         return None
     first, second = min(allowed)[1]
@@ -80,19 +89,27 @@ def slow_time_dft(n_cycles: int) -> SlowTimeDft | None:
     cycle_at = (i * second + j * first) % n_cycles
     bin_at = (i * second * pow(second, -1, first) + j * first * pow(first, -1, second)) % n_cycles
     (cosines_1, sines_1), (cosines_2, sines_2) = _tables(first), _tables(second)
-    return SlowTimeDft(cycle_at, bin_at, (cosines_1, cosines_2), (sines_1, sines_2), (first, second))
+    return SlowTimeDft(
+        cycle_at, bin_at, (cosines_1, cosines_2), (sines_1, sines_2), (first, second)
+    )
 
 
 def _tables(factor: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     mirrored = np.arange(1, (factor + 1) // 2)
     angles = 2 * np.pi * np.outer(mirrored, mirrored) / factor
     rest = -len(mirrored) % _TOGETHER
-    cosines, sines = (np.pad(table, (0, rest)).astype(np.float32) for table in (np.cos(angles), np.sin(angles)))
+    cosines, sines = (
+        np.pad(table, (0, rest)).astype(np.float32) for table in (np.cos(angles), np.sin(angles))
+    )
     return cosines, sines
 
 
 def add_doppler_power(
-    spectra: NDArray[np.complex64], channels: range, weights: NDArray[np.float32], dft: SlowTimeDft, power: NDArray[np.float32]
+    spectra: NDArray[np.complex64],
+    channels: range,
+    weights: NDArray[np.float32],
+    dft: SlowTimeDft,
+    power: NDArray[np.float32],
 ) -> None:
     """Add the squared magnitudes of weighted DFTs over the cycles of some channels.
 
@@ -134,17 +151,17 @@ def add_doppler_power(
 
 
 @inlined()
-def _row(store, number):  # type: ignore[no-untyped-def]
+def _row(store, number):
     return store[number * _ROW : (number + 1) * _ROW]
 
 
 @inlined()
-def _powers(store, number):  # type: ignore[no-untyped-def]
+def _powers(store, number):
     return store[number * _COLUMNS : (number + 1) * _COLUMNS]
 
 
 @inlined(fastmath={"contract"})
-def _read(samples, weight, out):  # type: ignore[no-untyped-def]
+def _read(samples, weight, out):
     """Fill ``out (row,)``: real parts of what is read, then imaginary ones, weighted."""
     for c in range(len(samples)):
         out[c] = samples[c].real * weight
@@ -152,7 +169,7 @@ def _read(samples, weight, out):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath={"contract"})
-def _fold(near, far, even, odd):  # type: ignore[no-untyped-def]
+def _fold(near, far, even, odd):
     """Sum of two rows, and their difference times -j, which the sine has before it."""
     for c in range(_COLUMNS):
         near_re, near_im, far_re, far_im = near[c], near[_COLUMNS + c], far[c], far[_COLUMNS + c]
@@ -163,7 +180,7 @@ def _fold(near, far, even, odd):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath={"contract"})
-def _read_folded(near, near_weight, far, far_weight, even, odd):  # type: ignore[no-untyped-def]
+def _read_folded(near, near_weight, far, far_weight, even, odd):
     """The same of what is read, weighted."""
     for c in range(len(near)):
         near_re, near_im = near[c].real * near_weight, near[c].imag * near_weight
@@ -175,18 +192,28 @@ def _read_folded(near, near_weight, far, far_weight, even, odd):  # type: ignore
 
 
 @inlined()
-def _put(row, out):  # type: ignore[no-untyped-def]
+def _put(row, out):
     for i in range(_ROW):
         out[i] = row[i]
 
 
 @inlined(fastmath={"contract"})
-def _add_products(table, begin, terms, out):  # type: ignore[no-untyped-def]
+def _add_products(table, begin, terms, out):
     """Add to three rows ``out``: those of ``terms``, times what the table has for the three frequencies from ``begin`` on."""
     a, b, c = table[begin], table[begin + 1], table[begin + 2]
     for k in range(0, len(a), _TOGETHER):
         rows = terms[k * _ROW : (k + _TOGETHER) * _ROW]
-        a0, a1, a2, b0, b1, b2, c0, c1, c2 = a[k], a[k + 1], a[k + 2], b[k], b[k + 1], b[k + 2], c[k], c[k + 1], c[k + 2]
+        a0, a1, a2, b0, b1, b2, c0, c1, c2 = (
+            a[k],
+            a[k + 1],
+            a[k + 2],
+            b[k],
+            b[k + 1],
+            b[k + 2],
+            c[k],
+            c[k + 1],
+            c[k + 2],
+        )
         for i in range(_ROW):
             r0, r1, r2 = rows[i], rows[_ROW + i], rows[2 * _ROW + i]
             out[i] = out[i] + a0 * r0 + a1 * r1 + a2 * r2
@@ -195,7 +222,7 @@ def _add_products(table, begin, terms, out):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath={"contract"})
-def _add_signed(terms, count, sign, out):  # type: ignore[no-untyped-def]
+def _add_signed(terms, count, sign, out):
     """Add rows to one: all of them, or (``sign`` -1) with signs that alternate."""
     factor = sign
     for k in range(count):
@@ -206,23 +233,28 @@ def _add_signed(terms, count, sign, out):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath={"contract"})
-def _add_squares(row, out):  # type: ignore[no-untyped-def]
+def _add_squares(row, out):
     for c in range(_COLUMNS):
         out[c] += row[c] * row[c] + row[_COLUMNS + c] * row[_COLUMNS + c]
 
 
 @inlined(fastmath={"contract"})
-def _unfold(one, other, low, high):  # type: ignore[no-untyped-def]
+def _unfold(one, other, low, high):
     """Fill ``low`` with the sum of two parts, and ``high``, of the mirrored frequency, with their difference."""
     for i in range(_ROW):
         low[i], high[i] = one[i] + other[i], one[i] - other[i]
 
 
 @inlined(fastmath={"contract"})
-def _add_unfolded_squares(cosine, sine, low, high):  # type: ignore[no-untyped-def]
+def _add_unfolded_squares(cosine, sine, low, high):
     """The same, but squared magnitudes, added."""
     for c in range(_COLUMNS):
-        cosine_re, cosine_im, sine_re, sine_im = cosine[c], cosine[_COLUMNS + c], sine[c], sine[_COLUMNS + c]
+        cosine_re, cosine_im, sine_re, sine_im = (
+            cosine[c],
+            cosine[_COLUMNS + c],
+            sine[c],
+            sine[_COLUMNS + c],
+        )
         real, imaginary = cosine_re + sine_re, cosine_im + sine_im
         low[c] += real * real + imaginary * imaginary
         real, imaginary = cosine_re - sine_re, cosine_im - sine_im
@@ -230,16 +262,34 @@ def _add_unfolded_squares(cosine, sine, low, high):  # type: ignore[no-untyped-d
 
 
 @compiled(fastmath={"contract"})
-def _add_power(  # type: ignore[no-untyped-def]
-    spectra, channel_begin, channel_end, weights, cycle_at, bin_at, n_1, n_2, cosines_1, sines_1, cosines_2, sines_2, power
+def _add_power(
+    spectra,
+    channel_begin,
+    channel_end,
+    weights,
+    cycle_at,
+    bin_at,
+    n_1,
+    n_2,
+    cosines_1,
+    sines_1,
+    cosines_2,
+    sines_2,
+    power,
 ):
     cycles, _, n_range = spectra.shape
     # Behind the rows of the grid is one of zeros.
-    grid, sums = on_cache_lines((cycles + 1) * _ROW, weights), on_cache_lines(cycles * _COLUMNS, weights)
+    grid, sums = (
+        on_cache_lines((cycles + 1) * _ROW, weights),
+        on_cache_lines(cycles * _COLUMNS, weights),
+    )
     terms = max(cosines_1.shape[1], cosines_2.shape[1])
     even, odd = on_cache_lines(terms * _ROW, weights), on_cache_lines(terms * _ROW, weights)
     alone, total = on_cache_lines(2 * _ROW, weights), on_cache_lines(_ROW, weights)
-    cosine_parts, sine_parts = on_cache_lines(_TOGETHER * _ROW, weights), on_cache_lines(_TOGETHER * _ROW, weights)
+    cosine_parts, sine_parts = (
+        on_cache_lines(_TOGETHER * _ROW, weights),
+        on_cache_lines(_TOGETHER * _ROW, weights),
+    )
     one = np.float32(1)
     for begin in range(0, n_range, _COLUMNS):
         end = min(begin + _COLUMNS, n_range)
@@ -259,9 +309,17 @@ def _add_power(  # type: ignore[no-untyped-def]
                     at_half = first + half * step if factor % 2 == 0 else cycles
                     own, middle = _row(grid, first), _row(grid, at_half)
                     if not last:
-                        _read(spectra[cycle_at[first], channel, begin:end], weights[cycle_at[first]], own)
+                        _read(
+                            spectra[cycle_at[first], channel, begin:end],
+                            weights[cycle_at[first]],
+                            own,
+                        )
                         if at_half < cycles:
-                            _read(spectra[cycle_at[at_half], channel, begin:end], weights[cycle_at[at_half]], middle)
+                            _read(
+                                spectra[cycle_at[at_half], channel, begin:end],
+                                weights[cycle_at[at_half]],
+                                middle,
+                            )
                     _unfold(own, middle, _row(alone, 0), _row(alone, 1))
                     for k in range(pairs):
                         low, high = first + (k + 1) * step, first + (factor - k - 1) * step
@@ -269,8 +327,13 @@ def _add_power(  # type: ignore[no-untyped-def]
                             _fold(_row(grid, low), _row(grid, high), _row(even, k), _row(odd, k))
                         else:
                             low, high = cycle_at[low], cycle_at[high]
-                            near, far = spectra[low, channel, begin:end], spectra[high, channel, begin:end]
-                            _read_folded(near, weights[low], far, weights[high], _row(even, k), _row(odd, k))
+                            near, far = (
+                                spectra[low, channel, begin:end],
+                                spectra[high, channel, begin:end],
+                            )
+                            _read_folded(
+                                near, weights[low], far, weights[high], _row(even, k), _row(odd, k)
+                            )
                     # Frequencies without a mirror image: 0, and half of an even factor.
                     _put(_row(alone, 0), total)
                     _add_signed(even, pairs, one, total)
@@ -292,10 +355,15 @@ def _add_power(  # type: ignore[no-untyped-def]
                         _add_products(cosines, group, even, cosine_parts)
                         _add_products(sines, group, odd, sine_parts)
                         for k in range(min(_TOGETHER, pairs - group)):
-                            low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
+                            low, high = (
+                                first + (group + k + 1) * step,
+                                first + (factor - group - k - 1) * step,
+                            )
                             cosine, sine = _row(cosine_parts, k), _row(sine_parts, k)
                             if last:
-                                _add_unfolded_squares(cosine, sine, _powers(sums, low), _powers(sums, high))
+                                _add_unfolded_squares(
+                                    cosine, sine, _powers(sums, low), _powers(sums, high)
+                                )
                             else:
                                 _unfold(cosine, sine, _row(grid, low), _row(grid, high))
         for place in range(cycles):

@@ -49,7 +49,11 @@ class RangeDoppler:
 
 
 def range_doppler(
-    x: ArrayLike, radar: Radar, *, range_window: ArrayLike | None = None, doppler_window: ArrayLike | None = None
+    x: ArrayLike,
+    radar: Radar,
+    *,
+    range_window: ArrayLike | None = None,
+    doppler_window: ArrayLike | None = None,
 ) -> RangeDoppler:
     """Windowed range and Doppler spectra of IF samples, every channel apart.
 
@@ -153,7 +157,7 @@ def range_spectrum(
 
 
 @compiled(fastmath={"contract"})
-def _taper(values, weights, out):  # type: ignore[no-untyped-def]
+def _taper(values, weights, out):
     """Fill ``out (chirp, rx, sample)``: values times the weight of their sample."""
     for chirp in range(len(out)):
         for receiver in range(out.shape[1]):

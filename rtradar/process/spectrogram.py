@@ -66,7 +66,12 @@ class Spectrogram:
 
 
 def spectrogram(
-    signals: ArrayLike, radar: Radar, *, tx: int = 0, window: int = WINDOW_CYCLES, overlap: float = OVERLAP
+    signals: ArrayLike,
+    radar: Radar,
+    *,
+    tx: int = 0,
+    window: int = WINDOW_CYCLES,
+    overlap: float = OVERLAP,
 ) -> Spectrogram:
     """Spectrogram of one virtual channel, its power summed over the given range bins.
 
@@ -114,7 +119,9 @@ def spectrogram(
         )
     if not np.isfinite(values).all():
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
-    values = values.astype(np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False)
+    values = values.astype(
+        np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False
+    )
     starts = np.arange(0, len(values) - window + 1, hop)
     power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar))
     return Spectrogram(power, _times(starts, radar, tx, window), radar.velocity_mps(window))
@@ -154,13 +161,17 @@ class SlidingSpectrogram:
     ) -> None:
         window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:
-            raise InputError(f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}")
+            raise InputError(
+                f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
+            )
         self._radar, self._window, self._removal = radar, window, removal or ClutterRemoval(radar)
         self._tx, self._rx = divmod(channel, radar.n_rx)
         self._hop = _hop(radar, self._tx, window, overlap)
         self._chirps = 0  # pushed so far
         self._start = 0  # cycle that the next window begins with, and the first of those held
-        self._held = np.empty((0, radar.samples_per_chirp), np.complex64)  # fewer than window cycles
+        self._held = np.empty(
+            (0, radar.samples_per_chirp), np.complex64
+        )  # fewer than window cycles
 
     def push(self, spectra: NDArray[np.complexfloating]) -> Spectrogram:
         """Take the next block of chirps and give the columns that it completes.
@@ -204,11 +215,15 @@ class SlidingSpectrogram:
 def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
     """Cycles from one window to the next."""
     if not 0 <= tx < radar.n_tx:
-        raise InputError(f"spectrogram: tx = {tx}; radar '{radar.name}' has Tx 0 to {radar.n_tx - 1}")
+        raise InputError(
+            f"spectrogram: tx = {tx}; radar '{radar.name}' has Tx 0 to {radar.n_tx - 1}"
+        )
     if window < 2:
         raise InputError(f"spectrogram: window = {window} cycles; it must hold at least 2")
     if not 0 <= overlap < 1:
-        raise InputError(f"spectrogram: overlap = {overlap}; it is a share of the window, from 0 to below 1")
+        raise InputError(
+            f"spectrogram: overlap = {overlap}; it is a share of the window, from 0 to below 1"
+        )
     # 100 x (1 - 0.9) is a little less than 10, and means 10.
     return max(1, int(window * (1 - overlap) * (1 + 1e-12)))
 
@@ -233,12 +248,16 @@ def _columns(
     power = np.empty((len(starts), window), dtype=real)
     # One window at a time stays in the cache of a core, and a column cannot depend on its neighbours in the stream.
     for row, start in enumerate(starts):
-        spectra = scipy.fft.fft(removal.window(signals[start : start + window]) * weights, axis=0, overwrite_x=True)
+        spectra = scipy.fft.fft(
+            removal.window(signals[start : start + window]) * weights, axis=0, overwrite_x=True
+        )
         parts = spectra.view(real)
         squares = np.square(parts, out=parts)
         if radar.multiplexing == "ddm":
             # Rows of a Tx hold all of them, turned back by its code: by so many bands.
-            received = np.roll(squares[:, ::2] + squares[:, 1::2], tx * window // radar.n_doppler_bands, axis=0)
+            received = np.roll(
+                squares[:, ::2] + squares[:, 1::2], tx * window // radar.n_doppler_bands, axis=0
+            )
             own = without_copies(received, radar, 1) / radar.n_tx
             power[row] = own.sum(axis=1)
         else:

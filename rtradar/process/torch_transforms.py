@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     import torch
 
 
-def range_spectra(samples: NDArray[np.generic], scale: NDArray[np.float32], device: str) -> NDArray[np.complex64]:
+def range_spectra(
+    samples: NDArray[np.generic], scale: NDArray[np.float32], device: str
+) -> NDArray[np.complex64]:
     """Weighted FFTs over fast time.
 
     Parameters
@@ -35,7 +37,9 @@ def range_spectra(samples: NDArray[np.generic], scale: NDArray[np.float32], devi
         return _handed_back(torch.fft.fft(weighted, dim=2))
 
 
-def doppler_power(spectra: NDArray[np.complexfloating], scale: NDArray[np.float32], device: str) -> NDArray[np.float32]:
+def doppler_power(
+    spectra: NDArray[np.complexfloating], scale: NDArray[np.float32], device: str
+) -> NDArray[np.float32]:
     """Squared magnitudes of weighted FFTs over slow time, summed over channels.
 
     Parameters
@@ -53,7 +57,9 @@ def doppler_power(spectra: NDArray[np.complexfloating], scale: NDArray[np.float3
     import torch
 
     with torch.inference_mode():
-        weighted = _handed_over(spectra, device) * torch.as_tensor(scale, device=device)[:, None, None]
+        weighted = (
+            _handed_over(spectra, device) * torch.as_tensor(scale, device=device)[:, None, None]
+        )
         parts = torch.view_as_real(torch.fft.fft(weighted, dim=0))
         return _handed_back(parts.square_().sum(dim=(1, 3)))
 
@@ -62,7 +68,9 @@ def _handed_over(values: NDArray[np.generic], device: str) -> torch.Tensor:
     import torch
 
     # By way of memory that does not move, from which a GPU reads by itself; and torch takes no array that is read-only.
-    staged = torch.empty(values.shape, dtype=torch.complex64, pin_memory=torch.device(device).type == "cuda")
+    staged = torch.empty(
+        values.shape, dtype=torch.complex64, pin_memory=torch.device(device).type == "cuda"
+    )
     staged.numpy()[...] = values
     return staged.to(device)
 

@@ -23,7 +23,9 @@ def weights(window: ArrayLike | None, n: int, name: str) -> NDArray[np.float64]:
         return _hann_weights(n)
     given = np.asarray(window)
     if given.shape != (n,) or given.dtype.kind not in "fiu" or not np.isfinite(given).all():
-        raise InputError(f"{name} has shape {given.shape}, type {given.dtype}; it must be {n} finite real numbers")
+        raise InputError(
+            f"{name} has shape {given.shape}, type {given.dtype}; it must be {n} finite real numbers"
+        )
     total = float(given.sum())
     if total == 0:
         raise InputError(f"{name} sums to 0; a window needs weight")

@@ -34,7 +34,11 @@ class CrossArray(Waveform):
     @property
     def n_rx(self) -> int:
         """Length of the rx axis: receivers that are kept in one chirp."""
-        return self.rx_y + self.rx_z if self.channels == "all" else (self.rx_y if self.tx_y else self.rx_z)
+        return (
+            self.rx_y + self.rx_z
+            if self.channels == "all"
+            else (self.rx_y if self.tx_y else self.rx_z)
+        )
 
     @property
     def n_channels(self) -> int:
@@ -50,20 +54,32 @@ class CrossArray(Waveform):
     @cached_property
     def tx(self) -> NDArray[np.float64]:
         """Transmitters (tx, 3) [m], world."""
-        return self._lines(self.tx_y, self.tx_z, self.tx_spacing_wavelengths * self.start_wavelength_m)
+        return self._lines(
+            self.tx_y, self.tx_z, self.tx_spacing_wavelengths * self.start_wavelength_m
+        )
 
     @cached_property
     def rx(self) -> NDArray[np.float64]:
         """Receivers (rx, 3) [m], world: the y-line, then the z-line."""
-        return self._lines(self.rx_y, self.rx_z, self.rx_spacing_wavelengths * self.start_wavelength_m)
+        return self._lines(
+            self.rx_y, self.rx_z, self.rx_spacing_wavelengths * self.start_wavelength_m
+        )
 
     @cached_property
     def rx_of_tx(self) -> NDArray[np.int64]:
         """Indices into `rx` of the receivers kept while each Tx transmits, (tx, rx)."""
         if self.channels == "all":
             return np.tile(np.arange(self.rx_y + self.rx_z), (self.n_tx, 1))
-        y_line = np.tile(np.arange(self.rx_y), (self.tx_y, 1)) if self.tx_y else np.zeros((0, self.n_rx), np.int64)
-        z_line = np.tile(np.arange(self.rx_z) + self.rx_y, (self.tx_z, 1)) if self.tx_z else np.zeros((0, self.n_rx), np.int64)
+        y_line = (
+            np.tile(np.arange(self.rx_y), (self.tx_y, 1))
+            if self.tx_y
+            else np.zeros((0, self.n_rx), np.int64)
+        )
+        z_line = (
+            np.tile(np.arange(self.rx_z) + self.rx_y, (self.tx_z, 1))
+            if self.tx_z
+            else np.zeros((0, self.n_rx), np.int64)
+        )
         return np.concatenate([y_line, z_line])
 
     @property

@@ -21,8 +21,16 @@ _POSITIVE = (
     "rx_spacing_wavelengths",
 )
 _COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
-_CHOICES = {"channels": ("pairs", "all"), "polarization": ("v", "h"), "multiplexing": ("tdm", "fdm", "ddm")}
-_POWERS = (("transmit_power_dbm", -200, 200), ("noise_figure_db", 0, 100), ("noise_temperature_k", 0, 1e6))
+_CHOICES = {
+    "channels": ("pairs", "all"),
+    "polarization": ("v", "h"),
+    "multiplexing": ("tdm", "fdm", "ddm"),
+}
+_POWERS = (
+    ("transmit_power_dbm", -200, 200),
+    ("noise_figure_db", 0, 100),
+    ("noise_temperature_k", 0, 1e6),
+)
 _MAY_BE_UNKNOWN = ("transmit_power_dbm", "noise_figure_db")
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
@@ -53,33 +61,49 @@ def checked_values(values: Mapping[str, Any]) -> dict[str, Any]:
     for field in _POSITIVE:
         value = values[field]
         if not (_is_number(value) and _LEAST < value < _LARGEST):
-            raise InputError(f"{radar}: {field} = {shown(value)}; it must be a positive, finite number")
+            raise InputError(
+                f"{radar}: {field} = {shown(value)}; it must be a positive, finite number"
+            )
         found[field] = float(value)
     for field, lowest in _COUNTS.items():
         value = values[field]
         if not (_is_count(value) and lowest <= value <= _MOST):
-            raise InputError(f"{radar}: {field} = {shown(value)}; it must be a whole number from {lowest} to {_MOST}")
+            raise InputError(
+                f"{radar}: {field} = {shown(value)}; it must be a whole number from {lowest} to {_MOST}"
+            )
         found[field] = int(value)
     for field, allowed in _CHOICES.items():
         if values[field] not in allowed:
-            raise InputError(f"{radar}: {field} = {shown(values[field])}; allowed: {', '.join(allowed)}")
+            raise InputError(
+                f"{radar}: {field} = {shown(values[field])}; allowed: {', '.join(allowed)}"
+            )
     position = values["position_m"]
-    if not isinstance(position, list | tuple | np.ndarray) or len(position) != 3 or not all(map(_is_number, position)):
-        raise InputError(f"{radar}: position_m = {shown(position)}; it must be three finite numbers [m]")
+    if (
+        not isinstance(position, list | tuple | np.ndarray)
+        or len(position) != 3
+        or not all(map(_is_number, position))
+    ):
+        raise InputError(
+            f"{radar}: position_m = {shown(position)}; it must be three finite numbers [m]"
+        )
     found["position_m"] = tuple(float(value) for value in position)
     for field, least, most in _POWERS:
         value = values[field]
         if value is None and field in _MAY_BE_UNKNOWN:
             continue
         if not (_is_number(value) and least <= value <= most):
-            raise InputError(f"{radar}: {field} = {shown(value)}; it must lie between {least} and {most:g}")
+            raise InputError(
+                f"{radar}: {field} = {shown(value)}; it must lie between {least} and {most:g}"
+            )
         found[field] = float(value)
     # What they may be hangs on other fields; `check_multiplexing` says.
     if _is_number(values["carrier_step_hz"]):
         found["carrier_step_hz"] = float(values["carrier_step_hz"])
     if _is_count(values["doppler_bands"]):
         found["doppler_bands"] = int(values["doppler_bands"])
-    return found | {field: _antenna(radar, field, values[field]) for field in ("tx_antenna", "rx_antenna")}
+    return found | {
+        field: _antenna(radar, field, values[field]) for field in ("tx_antenna", "rx_antenna")
+    }
 
 
 def _antenna(radar: str, field: str, value: object) -> Antenna | None:
@@ -88,7 +112,9 @@ def _antenna(radar: str, field: str, value: object) -> Antenna | None:
     except InputError as error:
         raise InputError(f"{radar}: {field}: {error}") from None
     if made is not None and not isinstance(made, Antenna):
-        raise InputError(f"{radar}: {field} = {shown(value)}; it must be a table of an antenna's fields")
+        raise InputError(
+            f"{radar}: {field} = {shown(value)}; it must be a table of an antenna's fields"
+        )
     return made
 
 
@@ -149,10 +175,17 @@ def check_multiplexing(
     ------
     InputError
     """
-    for field, value, owner in (("carrier_step_hz", carrier_step_hz, "fdm"), ("doppler_bands", doppler_bands, "ddm")):
+    for field, value, owner in (
+        ("carrier_step_hz", carrier_step_hz, "fdm"),
+        ("doppler_bands", doppler_bands, "ddm"),
+    ):
         if value is not None and multiplexing != owner:
-            raise InputError(f"radar '{name}': {field} belongs to multiplexing = '{owner}'; leave it out")
-    if carrier_step_hz is not None and not (_is_number(carrier_step_hz) and sample_rate_hz <= carrier_step_hz):
+            raise InputError(
+                f"radar '{name}': {field} belongs to multiplexing = '{owner}'; leave it out"
+            )
+    if carrier_step_hz is not None and not (
+        _is_number(carrier_step_hz) and sample_rate_hz <= carrier_step_hz
+    ):
         raise InputError(
             f"radar '{name}': carrier_step_hz = {shown(carrier_step_hz)}; bands of the IF are {sample_rate_hz:g} Hz wide "
             "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
@@ -165,7 +198,9 @@ def check_multiplexing(
                 f"radar '{name}': {n_tx} carriers {step:g} Hz apart begin {below:g} Hz below start_frequency_hz = "
                 f"{start_frequency_hz:g}, at no positive frequency; raise that, or set them nearer (carrier_step_hz)"
             )
-    if doppler_bands is not None and not (_is_count(doppler_bands) and n_tx < doppler_bands <= _MOST):
+    if doppler_bands is not None and not (
+        _is_count(doppler_bands) and n_tx < doppler_bands <= _MOST
+    ):
         raise InputError(
             f"radar '{name}': doppler_bands = {shown(doppler_bands)}; it must be a whole number above {n_tx}, the number of Tx"
         )

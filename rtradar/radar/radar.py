@@ -18,7 +18,9 @@ from rtradar.system.registry import Registry
 from rtradar.system.toml_tables import check_keys, read_toml
 
 PRESETS = Registry(
-    "rtradar.radars", "radar", {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"}
+    "rtradar.radars",
+    "radar",
+    {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"},
 )
 """Radars that have a name: what makes them, called without arguments."""
 
@@ -89,7 +91,9 @@ class Radar(Schedule):
     rx_antenna: Antenna | None = None
 
     def __post_init__(self) -> None:
-        for field, value in checked_values({field.name: getattr(self, field.name) for field in dataclasses.fields(self)}).items():
+        for field, value in checked_values(
+            {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        ).items():
             object.__setattr__(self, field, value)
         check_array(self.name, (self.tx_y, self.tx_z), (self.rx_y, self.rx_z), self.channels)
         check_multiplexing(
@@ -167,7 +171,9 @@ class Radar(Schedule):
             return cls.preset(str(source))
         table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
         try:
-            check_keys("", table, (), tuple(sorted(field.name for field in dataclasses.fields(cls))))
+            check_keys(
+                "", table, (), tuple(sorted(field.name for field in dataclasses.fields(cls)))
+            )
             return cls(**{"name": printable(path.stem), **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None
@@ -182,9 +188,21 @@ class Radar(Schedule):
             Where the radar does not state its transmit power.
         """
         if self.transmit_power_dbm is None:
-            raise InputError(f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are not known; give it")
-        gains = math.prod(antenna.peak_gain for antenna in (self.tx_antenna, self.rx_antenna) if antenna is not None)
-        return float(1e-3 * 10 ** (self.transmit_power_dbm / 10) * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
+            raise InputError(
+                f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are not known; give it"
+            )
+        gains = math.prod(
+            antenna.peak_gain
+            for antenna in (self.tx_antenna, self.rx_antenna)
+            if antenna is not None
+        )
+        return float(
+            1e-3
+            * 10 ** (self.transmit_power_dbm / 10)
+            * gains
+            * self.wavelength_m**2
+            / (4 * math.pi) ** 3
+        )
 
     @property
     def noise_power_w(self) -> float:
@@ -199,6 +217,10 @@ class Radar(Schedule):
             Where the radar does not state its noise figure.
         """
         if self.noise_figure_db is None:
-            raise InputError(f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; give it")
+            raise InputError(
+                f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; give it"
+            )
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
-        return float(BOLTZMANN_J_PER_K * (self.noise_temperature_k + receiver_k) * self.sample_rate_hz)
+        return float(
+            BOLTZMANN_J_PER_K * (self.noise_temperature_k + receiver_k) * self.sample_rate_hz
+        )

@@ -41,7 +41,10 @@ class Schedule(CrossArray):
     @cached_property
     def tx_delay_s(self) -> NDArray[np.float64]:
         """How long after the first Tx each Tx transmits in a cycle, (tx,) [s]."""
-        return np.asarray(np.arange(self.n_tx) * (0.0 if self.at_once else self.chirp_duration_s), dtype=np.float64)
+        return np.asarray(
+            np.arange(self.n_tx) * (0.0 if self.at_once else self.chirp_duration_s),
+            dtype=np.float64,
+        )
 
     @cached_property
     def tx_offset_hz(self) -> NDArray[np.float64]:
@@ -66,7 +69,11 @@ class Schedule(CrossArray):
         """Bands of the Doppler axis under DDM, else 1."""
         if self.multiplexing != "ddm":
             return 1
-        return self.n_tx + math.ceil(self.n_tx / 3) if self.doppler_bands is None else self.doppler_bands
+        return (
+            self.n_tx + math.ceil(self.n_tx / 3)
+            if self.doppler_bands is None
+            else self.doppler_bands
+        )
 
     @property
     def cycles_per_frame(self) -> int:
@@ -175,7 +182,10 @@ class Schedule(CrossArray):
         (window,) float64
             Since the start of the capture [s].
         """
-        return np.asarray((np.asarray(starts) + self.cycles_per_frame / 2) * self.cycle_duration_s, dtype=np.float64)
+        return np.asarray(
+            (np.asarray(starts) + self.cycles_per_frame / 2) * self.cycle_duration_s,
+            dtype=np.float64,
+        )
 
     @property
     def max_velocity_mps(self) -> float:

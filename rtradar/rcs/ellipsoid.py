@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
-def ellipsoid(a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: ArrayLike) -> NDArray[np.float64]:
+def ellipsoid(
+    a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: ArrayLike
+) -> NDArray[np.float64]:
     """Monostatic radar cross-section of a conducting ellipsoid, far away, by geometric optics.
 
     Parameters
@@ -43,7 +45,9 @@ def ellipsoid(a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: A
     # Scaled by the largest axis: squares of squares of tiny or huge axes would leave the range of float64.
     largest = np.maximum(np.maximum(a, b), c)
     a, b, c = a / largest, b / largest, c / largest
-    support_squared = (a * sine * np.cos(phi)) ** 2 + (b * sine * np.sin(phi)) ** 2 + (c * np.cos(theta)) ** 2
+    support_squared = (
+        (a * sine * np.cos(phi)) ** 2 + (b * sine * np.sin(phi)) ** 2 + (c * np.cos(theta)) ** 2
+    )
     return np.asarray(np.pi * (largest * a * b * c / support_squared) ** 2)
 
 
@@ -69,9 +73,13 @@ def ellipsoid_radii(
 
     Equation :eq:`radii` of the theory page.
     """
-    a, b, c, theta, phi = np.broadcast_arrays(*(np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi)))
+    a, b, c, theta, phi = np.broadcast_arrays(
+        *(np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
+    )
     squares = np.stack([a, b, c], axis=-1) ** 2
-    normal = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+    normal = np.stack(
+        [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1
+    )
     h = np.sqrt((squares * normal**2).sum(-1))
     mean = (squares.sum(-1) - (squares**2 * normal**2).sum(-1) / h**2) / h / 2
     product = squares.prod(-1) / h**4

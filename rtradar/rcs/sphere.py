@@ -11,7 +11,9 @@ from scipy.special import jv, yv
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 
 
-def sphere(radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", "mie"] = "mie") -> NDArray[np.complex128]:
+def sphere(
+    radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", "mie"] = "mie"
+) -> NDArray[np.complex128]:
     """Monostatic scattering length of a conducting sphere, far away; the phase belongs to the path over its centre.
 
     Parameters
@@ -41,7 +43,9 @@ def sphere(radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", 
 
     Equations :eq:`sphere-go`, :eq:`sphere-po` and :eq:`sphere-mie` of the theory page.
     """
-    radius, frequency = np.broadcast_arrays(np.asarray(radius, np.float64), np.asarray(frequency, np.float64))
+    radius, frequency = np.broadcast_arrays(
+        np.asarray(radius, np.float64), np.asarray(frequency, np.float64)
+    )
     if not ((radius > 0).all() and (frequency > 0).all()):
         raise ValueError("rcs.sphere: radius [m] and frequency [Hz] must be positive")
     k = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
@@ -50,7 +54,9 @@ def sphere(radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", 
         return np.asarray(np.sqrt(np.pi) * radius * np.exp(2j * ka))
     if method == "po":
         # 1/(4k^2) (exp(2jka) - 1) cancels for small ka: expm1 keeps its digits.
-        integral = 2 * np.pi * (np.exp(2j * ka) * radius / (2j * k) + np.expm1(2j * ka) / (4 * k**2))
+        integral = (
+            2 * np.pi * (np.exp(2j * ka) * radius / (2j * k) + np.expm1(2j * ka) / (4 * k**2))
+        )
         return np.asarray(1j * k / np.sqrt(np.pi) * integral)
     if method == "mie":
         series = np.array([_mie_backscatter(x) for x in ka.ravel()]).reshape(ka.shape)

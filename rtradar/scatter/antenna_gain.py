@@ -21,7 +21,10 @@ def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
 
     The specular point but for terms of the part's size over its distance, and what is seen of a part lies about it.
     """
-    tx, rx = (_unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None]))
+    tx, rx = (
+        _unit(antenna - at.centres[:, None])
+        for antenna in (at.tx[:, None, None], at.rx[:, :, None])
+    )
     normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
     # A normal of a unit sphere that is stretched to the ellipsoid.
     local = at.semi_axes * _unit(normal)
@@ -35,7 +38,10 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
     """
     points = specular_points(at)
     gain = np.ones(points.shape[:-1])
-    for antenna, place in ((radar.tx_antenna, at.tx[:, None, None]), (radar.rx_antenna, at.rx[:, :, None])):
+    for antenna, place in (
+        (radar.tx_antenna, at.tx[:, None, None]),
+        (radar.rx_antenna, at.rx[:, :, None]),
+    ):
         if antenna is not None:
             gain *= np.sqrt(antenna.relative(points - place, radar.polarization))
     return gain
@@ -72,4 +78,7 @@ class _ThroughAntennas:
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     """Unit vectors; none, for no direction: of a part straight between Tx and Rx, which has no echo."""
-    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(np.float64).tiny))
+    return np.asarray(
+        vectors
+        / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
+    )

@@ -40,7 +40,13 @@ _COMMON = ("radar", "body", "variant", "spreading")
 
 
 def build_model(
-    fidelity: str, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, **model_options: Any
+    fidelity: str,
+    radar: Radar,
+    body: Body,
+    *,
+    variant: str = "auto",
+    spreading: bool = True,
+    **model_options: Any,
 ) -> EchoModel:
     """The model of that name, for this body and radar, through the radar's antennas.
 
@@ -76,11 +82,17 @@ def build_model(
         known = [name for name in taken if name not in _COMMON]
         for option in model_options:
             if option not in known:
-                raise InputError(f"fidelity '{fidelity}' has no option '{option}'; it has: {', '.join(known) or 'none'}")
+                raise InputError(
+                    f"fidelity '{fidelity}' has no option '{option}'; it has: {', '.join(known) or 'none'}"
+                )
         # What traces nothing takes no backend.
         backend = {"variant": variant} if takes_backend(fidelity) else {}
         model: EchoModel = kind(radar, body, spreading=spreading, **backend, **model_options)
-    return through_antennas(model if fidelity in MODELS.built_in else _Checked(fidelity, model, radar, body), radar, body)
+    return through_antennas(
+        model if fidelity in MODELS.built_in else _Checked(fidelity, model, radar, body),
+        radar,
+        body,
+    )
 
 
 def takes_backend(fidelity: str) -> bool:
@@ -112,7 +124,9 @@ class _Checked:
             if isinstance(model, Accountable):
                 self.account = self._account
         if not isinstance(self.variant, str | None):
-            raise MODELS.refuse(name, f"has a variant that is a {type(self.variant).__name__}, not a string or None")
+            raise MODELS.refuse(
+                name, f"has a variant that is a {type(self.variant).__name__}, not a string or None"
+            )
 
     def _account(self) -> dict[str, Any]:
         with MODELS.guarded(self._name):
@@ -128,9 +142,13 @@ class _Checked:
             raise MODELS.refuse(self._name, f"gave a {type(found).__name__}, not Echoes")
         expected = len(chirps), self._radar.n_rx
         if found.length.shape[:2] != expected:
-            raise MODELS.refuse(self._name, f"gave lengths of shape {found.length.shape}, not {expected} and echoes")
+            raise MODELS.refuse(
+                self._name, f"gave lengths of shape {found.length.shape}, not {expected} and echoes"
+            )
         if not np.array_equal(found.tx, self._radar.tx_of_chirp(chirps)):
-            raise MODELS.refuse(self._name, "named other Tx than those of its chirps (radar.tx_of_chirp)")
+            raise MODELS.refuse(
+                self._name, "named other Tx than those of its chirps (radar.tx_of_chirp)"
+            )
         if len(found.part) and not 0 <= found.part.min() <= found.part.max() < self._parts:
             raise MODELS.refuse(self._name, f"named parts outside 0 to {self._parts - 1}")
         if not (np.isfinite(found.length).all() and np.isfinite(found.amplitude).all()):

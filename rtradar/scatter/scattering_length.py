@@ -90,9 +90,13 @@ def scattering_length(
     """
     tx_array, rx_array, frequencies = _pairs(tx, rx, frequency)
     if polarization not in ("v", "h"):
-        raise InputError(f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h")
+        raise InputError(
+            f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h"
+        )
     if fidelity not in _HOMES:
-        raise InputError(f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(_HOMES)}")
+        raise InputError(
+            f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(_HOMES)}"
+        )
     home = _HOMES[fidelity]
     if isinstance(target, Ellipsoids):
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
@@ -107,14 +111,18 @@ def scattering_length(
     for option in model_options:
         if option not in known:
             allowed = ", ".join(known) or "none"
-            raise InputError(f"scattering_length: '{fidelity}' has no option '{option}'; it has: {allowed}")
+            raise InputError(
+                f"scattering_length: '{fidelity}' has no option '{option}'; it has: {allowed}"
+            )
     if isinstance(target, Ellipsoids) and home.hides:
         target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
         _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
         wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
         warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
-    return field(target, tx_array, rx_array, frequencies, polarization=polarization, **model_options)
+    return field(
+        target, tx_array, rx_array, frequencies, polarization=polarization, **model_options
+    )
 
 
 def _analytic_field(
@@ -141,15 +149,23 @@ def _specular_field(
     from rtradar.trace.backends.backend import select, use
     from rtradar.trace.body_tracer import BodyTracer
 
-    length, amplitude, points = mirror(tx, rx[:, None], *_poses(target, len(tx)), polarization=polarization, points=True)
+    length, amplitude, points = mirror(
+        tx, rx[:, None], *_poses(target, len(tx)), polarization=polarization, points=True
+    )
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
     tracer.pose(target.centres, target.frames)
-    return _sum(length, amplitude * unobstructed(tracer, tx, rx[:, None], points), tx, rx, frequency)
+    return _sum(
+        length, amplitude * unobstructed(tracer, tx, rx[:, None], points), tx, rx, frequency
+    )
 
 
-def _poses(target: Ellipsoids, pairs: int) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def _poses(
+    target: Ellipsoids, pairs: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """The pose repeated for every pair, and the semi-axes."""
-    centres, frames = (np.broadcast_to(array, (pairs, *array.shape)) for array in (target.centres, target.frames))
+    centres, frames = (
+        np.broadcast_to(array, (pairs, *array.shape)) for array in (target.centres, target.frames)
+    )
     return centres, frames, target.semi_axes
 
 
@@ -172,24 +188,42 @@ def _pairs(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Antennas (n, 3) twice and frequencies (n,)."""
     try:
-        tx_array, rx_array = (np.atleast_2d(np.asarray(antenna, dtype=np.float64)) for antenna in (tx, rx))
+        tx_array, rx_array = (
+            np.atleast_2d(np.asarray(antenna, dtype=np.float64)) for antenna in (tx, rx)
+        )
         frequencies = np.asarray(frequency, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError("scattering_length: tx, rx [m] and frequency [Hz] must be numbers") from None
+        raise InputError(
+            "scattering_length: tx, rx [m] and frequency [Hz] must be numbers"
+        ) from None
     shapes = f"tx {tx_array.shape}, rx {rx_array.shape}, frequency {frequencies.shape}"
     counts = {len(tx_array), len(rx_array), *frequencies.shape} - {1}
-    if tx_array.shape[1:] != (3,) or rx_array.shape[1:] != (3,) or frequencies.ndim > 1 or len(counts) > 1:
-        raise InputError(f"scattering_length: shapes {shapes}; they must be (n, 3), (n, 3), (n,), or one for all")
+    if (
+        tx_array.shape[1:] != (3,)
+        or rx_array.shape[1:] != (3,)
+        or frequencies.ndim > 1
+        or len(counts) > 1
+    ):
+        raise InputError(
+            f"scattering_length: shapes {shapes}; they must be (n, 3), (n, 3), (n,), or one for all"
+        )
     if not (np.isfinite(tx_array).all() and np.isfinite(rx_array).all()):
         raise InputError("scattering_length: tx and rx must be finite [m]")
     if not (np.isfinite(frequencies) & (frequencies > 0)).all():
         raise InputError("scattering_length: frequency must be positive and finite [Hz]")
     n = counts.pop() if counts else 1
-    return np.broadcast_to(tx_array, (n, 3)), np.broadcast_to(rx_array, (n, 3)), np.broadcast_to(frequencies, (n,))
+    return (
+        np.broadcast_to(tx_array, (n, 3)),
+        np.broadcast_to(rx_array, (n, 3)),
+        np.broadcast_to(frequencies, (n,)),
+    )
 
 
 def _refuse_inside(target: Ellipsoids, name: str, antennas: NDArray[np.float64]) -> None:
-    local = np.einsum("pji,npj->npi", target.frames, antennas[:, None] - target.centres) / target.semi_axes
+    local = (
+        np.einsum("pji,npj->npi", target.frames, antennas[:, None] - target.centres)
+        / target.semi_axes
+    )
     inside = np.argwhere((local**2).sum(axis=-1) <= 1)
     if len(inside):
         antenna, part = inside[0]

@@ -34,15 +34,23 @@ def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]
     import trimesh  # slow to import
 
     if not isinstance(target, trimesh.Trimesh):
-        raise InputError(f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or trimesh.Trimesh")
+        raise InputError(
+            f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or trimesh.Trimesh"
+        )
     vertices = np.asarray(target.vertices, dtype=np.float64)
-    mesh = checked_triangles("scattering_length: the mesh", vertices, np.asarray(target.faces, dtype=np.int64))
+    mesh = checked_triangles(
+        "scattering_length: the mesh", vertices, np.asarray(target.faces, dtype=np.int64)
+    )
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     nearest = _ON_SURFACE * float((high - low).max())
     for name, antennas in (("tx", tx), ("rx", rx)):
         # Only antennas in its box are worth a look at every triangle.
-        for index in np.flatnonzero(((antennas >= low - nearest) & (antennas <= high + nearest)).all(axis=1)):
+        for index in np.flatnonzero(
+            ((antennas >= low - nearest) & (antennas <= high + nearest)).all(axis=1)
+        ):
             if mesh.distance_m(antennas[index]) <= nearest:
                 where = "inside the mesh or on it" if mesh.closed else "on the mesh"
-                raise InputError(f"scattering_length: {name}[{index}] is {where}; antennas must stand outside the target")
+                raise InputError(
+                    f"scattering_length: {name}[{index}] is {where}; antennas must stand outside the target"
+                )
     return mesh

@@ -58,9 +58,15 @@ class Furniture:
         check_text("furniture", "name", self.name)
         where = f"furniture '{self.name}'"
         if not isinstance(self.material, Material):
-            raise InputError(f"{where}: material = {shown(self.material)}; it must be a Material, as material('wood') gives")
-        object.__setattr__(self, "position_m", check_vector(where, "position_m", self.position_m, 3))
-        object.__setattr__(self, "yaw_deg", check_number(where, "yaw_deg", self.yaw_deg, -360.0, 360.0))
+            raise InputError(
+                f"{where}: material = {shown(self.material)}; it must be a Material, as material('wood') gives"
+            )
+        object.__setattr__(
+            self, "position_m", check_vector(where, "position_m", self.position_m, 3)
+        )
+        object.__setattr__(
+            self, "yaw_deg", check_number(where, "yaw_deg", self.yaw_deg, -360.0, 360.0)
+        )
         object.__setattr__(self, "scale", check_number(where, "scale", self.scale, 1e-3, 1e3))
         if not isinstance(self.sheet, bool):
             raise InputError(f"{where}: sheet = {shown(self.sheet)}; it must be true or false")
@@ -111,9 +117,13 @@ class Furniture:
                 f"{where}: mesh '{self.mesh}' is not closed; close its holes, or say sheet = true if it is a thin sheet"
             )
         if read.closed and self.sheet:
-            raise InputError(f"{where}: mesh '{self.mesh}' is closed, so it is no thin sheet; leave sheet out")
+            raise InputError(
+                f"{where}: mesh '{self.mesh}' is closed, so it is no thin sheet; leave sheet out"
+            )
         if not read.closed and not self.material.conducts:
-            raise InputError(f"{where}: material '{self.material.name}' of a thin sheet; allowed: metal, perfect-conductor")
+            raise InputError(
+                f"{where}: material '{self.material.name}' of a thin sheet; allowed: metal, perfect-conductor"
+            )
         vertices = read.vertices * (self.scale * (self.metres_per_unit or 1.0))
         size = float(np.ptp(vertices, axis=0).max())
         if not SMALLEST_M <= size <= LARGEST_M:
@@ -122,7 +132,9 @@ class Furniture:
                 "see to metres_per_unit and scale"
             )
         angle = np.radians(self.yaw_deg)
-        turn = np.array([[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]])
+        turn = np.array(
+            [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
+        )
         vertices = vertices @ turn.T + np.array(self.position_m)
         vertices.setflags(write=False)
         return Triangles(vertices, read.faces, read.closed)

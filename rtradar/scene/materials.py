@@ -45,7 +45,10 @@ class Material:
     @property
     def conducts(self) -> bool:
         """Whether it reflects so well that a sheet of it needs no thickness: sigma of 1e6 S/m or more."""
-        return all(isinstance(band, Conductor) or (isinstance(band, PowerLaw) and band.c >= 1e6) for band in self.bands)
+        return all(
+            isinstance(band, Conductor) or (isinstance(band, PowerLaw) and band.c >= 1e6)
+            for band in self.bands
+        )
 
     def holds(self, frequency_hz: ArrayLike) -> NDArray[np.bool_]:
         """Whether its figures are given at these frequencies [Hz], of any shape.
@@ -92,8 +95,12 @@ class Material:
         return eta
 
     def _refuse(self, frequency_hz: float) -> None:
-        limits = " and ".join(f"{band.low_hz / 1e9:g} to {band.high_hz / 1e9:g} GHz" for band in self.bands)
-        others = ", ".join(sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz)))
+        limits = " and ".join(
+            f"{band.low_hz / 1e9:g} to {band.high_hz / 1e9:g} GHz" for band in self.bands
+        )
+        others = ", ".join(
+            sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz))
+        )
         raise InputError(
             f"material '{self.name}' at {frequency_hz / 1e9:g} GHz: {self.source} gives it for {limits}; known there: "
             f"{others or 'none'}; or give one of your own, with its source"
@@ -110,7 +117,10 @@ _TABLE_3: dict[str, tuple[tuple[float, float, float, float, float, float], ...]]
     "plasterboard": ((1.0, 100.0, 2.73, 0.0, 0.0085, 0.9395),),
     "wood": ((0.001, 100.0, 1.99, 0.0, 0.0047, 1.0718),),
     "glass": ((0.1, 100.0, 6.31, 0.0, 0.0036, 1.3394), (220.0, 450.0, 5.79, 0.0, 0.0004, 1.658)),
-    "ceiling-board": ((1.0, 100.0, 1.48, 0.0, 0.0011, 1.0750), (220.0, 450.0, 1.52, 0.0, 0.0029, 1.029)),
+    "ceiling-board": (
+        (1.0, 100.0, 1.48, 0.0, 0.0011, 1.0750),
+        (220.0, 450.0, 1.52, 0.0, 0.0029, 1.029),
+    ),
     "chipboard": ((1.0, 100.0, 2.58, 0.0, 0.0217, 0.7800),),
     "plywood": ((1.0, 40.0, 2.71, 0.0, 0.33, 0.0),),
     "marble": ((1.0, 60.0, 7.074, 0.0, 0.0055, 0.9262),),
@@ -127,11 +137,21 @@ _SKIN = ColeCole(1e9, 100e9, 4.0, ((32.0, 7.234e-12, 0.0), (1100.0, 32.481e-9, 0
 
 def _known() -> dict[str, Material]:
     found = [
-        Material(name=name, source=ITU, bands=tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows))
+        Material(
+            name=name,
+            source=ITU,
+            bands=tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows),
+        )
         for name, rows in _TABLE_3.items()
     ]
     found.append(Material(name="skin", source="dry skin of Gabriel et al. 1996", bands=(_SKIN,)))
-    found.append(Material(name="perfect-conductor", source="the limit of infinite conductivity", bands=(Conductor(),)))
+    found.append(
+        Material(
+            name="perfect-conductor",
+            source="the limit of infinite conductivity",
+            bands=(Conductor(),),
+        )
+    )
     return {material.name: material for material in found}
 
 
@@ -156,12 +176,22 @@ def material(name: str) -> Material:
         Where there is none.
     """
     if not isinstance(name, str) or name not in MATERIALS:
-        raise InputError(f"material {shown(name)} is unknown; allowed: {', '.join(sorted(MATERIALS))}")
+        raise InputError(
+            f"material {shown(name)} is unknown; allowed: {', '.join(sorted(MATERIALS))}"
+        )
     return MATERIALS[name]
 
 
 def own_material(
-    name: str, *, source: object, low_hz: object, high_hz: object, a: object, b: object = 0.0, c: object = 0.0, d: object = 0.0
+    name: str,
+    *,
+    source: object,
+    low_hz: object,
+    high_hz: object,
+    a: object,
+    b: object = 0.0,
+    c: object = 0.0,
+    d: object = 0.0,
 ) -> Material:
     """A material by constants of one's own: permittivity a f^b and conductivity c f^d [S/m], f in GHz.
 
@@ -188,13 +218,20 @@ def own_material(
     where = f"material {shown(name)}"
     check_text(where, "its name", name)
     if name in MATERIALS:
-        raise InputError(f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your own figures")
+        raise InputError(
+            f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your own figures"
+        )
     check_text(where, "source", source)
     low = check_number(where, "low_hz", low_hz, 1e6, 1e12)
     high = check_number(where, "high_hz", high_hz, low, 1e12)
     constants = [
         check_number(where, key, value, least, most)
-        for key, value, least, most in (("a", a, 0.0, 1e4), ("b", b, -10.0, 10.0), ("c", c, 0.0, 1e9), ("d", d, -10.0, 10.0))
+        for key, value, least, most in (
+            ("a", a, 0.0, 1e4),
+            ("b", b, -10.0, 10.0),
+            ("c", c, 0.0, 1e9),
+            ("d", d, -10.0, 10.0),
+        )
     ]
     law = PowerLaw(low, high, *constants)
     # A power law is monotonic, so its ends tell.

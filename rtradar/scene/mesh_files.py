@@ -126,7 +126,9 @@ def read_mesh(path: Path) -> Triangles:
     except OSError as error:
         raise InputError(f"{where}: {error.strerror}") from None
     if status.st_size > MOST_BYTES:
-        raise InputError(f"{where} has {status.st_size / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} MB are allowed")
+        raise InputError(
+            f"{where} has {status.st_size / 1e6:.0f} MB; {MOST_BYTES / 1e6:.0f} MB are allowed"
+        )
     return _read(path, status.st_mtime_ns, status.st_size)
 
 
@@ -151,11 +153,19 @@ def _in_ascii(content: bytes, ending: str) -> bytes:
     if ending == ".obj":
         text = len(content)
     elif ending == ".stl":
-        (count,) = struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4) if len(content) >= _STL_HEADER_BYTES else (0,)
+        (count,) = (
+            struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)
+            if len(content) >= _STL_HEADER_BYTES
+            else (0,)
+        )
         # What tells a binary file from one of text, which may both begin with "solid".
         text = 0 if len(content) == _STL_HEADER_BYTES + _STL_FACE_BYTES * count else len(content)
     elif ending == ".ply":
-        text = len(content) if re.match(rb"ply\s+format\s+ascii", content) else content.find(b"end_header")
+        text = (
+            len(content)
+            if re.match(rb"ply\s+format\s+ascii", content)
+            else content.find(b"end_header")
+        )
     else:  # the text of a glb is JSON, which is UTF-8
         text = 0
     return content[:text].translate(_TO_ASCII) + content[text:] if text > 0 else content
@@ -168,7 +178,11 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
         # No resolver: a file may name others (materials, buffers, pictures), and none of them is opened.
         with np.errstate(all="ignore"):
             loaded = trimesh.load_scene(
-                io.BytesIO(content), file_type=ending[1:], resolver=None, process=False, skip_materials=True
+                io.BytesIO(content),
+                file_type=ending[1:],
+                resolver=None,
+                process=False,
+                skip_materials=True,
             )
             pieces = _pieces(where, loaded)
     except InputError:
@@ -185,7 +199,9 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
     starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
     return (
         np.concatenate([vertices for vertices, _ in pieces]),
-        np.concatenate([faces + start for (_, faces), start in zip(pieces, starts[:-1], strict=True)]),
+        np.concatenate(
+            [faces + start for (_, faces), start in zip(pieces, starts[:-1], strict=True)]
+        ),
     )
 
 
@@ -207,7 +223,9 @@ def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[
     return pieces
 
 
-def checked_triangles(where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> Triangles:
+def checked_triangles(
+    where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]
+) -> Triangles:
     """A mesh, checked: each place once, no triangle without area, and, where it is closed, normals outward.
 
     Parameters
@@ -232,14 +250,23 @@ def checked_triangles(where: str, vertices: NDArray[np.float64], faces: NDArray[
     """
     import trimesh  # slow to import
 
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or (len(faces) and faces.shape[1] != 3):
-        raise InputError(f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) and (face, 3)")
+    if (
+        vertices.ndim != 2
+        or vertices.shape[1] != 3
+        or faces.ndim != 2
+        or (len(faces) and faces.shape[1] != 3)
+    ):
+        raise InputError(
+            f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) and (face, 3)"
+        )
     if not np.all(np.abs(vertices) <= _FARTHEST):
         raise InputError(f"{where}: a vertex is not finite, or more than {_FARTHEST:g} units away")
     if len(faces) == 0:
         raise InputError(f"{where} has no triangles; give a surface")
     if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, counted from 0")
+        raise InputError(
+            f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, counted from 0"
+        )
     places, which = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = which.reshape(-1)[faces]
     a, b, c = (places[faces[:, k]] for k in range(3))
@@ -251,11 +278,16 @@ def checked_triangles(where: str, vertices: NDArray[np.float64], faces: NDArray[
     mesh = trimesh.Trimesh(places, faces, process=False)
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
-        raise InputError(f"{where}: its triangles do not agree which side is outside; make their normals consistent")
+        raise InputError(
+            f"{where}: its triangles do not agree which side is outside; make their normals consistent"
+        )
     if closed:
         faces = _outward(where, mesh)
     used, faces = np.unique(faces, return_inverse=True)
-    places, faces = np.ascontiguousarray(places[used]), np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64)
+    places, faces = (
+        np.ascontiguousarray(places[used]),
+        np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64),
+    )
     places.setflags(write=False)
     faces.setflags(write=False)
     return Triangles(places, faces, closed)
@@ -268,12 +300,16 @@ def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
     faces, corners = np.array(mesh.faces), np.asarray(mesh.triangles - mesh.vertices.mean(axis=0))
     label: Any = graph.connected_component_labels  # has no types
     piece = label(mesh.face_adjacency, node_count=len(faces))
-    volume = np.bincount(piece, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])))
+    volume = np.bincount(
+        piece, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    )
     if volume.sum() < 0:
         faces, corners, volume = faces[:, ::-1], corners[:, ::-1], -volume
     inward = np.flatnonzero(volume < 0)
     if len(inward) > _MOST_INWARD:
-        raise InputError(f"{where}: {len(inward)} of its pieces are inside out; make their normals consistent")
+        raise InputError(
+            f"{where}: {len(inward)} of its pieces are inside out; make their normals consistent"
+        )
     for number in inward:
         own = piece == number
         if _winding(corners[~own] - corners[own][0, 0]) < 0.5:

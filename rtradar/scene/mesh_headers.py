@@ -46,14 +46,18 @@ def _check_ply(where: str, content: bytes, most_faces: int) -> None:
     for kind, count in re.findall(rb"element\s+(\S+)\s+(\d+)", head):
         most = most_faces if kind == b"face" else 3 * most_faces
         if len(count) > 12 or int(count) > most:
-            raise InputError(f"{where} promises more elements {shown(kind.decode('ascii', 'replace'))} than the {most} allowed")
+            raise InputError(
+                f"{where} promises more elements {shown(kind.decode('ascii', 'replace'))} than the {most} allowed"
+            )
 
 
 def _check_glb(where: str, content: bytes, most_faces: int) -> None:
     broken = f"{where} is broken or is no glb file"
     length = struct.unpack("<I", content[12:16])[0] if len(content) >= 20 else 0
     if not 0 < length <= _MOST_GLB_HEADER:
-        raise InputError(f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed")
+        raise InputError(
+            f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed"
+        )
     try:
         accessors = json.loads(content[20 : 20 + length]).get("accessors", [])
         count = sum(abs(int(accessor["count"])) for accessor in accessors)
@@ -61,4 +65,6 @@ def _check_glb(where: str, content: bytes, most_faces: int) -> None:
         raise InputError(f"{broken}: its header cannot be read") from None
     # An accessor without data is filled with zeros, however many it names, and one whose rows overlap grows.
     if count > _NUMBERS_A_FACE * most_faces:
-        raise InputError(f"{where} promises more data than the {most_faces} triangles that are allowed could have")
+        raise InputError(
+            f"{where} promises more data than the {most_faces} triangles that are allowed could have"
+        )

@@ -32,7 +32,9 @@ def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.inte
     -------
     mitsuba.Mesh
     """
-    mesh = mi.Mesh("triangles", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+    mesh = mi.Mesh(
+        "triangles", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False
+    )
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = np.ravel(vertices).astype(np.float32)
     parameters["faces"] = np.ravel(faces).astype(np.uint32)
@@ -40,7 +42,9 @@ def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.inte
     return mesh
 
 
-def build_body_scene(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer], n_parts: int) -> Any:
+def build_body_scene(
+    mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer], n_parts: int
+) -> Any:
     """Build a Mitsuba scene of ``n_parts`` instances of one closed triangle mesh.
 
     Parameters
@@ -57,9 +61,15 @@ def build_body_scene(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.i
     mitsuba.Scene
     """
     mesh = triangle_mesh(mi, vertices, faces)
-    description: dict[str, Any] = {"type": "scene", "shapes": {"type": "shapegroup", "unit_sphere": mesh}}
+    description: dict[str, Any] = {
+        "type": "scene",
+        "shapes": {"type": "shapegroup", "unit_sphere": mesh},
+    }
     for part in range(n_parts):
-        description[_part_key(part)] = {"type": "instance", "group": {"type": "ref", "id": "shapes"}}
+        description[_part_key(part)] = {
+            "type": "instance",
+            "group": {"type": "ref", "id": "shapes"},
+        }
     return mi.load_dict(description)
 
 

@@ -35,7 +35,10 @@ class PowerLaw:
         """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
         ghz = frequency_hz / 1e9
         conductivity = self.c * ghz**self.d
-        return np.asarray(self.a * ghz**self.b - 1j * conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM))
+        return np.asarray(
+            self.a * ghz**self.b
+            - 1j * conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
+        )
 
 
 @dataclass(frozen=True)

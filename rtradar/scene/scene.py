@@ -64,7 +64,9 @@ class Scene:
             names = [piece.name for piece in pieces]
             twice = sorted({name for name in names if names.count(name) > 1})
             if twice:
-                raise InputError(f"{where}: {key} has two of the name '{twice[0]}'; give each its own")
+                raise InputError(
+                    f"{where}: {key} has two of the name '{twice[0]}'; give each its own"
+                )
             object.__setattr__(self, key, pieces)
         if self.radar_position_m is not None:
             position = check_vector(where, "radar position_m", self.radar_position_m, 3)
@@ -105,13 +107,22 @@ class Scene:
                 found = False
             if not found:
                 known = ", ".join(sorted(file.stem for file in folder.glob("*.toml")))
-                raise InputError(f"scene {shown(str(source))} is unknown; allowed: {known}, or the path of a TOML file")
+                raise InputError(
+                    f"scene {shown(str(source))} is unknown; allowed: {known}, or the path of a TOML file"
+                )
         return read_scene(path)
 
     @property
     def materials(self) -> tuple[Material, ...]:
         """All that walls and furniture are made of, each once."""
-        return tuple(dict.fromkeys([*(wall.material for wall in self.walls), *(piece.material for piece in self.furniture)]))
+        return tuple(
+            dict.fromkeys(
+                [
+                    *(wall.material for wall in self.walls),
+                    *(piece.material for piece in self.furniture),
+                ]
+            )
+        )
 
     def place(self, radar: Radar) -> Radar:
         """The radar where it stands in this scene.
@@ -131,7 +142,11 @@ class Scene:
             Where a material is not known over the sweep of the radar, or the radar is inside a wall or nearer than 0.3 m to
             furniture.
         """
-        placed = radar if self.radar_position_m is None else replace(radar, position_m=self.radar_position_m)
+        placed = (
+            radar
+            if self.radar_position_m is None
+            else replace(radar, position_m=self.radar_position_m)
+        )
         start = placed.start_frequency_hz
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
@@ -153,8 +168,13 @@ class Scene:
             triangles = piece.triangles()
             low, high = triangles.vertices.min(axis=0), triangles.vertices.max(axis=0)
             # Only antennas near its box are worth a look at every triangle.
-            beside = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1) < MINIMUM_ANTENNA_DISTANCE_M
-            nearest = min((triangles.distance_m(antenna) for antenna in antennas[beside]), default=np.inf)
+            beside = (
+                np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1)
+                < MINIMUM_ANTENNA_DISTANCE_M
+            )
+            nearest = min(
+                (triangles.distance_m(antenna) for antenna in antennas[beside]), default=np.inf
+            )
             if nearest < MINIMUM_ANTENNA_DISTANCE_M:
                 raise InputError(
                     f"scene '{self.name}': '{piece.name}' is {nearest:.2f} m from an antenna of the radar at "

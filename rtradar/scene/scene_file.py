@@ -21,7 +21,10 @@ _TEXTS = ("name", "description")
 _TABLES = ("radar", "person", "materials", "room", "walls", "furniture")
 _SURFACE = ("material", "thickness_m"), ("roughness_m",)
 _WALL = ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m"), ("roughness_m",)
-_FURNITURE = ("name", "mesh", "material", "position_m"), ("yaw_deg", "scale", "metres_per_unit", "sheet")
+_FURNITURE = (
+    ("name", "mesh", "material", "position_m"),
+    ("yaw_deg", "scale", "metres_per_unit", "sheet"),
+)
 _MATERIAL = ("source", "low_hz", "high_hz", "a"), ("b", "c", "d")
 
 
@@ -46,7 +49,10 @@ def _scene(table: Table, path: Path) -> Scene:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
             raise InputError(f"{key} = {shown(table[key])}; it must be a string of one line")
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
-    walls = [*(_room(table["room"], materials) if "room" in table else ()), *_walls(table, materials)]
+    walls = [
+        *(_room(table["room"], materials) if "room" in table else ()),
+        *_walls(table, materials),
+    ]
     furniture = _furniture(table, materials, path.parent)
     fields: dict[str, Any] = {}
     if "radar" in table:
@@ -56,9 +62,16 @@ def _scene(table: Table, path: Path) -> Scene:
     if "person" in table:
         person = table_at("person", table)
         check_keys("[person] ", person, (), ("position_m", "heading_deg"))
-        fields |= {"person_" + key if key == "position_m" else key: value for key, value in person.items()}
+        fields |= {
+            "person_" + key if key == "position_m" else key: value for key, value in person.items()
+        }
     texts = {key: table[key] for key in _TEXTS if key in table}
-    scene = Scene(**{"name": printable(path.stem), **texts}, walls=tuple(walls), furniture=tuple(furniture), **fields)
+    scene = Scene(
+        **{"name": printable(path.stem), **texts},
+        walls=tuple(walls),
+        furniture=tuple(furniture),
+        **fields,
+    )
     for piece in scene.furniture:
         piece.triangles()
     return scene
@@ -82,7 +95,9 @@ def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     for side in ROOM_SIDES:
         key = side if side in table or side in ("floor", "ceiling") else "walls"
         if key not in table:
-            wanted = f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
+            wanted = (
+                f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
+            )
             raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
         surface = table_at(key, table, "room.")
         check_keys(f"[room.{key}] ", surface, *_SURFACE)
@@ -94,7 +109,10 @@ def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
 def _walls(table: Table, materials: Mapping[str, Material]) -> list[Wall]:
     def wall(where: str, piece: Table) -> Wall:
         check_keys(where, piece, *_WALL)
-        return _within(where, lambda: Wall(**{**piece, "material": _material("", piece["material"], materials)}))
+        return _within(
+            where,
+            lambda: Wall(**{**piece, "material": _material("", piece["material"], materials)}),
+        )
 
     return [wall(where, piece) for where, piece in tables_at("walls", table)]
 
@@ -117,7 +135,9 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
     if Path(text).suffix.lower() not in MESH_ENDINGS:
         raise InputError(f"{where}mesh = {shown(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
     if inside(folder, text) is None:
-        raise InputError(f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside it or below")
+        raise InputError(
+            f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside it or below"
+        )
     return folder / text
 
 

@@ -20,7 +20,9 @@ from rtradar.errors import InputError
 Polarization = Literal["te", "tm"]
 
 
-def reflection(eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization) -> NDArray[np.complex128]:
+def reflection(
+    eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
+) -> NDArray[np.complex128]:
     """Fresnel reflection of a plane wave in air by a half-space.
 
     Parameters
@@ -47,11 +49,17 @@ def reflection(eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarizat
     Equation :eq:`half-space` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    return np.where(conducts, _perfect(polarization), _interface(eta, cosine, _inner(eta, cosine), polarization))
+    return np.where(
+        conducts, _perfect(polarization), _interface(eta, cosine, _inner(eta, cosine), polarization)
+    )
 
 
 def slab(
-    eta: ArrayLike, thickness_m: ArrayLike, frequency_hz: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
+    eta: ArrayLike,
+    thickness_m: ArrayLike,
+    frequency_hz: ArrayLike,
+    cos_incidence: ArrayLike,
+    polarization: Polarization,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Reflection and transmission of a plane wave by a slab with air on both sides, all bounces inside it summed.
 
@@ -87,7 +95,10 @@ def slab(
     Equation :eq:`slab` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    thickness, frequency = np.asarray(thickness_m, dtype=np.float64), np.asarray(frequency_hz, dtype=np.float64)
+    thickness, frequency = (
+        np.asarray(thickness_m, dtype=np.float64),
+        np.asarray(frequency_hz, dtype=np.float64),
+    )
     for key, values in (("thickness_m", thickness), ("frequency_hz", frequency)):
         if not np.all((values > 0) & np.isfinite(values)):
             raise InputError(f"slab: {key} must be positive and finite")
@@ -100,7 +111,9 @@ def slab(
     loop = np.where(window, 1.0, loop)
     reflected = np.where(window, 0.0, face * (1 - through**2) / loop)
     transmitted = np.where(window, through, (1 - face**2) * through / loop)
-    return np.where(conducts, _perfect(polarization), reflected), np.where(conducts, 0.0, transmitted)
+    return np.where(conducts, _perfect(polarization), reflected), np.where(
+        conducts, 0.0, transmitted
+    )
 
 
 def slab_passes(
@@ -145,7 +158,11 @@ def slab_passes(
     k = 2 * pi * np.asarray(frequency_hz, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     through = np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner)
     if passes == 0:
-        term = face + (slab_passes(eta, thickness_m, frequency_hz, cosine, polarization, 2, rest=True) if rest else 0 * through)
+        term = face + (
+            slab_passes(eta, thickness_m, frequency_hz, cosine, polarization, 2, rest=True)
+            if rest
+            else 0 * through
+        )
         return np.where(conducts, _perfect(polarization), term)
     term = (1 - face**2) * (-face) ** (passes - 1) * through**passes
     if rest:
@@ -163,12 +180,16 @@ def _checked(
     cosine = np.asarray(cos_incidence, dtype=np.float64)
     # Cosines come from dot products of unit vectors, which rounding may leave a little above 1.
     if not np.all((cosine >= 0) & (cosine <= 1 + 1e-12)):
-        raise InputError("cos_incidence must be from 0 to 1: take the side of the wall that the wave meets")
+        raise InputError(
+            "cos_incidence must be from 0 to 1: take the side of the wall that the wave meets"
+        )
     values = np.asarray(eta, dtype=np.complex128)
     conducts = np.isinf(values)
     values = np.where(conducts, 1.0, values)
     if not np.all((values.imag <= 0) & (np.abs(values) > 0)):
-        raise InputError("eta must not be 0 nor have a positive imaginary part: exp(+j omega t) is meant")
+        raise InputError(
+            "eta must not be 0 nor have a positive imaginary part: exp(+j omega t) is meant"
+        )
     return values, np.minimum(cosine, 1.0), conducts
 
 
@@ -179,7 +200,10 @@ def _inner(eta: NDArray[np.complex128], cosine: NDArray[np.float64]) -> NDArray[
 
 
 def _interface(
-    eta: NDArray[np.complex128], cosine: NDArray[np.float64], inner: NDArray[np.complex128], polarization: Polarization
+    eta: NDArray[np.complex128],
+    cosine: NDArray[np.float64],
+    inner: NDArray[np.complex128],
+    polarization: Polarization,
 ) -> NDArray[np.complex128]:
     outer = cosine if polarization == "te" else eta * cosine
     total = outer + inner

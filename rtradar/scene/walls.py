@@ -64,7 +64,9 @@ class Wall:
             object.__setattr__(self, key, check_vector(where, key, getattr(self, key), 3))
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
-                raise InputError(f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} m long or more")
+                raise InputError(
+                    f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} m long or more"
+                )
         u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
         if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
             raise InputError(
@@ -72,9 +74,15 @@ class Wall:
                 "a wall is a rectangle"
             )
         if not isinstance(self.material, Material):
-            raise InputError(f"{where}: material = {shown(self.material)}; it must be a Material, as material('concrete') gives")
-        object.__setattr__(self, "thickness_m", check_number(where, "thickness_m", self.thickness_m, 1e-4, 10.0))
-        object.__setattr__(self, "roughness_m", check_number(where, "roughness_m", self.roughness_m, 0.0, 0.1))
+            raise InputError(
+                f"{where}: material = {shown(self.material)}; it must be a Material, as material('concrete') gives"
+            )
+        object.__setattr__(
+            self, "thickness_m", check_number(where, "thickness_m", self.thickness_m, 1e-4, 10.0)
+        )
+        object.__setattr__(
+            self, "roughness_m", check_number(where, "roughness_m", self.roughness_m, 0.0, 0.1)
+        )
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:
@@ -85,7 +93,9 @@ class Wall:
     @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Corners of the front face, anticlockwise seen from the front, (4, 3) [m]."""
-        corner, u, v = (np.array(vector) for vector in (self.corner_m, self.edge_u_m, self.edge_v_m))
+        corner, u, v = (
+            np.array(vector) for vector in (self.corner_m, self.edge_u_m, self.edge_v_m)
+        )
         return np.stack([corner, corner + u, corner + u + v, corner + v])
 
     @property
@@ -148,7 +158,9 @@ class Surface:
     roughness_m: float = 0.0
 
 
-def room_walls(size_m: Vector, corner_m: tuple[float, float], surfaces: Mapping[str, Surface]) -> tuple[Wall, ...]:
+def room_walls(
+    size_m: Vector, corner_m: tuple[float, float], surfaces: Mapping[str, Surface]
+) -> tuple[Wall, ...]:
     """The six walls of a box, fronts inward; its floor is z = 0.
 
     Parameters

@@ -24,7 +24,9 @@ def codes(radar: Radar, first_chirp: int, count: int) -> NDArray[np.complex64]:
     return np.exp(2j * np.pi * steps / radar.n_doppler_bands).astype(np.complex64)
 
 
-def receive(samples: NDArray[np.complexfloating], radar: Radar, first_chirp: int) -> NDArray[np.complexfloating]:
+def receive(
+    samples: NDArray[np.complexfloating], radar: Radar, first_chirp: int
+) -> NDArray[np.complexfloating]:
     """What the receivers get.
 
     Parameters
@@ -47,7 +49,9 @@ def receive(samples: NDArray[np.complexfloating], radar: Radar, first_chirp: int
     return np.asarray(coded, dtype=samples.dtype)
 
 
-def separate(received: NDArray[np.complexfloating], radar: Radar, first_chirp: int) -> NDArray[np.complexfloating]:
+def separate(
+    received: NDArray[np.complexfloating], radar: Radar, first_chirp: int
+) -> NDArray[np.complexfloating]:
     """Rows for each Tx from what the receivers got.
 
     Parameters

@@ -60,7 +60,9 @@ class Noise:
         -----
         Equation :eq:`snr` of the theory page.
         """
-        return cls(0.0 if math.isinf(snr_db) and snr_db > 0 else signal_power / 10 ** (snr_db / 10), seed)
+        return cls(
+            0.0 if math.isinf(snr_db) and snr_db > 0 else signal_power / 10 ** (snr_db / 10), seed
+        )
 
     def add(self, samples: NDArray[np.complex64], radar: Radar, first_chirp: int) -> None:
         """Add noise in place to what was received.
@@ -83,7 +85,9 @@ class Noise:
             Where the block does not start with a cycle.
         """
         if first_chirp % radar.n_tx:
-            raise ValueError(f"Noise.add: the block starts at chirp {first_chirp}; it must start with a cycle")
+            raise ValueError(
+                f"Noise.add: the block starts at chirp {first_chirp}; it must start with a cycle"
+            )
         if self.power == 0:
             return
         rows = 1 if radar.multiplexing == "ddm" else radar.n_tx
@@ -92,7 +96,9 @@ class Noise:
 
         def fill(first: int) -> None:
             part = samples[first : first + _CYCLES_AT_ONCE * rows]
-            numbers = range(first_cycle + first // rows, first_cycle + -(-(first + len(part)) // rows))
+            numbers = range(
+                first_cycle + first // rows, first_cycle + -(-(first + len(part)) // rows)
+            )
             _add(np.array([_stream(self.seed, number) for number in numbers]), rows, sigma, part)
 
         in_threads(fill, range(0, len(samples), _CYCLES_AT_ONCE * rows))
@@ -109,12 +115,16 @@ _ONE, _TWO, _HALF, _STEP = np.float32(1), np.float32(2), np.float32(0.5), np.flo
 _LN_2, _HALF_TURNS = np.float32(math.log(2)), np.float32(math.pi * 2.0**-32)
 _ROOT_HALF_BITS, _FRACTION_BITS, _FRACTION = np.int32(0x3F3504F3), 23, np.int32((1 << 23) - 1)
 _L3, _L5, _L7, _L9 = (np.float32(2 / odd) for odd in (3, 5, 7, 9))
-_S3, _S5, _S7, _S9, _S11 = (np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (3, 5, 7, 9, 11))
-_C2, _C4, _C6, _C8, _C10 = (np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (2, 4, 6, 8, 10))
+_S3, _S5, _S7, _S9, _S11 = (
+    np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (3, 5, 7, 9, 11)
+)
+_C2, _C4, _C6, _C8, _C10 = (
+    np.float32((-1) ** (n // 2) / math.factorial(n)) for n in (2, 4, 6, 8, 10)
+)
 
 
 @compiled(fastmath={"contract"})
-def _add(streams, rows, sigma, out):  # type: ignore[no-untyped-def]
+def _add(streams, rows, sigma, out):
     """Add complex normal numbers, of deviation sigma in either part, to ``out (chirp, rx, sample)``, from 64 random bits each.
 
     ``streams (cycle, 4)`` are states of SFC64 (Doty-Humphrey, PractRand), each for ``rows`` chirps: its steps, but for where its
@@ -133,7 +143,10 @@ def _add(streams, rows, sigma, out):  # type: ignore[no-untyped-def]
                     counter += np.uint64(1)
                     a, b = b ^ (b >> np.uint64(11)), c + (c << np.uint64(3))
                     c = ((c << np.uint64(24)) | (c >> np.uint64(40))) + bits
-                    for_radius[sample], for_angle[sample] = np.int32(bits >> np.uint64(33)), np.int32(np.uint32(bits))
+                    for_radius[sample], for_angle[sample] = (
+                        np.int32(bits >> np.uint64(33)),
+                        np.int32(np.uint32(bits)),
+                    )
                 samples = out[chirp, receiver]
                 for sample in range(n_samples):
                     u = np.float32((np.float32(for_radius[sample]) + _HALF) * _STEP)
@@ -150,4 +163,6 @@ def _add(streams, rows, sigma, out):  # type: ignore[no-untyped-def]
                     x = half * half
                     sine = half * (_ONE + x * (_S3 + x * (_S5 + x * (_S7 + x * (_S9 + x * _S11)))))
                     cosine = _ONE + x * (_C2 + x * (_C4 + x * (_C6 + x * (_C8 + x * _C10))))
-                    samples[sample] += complex(radius * (_ONE - _TWO * sine * sine), radius * _TWO * sine * cosine)
+                    samples[sample] += complex(
+                        radius * (_ONE - _TWO * sine * sine), radius * _TWO * sine * cosine
+                    )

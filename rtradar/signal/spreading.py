@@ -73,7 +73,9 @@ def spread_sum(
     cells, half = fft.next_fast_len(2 * samples), samples // 2
     gaussian, variance, weights = _gaussian(samples, cells)
     parabolas = _parabolas(powers, half / samples)
-    cubic = np.polynomial.polynomial.polyval((np.arange(samples) - half) / samples, _CUBIC).astype(np.float32)
+    cubic = np.polynomial.polynomial.polyval((np.arange(samples) - half) / samples, _CUBIC).astype(
+        np.float32
+    )
     for first in range(0, chirps, _CHIRPS_AT_ONCE):
         some = slice(first, min(first + _CHIRPS_AT_ONCE, chirps))
         sums = out[some]
@@ -81,7 +83,18 @@ def spread_sum(
         for number, parabola in enumerate(parabolas):
             grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
             own = length[some], amplitude[:, some]
-            _spread(*own, parabola, start_frequency, slope, sample_rate, half, samples, gaussian, variance, grid)
+            _spread(
+                *own,
+                parabola,
+                start_frequency,
+                slope,
+                sample_rate,
+                half,
+                samples,
+                gaussian,
+                variance,
+                grid,
+            )
             summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)
             if number > 0:
                 sums *= cubic
@@ -101,7 +114,9 @@ def _parabolas(powers: NDArray[np.float64], middle: float) -> list[NDArray[np.fl
             shifted[low] += math.comb(high, low) * middle ** (high - low) * powers[high]
     parts = np.zeros((2, _POWERS, nodes))
     for node, column in enumerate(shifted.T):
-        quotient, remainder = (np.atleast_1d(part) for part in np.polynomial.polynomial.polydiv(column, _CUBIC))
+        quotient, remainder = (
+            np.atleast_1d(part) for part in np.polynomial.polynomial.polydiv(column, _CUBIC)
+        )
         parts[0, : len(quotient), node], parts[1, : len(remainder), node] = quotient, remainder
     return list(parts) if len(powers) > _POWERS else [parts[1]]
 
@@ -116,18 +131,35 @@ def _gaussian(samples: int, cells: int) -> tuple[NDArray[np.float32], float, NDA
     distance = np.arange(_TAPS) - _BEFORE - place[:, None]
     turn = 2 * np.pi * (np.arange(samples) - samples // 2) / cells
     weights = np.exp(variance * turn**2 / 2) / math.sqrt(2 * math.pi * variance)
-    return np.exp(-(distance**2) / (2 * variance)).astype(np.float32), variance, weights.astype(np.float32)
+    return (
+        np.exp(-(distance**2) / (2 * variance)).astype(np.float32),
+        variance,
+        weights.astype(np.float32),
+    )
 
 
 @compiled(parallel=True, fastmath={"contract"})
-def _spread(  # type: ignore[no-untyped-def]
-    length, amplitude, powers, start_frequency, sweep, sample_rate, half, samples, gaussian, variance, grid
+def _spread(
+    length,
+    amplitude,
+    powers,
+    start_frequency,
+    sweep,
+    sample_rate,
+    half,
+    samples,
+    gaussian,
+    variance,
+    grid,
 ):
     chirps, receivers, cells = grid.shape
     nodes, echoes = amplitude.shape[0], length.shape[2]
     width = cells / (2 * math.pi * samples)
     for chirp in prange(chirps):
-        real, imaginary = np.empty(cells + _TAPS, dtype=np.float32), np.empty(cells + _TAPS, dtype=np.float32)
+        real, imaginary = (
+            np.empty(cells + _TAPS, dtype=np.float32),
+            np.empty(cells + _TAPS, dtype=np.float32),
+        )
         position, across, up = np.empty(echoes), np.empty(echoes), np.empty(echoes)
         for receiver in range(receivers):
             real[:] = 0
@@ -137,7 +169,9 @@ def _spread(  # type: ignore[no-untyped-def]
                 delay = length[chirp, receiver, echo] / SPEED_OF_LIGHT_MPS
                 beat = sweep * delay
                 position[echo] = beat / sample_rate * cells
-                across[echo], up[echo] = phasor(start_frequency * delay - 0.5 * beat * delay + half * beat / sample_rate)
+                across[echo], up[echo] = phasor(
+                    start_frequency * delay - 0.5 * beat * delay + half * beat / sample_rate
+                )
             for echo in range(echoes):
                 if not (position[echo] >= 0 and position[echo] < cells):
                     continue
@@ -154,21 +188,37 @@ def _spread(  # type: ignore[no-untyped-def]
                 off = position[echo] - cell - known
                 # A power of the sample number is one of the distance from the echo: constant + slant x + bend x^2.
                 bend = start * c2 * (width * width / variance)
-                constant, slant, bend = start * c0 + bend, start * c1 * complex(0.0, -width / variance), -bend / variance
+                constant, slant, bend = (
+                    start * c0 + bend,
+                    start * c1 * complex(0.0, -width / variance),
+                    -bend / variance,
+                )
                 # About the known place instead, and times the Gaussian's own change from there.
                 slope = off / variance
                 twist = slope * bend
-                bend, slant, constant = bend + slope * slant, slant + slope * constant - 2 * off * bend, constant - off * slant
+                bend, slant, constant = (
+                    bend + slope * slant,
+                    slant + slope * constant - 2 * off * bend,
+                    constant - off * slant,
+                )
                 c_re, c_im = np.float32(constant.real), np.float32(constant.imag)
                 s_re, s_im = np.float32(slant.real), np.float32(slant.imag)
                 b_re, b_im = np.float32(bend.real), np.float32(bend.imag)
                 t_re, t_im = np.float32(twist.real), np.float32(twist.imag)
                 nearest = np.float32(-_BEFORE - known)
-                taps, re, im = gaussian[place], real[cell : cell + _TAPS], imaginary[cell : cell + _TAPS]
+                taps, re, im = (
+                    gaussian[place],
+                    real[cell : cell + _TAPS],
+                    imaginary[cell : cell + _TAPS],
+                )
                 for tap in range(_TAPS):
                     distance = np.float32(tap) + nearest
-                    re[tap] += taps[tap] * (c_re + distance * (s_re + distance * (b_re + distance * t_re)))
-                    im[tap] += taps[tap] * (c_im + distance * (s_im + distance * (b_im + distance * t_im)))
+                    re[tap] += taps[tap] * (
+                        c_re + distance * (s_re + distance * (b_re + distance * t_re))
+                    )
+                    im[tap] += taps[tap] * (
+                        c_im + distance * (s_im + distance * (b_im + distance * t_im))
+                    )
             # Cells beyond an end are those at the other end; cell 0 of the grid stands at _BEFORE.
             for cell in range(_BEFORE):
                 real[cells + cell] += real[cell]
@@ -177,4 +227,6 @@ def _spread(  # type: ignore[no-untyped-def]
                 real[cell] += real[cells + cell]
                 imaginary[cell] += imaginary[cells + cell]
             for cell in range(cells):
-                grid[chirp, receiver, cell] = complex(real[_BEFORE + cell], imaginary[_BEFORE + cell])
+                grid[chirp, receiver, cell] = complex(
+                    real[_BEFORE + cell], imaginary[_BEFORE + cell]
+                )

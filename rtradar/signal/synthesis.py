@@ -102,19 +102,32 @@ def synthesize(
     """
     times = np.asarray(times, dtype=np.float64)
     if times.shape != echoes.length.shape[:1]:
-        raise ValueError(f"synthesize: times has shape {times.shape}; with these echoes it must be {echoes.length.shape[:1]}")
+        raise ValueError(
+            f"synthesize: times has shape {times.shape}; with these echoes it must be {echoes.length.shape[:1]}"
+        )
     _warn_of_motion_in_chirp(echoes, radar, times)
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
-    out = array_to_fill("synthesize", out, (*echoes.length.shape[:2], radar.samples_per_chirp), dtype)
+    out = array_to_fill(
+        "synthesize", out, (*echoes.length.shape[:2], radar.samples_per_chirp), dtype
+    )
     nodes = len(echoes.frequency)
-    many = echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES) and nodes <= MOST_NODES
+    many = (
+        echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES)
+        and nodes <= MOST_NODES
+    )
     many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES
     length = np.ascontiguousarray(echoes.length)
     waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
     if many:
         # A slice of a block serves as it is where amplitudes are only picked.
-        spread_sum(length, echoes.amplitude, _powers_of_sample_number(echoes.frequency, radar, 0.0), *waveform, out)
+        spread_sum(
+            length,
+            echoes.amplitude,
+            _powers_of_sample_number(echoes.frequency, radar, 0.0),
+            *waveform,
+            out,
+        )
     else:
         kind = np.float32 if out.dtype == np.complex64 and nodes <= _MOST_POWERS else np.float64
         amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
@@ -124,7 +137,16 @@ def synthesize(
         at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
 
         def fill(begin: int) -> None:
-            add_tones(begin, min(begin + at_once, len(out)), length, amplitude, powers, *waveform, *lanes, out)
+            add_tones(
+                begin,
+                min(begin + at_once, len(out)),
+                length,
+                amplitude,
+                powers,
+                *waveform,
+                *lanes,
+                out,
+            )
 
         in_threads(fill, range(0, len(out), at_once))
     return out
@@ -136,7 +158,9 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
     return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
 
-def _powers_of_sample_number(frequency: NDArray[np.float64], radar: Radar, origin: float) -> NDArray[np.float64]:
+def _powers_of_sample_number(
+    frequency: NDArray[np.float64], radar: Radar, origin: float
+) -> NDArray[np.float64]:
     """Weights (power, node) of an amplitude's values at the nodes in its polynomial in n / samples less an origin."""
     if len(frequency) == 1:
         return np.ones((1, 1))
@@ -160,7 +184,9 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     if rate.max(initial=0.0) * bins_of_rate <= MAX_BINS_IN_CHIRP:
         return
     for chirps, length in zip((before, after), lengths, strict=True):
-        rate[~((echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar))] = 0.0
+        rate[~((echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar))] = (
+            0.0
+        )
     bins = float(rate.max()) * bins_of_rate
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(

@@ -55,7 +55,7 @@ _HALF, _ONE, _TWO, _THREE = np.float32(0.5), np.float32(1), np.float32(2), np.fl
 
 
 @inlined(fastmath={"contract"})
-def _reduce(turns, angle, quadrant, place):  # type: ignore[no-untyped-def]
+def _reduce(turns, angle, quadrant, place):
     """Whole quarters taken out in float64, of which the quadrant is told; the rest is an angle of up to an eighth of a turn."""
     quarters = np.floor(4 * turns + 0.5)
     angle[place] = (turns - 0.25 * quarters) * (2 * math.pi)
@@ -63,13 +63,15 @@ def _reduce(turns, angle, quadrant, place):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath={"contract"})
-def _phasors(count, angle, quadrant, sines, cosines, re, im):  # type: ignore[no-untyped-def]
+def _phasors(count, angle, quadrant, sines, cosines, re, im):
     """exp(j angle) of what `_reduce` left, side by side, in the precision of the arrays."""
     for i in range(count):
         x = angle[i] * angle[i]
         sine = sines[3] + x * (sines[4] + x * (sines[5] + x * (sines[6] + x * sines[7])))
         sine = angle[i] * (sines[0] + x * (sines[1] + x * (sines[2] + x * sine)))
-        cosine = cosines[3] + x * (cosines[4] + x * (cosines[5] + x * (cosines[6] + x * cosines[7])))
+        cosine = cosines[3] + x * (
+            cosines[4] + x * (cosines[5] + x * (cosines[6] + x * cosines[7]))
+        )
         cosine = cosines[0] + x * (cosines[1] + x * (cosines[2] + x * cosine))
         odd = quadrant[i] == _ONE or quadrant[i] == _THREE
         across, up = (sine, cosine) if odd else (cosine, sine)
@@ -78,7 +80,7 @@ def _phasors(count, angle, quadrant, sines, cosines, re, im):  # type: ignore[no
 
 
 @inlined(fastmath={"contract"})
-def _lanes(row, rest, ramp, sines, cosines, out):  # type: ignore[no-untyped-def]
+def _lanes(row, rest, ramp, sines, cosines, out):
     """Powers of a tone side by side: those of the next step on the grid, turned by the rest [rad a sample] times each.
 
     That is up to 0.024 rad in the last lane: of either series the next terms are 0.024^8 / 8! = 3e-18 at most.
@@ -93,14 +95,14 @@ def _lanes(row, rest, ramp, sines, cosines, out):  # type: ignore[no-untyped-def
 
 
 @inlined(fastmath={"contract"})
-def _together(w, x, i):  # type: ignore[no-untyped-def]
+def _together(w, x, i):
     """The sum over `_TOGETHER` tones of their weights times what ``x`` has of each at a place ``i`` of its lanes."""
     first = w[0] * x[i] + w[1] * x[i + _NEXT] + w[2] * x[i + 2 * _NEXT]
     return first + w[3] * x[i + 3 * _NEXT] + w[4] * x[i + 4 * _NEXT] + w[5] * x[i + 5 * _NEXT]
 
 
 @inlined(fastmath={"contract"})
-def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  # type: ignore[no-untyped-def]
+def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):
     """Add tones to ``out``, two blocks at a time, of which ``middle (pair * tone,)`` are the values in their middle.
 
     ``lanes (tone * (real, imaginary) * lane,)``. As far before the middle as after it a power is the conjugate: ``sums`` of the
@@ -113,7 +115,10 @@ def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  #
         for tone in range(0, tones, _TOGETHER):
             at = pair * tones + tone
             re, im = middle_re[at : at + _TOGETHER], middle_im[at : at + _TOGETHER]
-            real, imaginary = (re[0], re[1], re[2], re[3], re[4], re[5]), (im[0], im[1], im[2], im[3], im[4], im[5])
+            real, imaginary = (
+                (re[0], re[1], re[2], re[3], re[4], re[5]),
+                (im[0], im[1], im[2], im[3], im[4], im[5]),
+            )
             some = lanes[tone * _NEXT : (tone + _TOGETHER) * _NEXT]
             for i in range(LANES):
                 sums[i] += _together(real, some, i)
@@ -122,7 +127,12 @@ def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  #
                 sums[i + 3 * LANES] += _together(imaginary, some, i + LANES)
         # Slices, for what is counted from their beginning is surely not counted from an end: lanes would be taken one by one.
         early, late, end = 2 * pair * LANES, (2 * pair + 1) * LANES, 2 * (pair + 1) * LANES
-        early_re, early_im, late_re, late_im = out_re[early:late], out_im[early:late], out_re[late:end], out_im[late:end]
+        early_re, early_im, late_re, late_im = (
+            out_re[early:late],
+            out_im[early:late],
+            out_re[late:end],
+            out_im[late:end],
+        )
         for i in range(LANES):
             late_re[i] += sums[i] - sums[i + 3 * LANES]
             late_im[i] += sums[i + LANES] + sums[i + 2 * LANES]
@@ -132,7 +142,9 @@ def _add_constants(pairs, lanes, middle_re, middle_im, sums, out_re, out_im):  #
 
 
 @inlined()
-def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im):  # type: ignore[no-untyped-def]
+def _weigh(
+    power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im
+):
     """Coefficients ``now (tone,)`` of a power of the sample number, and whether any is other than 0.
 
     ``change (node * tone,)`` is what amplitudes at the other frequencies are more than those at the ``first``: 0 where they are
@@ -143,7 +155,10 @@ def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, w
         weight_re[i], weight_im[i] = (first_re[i], first_im[i]) if power == 0 else (0.0, 0.0)
     for node in range(1, powers.shape[1]):
         share = powers[power, node]
-        own_re, own_im = change_re[(node - 1) * tones : node * tones], change_im[(node - 1) * tones : node * tones]
+        own_re, own_im = (
+            change_re[(node - 1) * tones : node * tones],
+            change_im[(node - 1) * tones : node * tones],
+        )
         for i in range(tones):
             weight_re[i] += share * own_re[i]
             weight_im[i] += share * own_im[i]
@@ -155,7 +170,7 @@ def _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, w
 
 
 @inlined()
-def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: ignore[no-untyped-def]
+def _heard(length, amplitude, beat_per_metre, sample_rate, heard):
     """Which echoes (echo,) are in the band and not hidden; ``amplitude (node, echo)``. Their count."""
     count = 0
     for echo in range(len(length)):
@@ -170,8 +185,20 @@ def _heard(length, amplitude, beat_per_metre, sample_rate, heard):  # type: igno
 
 
 @compiled(fastmath={"contract"})
-def add_tones(  # type: ignore[no-untyped-def]
-    begin, end, length, amplitude, powers, start_frequency, slope, sample_rate, table, ramp, sines, cosines, out
+def add_tones(
+    begin,
+    end,
+    length,
+    amplitude,
+    powers,
+    start_frequency,
+    slope,
+    sample_rate,
+    table,
+    ramp,
+    sines,
+    cosines,
+    out,
 ):
     """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the precision of ``ramp``, which counts the lanes.
 
@@ -180,16 +207,40 @@ def add_tones(  # type: ignore[no-untyped-def]
     receivers, samples = out.shape[1:]
     nodes, echoes = amplitude.shape[0], length.shape[2]
     # The last pair of blocks may reach past the last sample, the last tones added together past the last tone: these are silent.
-    pairs, tones = (samples + 2 * LANES - 1) // (2 * LANES), (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
-    sum_re, sum_im = np.empty(pairs * 2 * LANES, dtype=ramp.dtype), np.empty(pairs * 2 * LANES, dtype=ramp.dtype)
+    pairs, tones = (
+        (samples + 2 * LANES - 1) // (2 * LANES),
+        (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER,
+    )
+    sum_re, sum_im = (
+        np.empty(pairs * 2 * LANES, dtype=ramp.dtype),
+        np.empty(pairs * 2 * LANES, dtype=ramp.dtype),
+    )
     lanes, sums = on_cache_lines(tones * _NEXT, ramp), on_cache_lines(2 * _NEXT, ramp)
-    middle_re, middle_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
-    angle, quadrant = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
-    first_re, first_im, weight_re, weight_im = np.zeros(tones), np.zeros(tones), np.empty(tones), np.empty(tones)
+    middle_re, middle_im = (
+        np.empty(pairs * tones, dtype=ramp.dtype),
+        np.empty(pairs * tones, dtype=ramp.dtype),
+    )
+    angle, quadrant = (
+        np.empty(pairs * tones, dtype=ramp.dtype),
+        np.empty(pairs * tones, dtype=ramp.dtype),
+    )
+    first_re, first_im, weight_re, weight_im = (
+        np.zeros(tones),
+        np.zeros(tones),
+        np.empty(tones),
+        np.empty(tones),
+    )
     now_re, now_im = np.empty(tones, dtype=ramp.dtype), np.empty(tones, dtype=ramp.dtype)
     change_re, change_im = np.zeros((nodes - 1) * tones), np.zeros((nodes - 1) * tones)
-    weighed_re, weighed_im = np.empty(pairs * tones, dtype=ramp.dtype), np.empty(pairs * tones, dtype=ramp.dtype)
-    rest, middles, share = np.empty(tones, dtype=ramp.dtype), ramp + _HALF, np.empty(samples, dtype=ramp.dtype)
+    weighed_re, weighed_im = (
+        np.empty(pairs * tones, dtype=ramp.dtype),
+        np.empty(pairs * tones, dtype=ramp.dtype),
+    )
+    rest, middles, share = (
+        np.empty(tones, dtype=ramp.dtype),
+        ramp + _HALF,
+        np.empty(samples, dtype=ramp.dtype),
+    )
     start, step, heard = np.empty(tones), np.empty(tones), np.empty(echoes, np.int64)
     for sample in range(samples):
         share[sample] = sample / samples - MIDDLE
@@ -198,24 +249,39 @@ def add_tones(  # type: ignore[no-untyped-def]
     for chirp in range(begin, end):
         for receiver in range(receivers):
             own = amplitude[:, chirp, receiver]
-            count = _heard(length[chirp, receiver], own, slope / SPEED_OF_LIGHT_MPS, sample_rate, heard)
+            count = _heard(
+                length[chirp, receiver], own, slope / SPEED_OF_LIGHT_MPS, sample_rate, heard
+            )
             for i in range(count):
                 delay = length[chirp, receiver, heard[i]] / SPEED_OF_LIGHT_MPS
                 # Turns at the first sample, and from one to the next.
-                start[i], step[i] = delay * (start_frequency - 0.5 * slope * delay), slope * delay / sample_rate
+                start[i], step[i] = (
+                    delay * (start_frequency - 0.5 * slope * delay),
+                    slope * delay / sample_rate,
+                )
             for i in range(tones):
                 here = own[0, heard[i]] if i < count else 0j
                 first_re[i], first_im[i] = here.real, here.imag
                 for node in range(1, nodes):
                     there = own[node, heard[i]] - here if i < count else 0j
-                    change_re[(node - 1) * tones + i], change_im[(node - 1) * tones + i] = there.real, there.imag
+                    change_re[(node - 1) * tones + i], change_im[(node - 1) * tones + i] = (
+                        there.real,
+                        there.imag,
+                    )
             for i in range(count):
                 row = int(step[i] * _GRID + 0.5)
                 rest[i] = (step[i] - row / _GRID) * (2 * math.pi)
-                _lanes(table[row], rest[i], middles, sines, cosines, lanes[i * _NEXT : (i + 1) * _NEXT])
+                _lanes(
+                    table[row], rest[i], middles, sines, cosines, lanes[i * _NEXT : (i + 1) * _NEXT]
+                )
             for pair in range(pairs):
                 for i in range(tones):
-                    _reduce(start[i] + step[i] * ((2 * pair + 1) * LANES - 0.5), angle, quadrant, pair * tones + i)
+                    _reduce(
+                        start[i] + step[i] * ((2 * pair + 1) * LANES - 0.5),
+                        angle,
+                        quadrant,
+                        pair * tones + i,
+                    )
             _phasors(pairs * tones, angle, quadrant, sines, cosines, middle_re, middle_im)
             sum_re[:] = 0.0
             sum_im[:] = 0.0
@@ -224,7 +290,18 @@ def add_tones(  # type: ignore[no-untyped-def]
                 for sample in range(samples if power < nodes - 1 else 0):
                     sum_re[sample] *= share[sample]
                     sum_im[sample] *= share[sample]
-                if not _weigh(power, powers, first_re, first_im, change_re, change_im, weight_re, weight_im, now_re, now_im):
+                if not _weigh(
+                    power,
+                    powers,
+                    first_re,
+                    first_im,
+                    change_re,
+                    change_im,
+                    weight_re,
+                    weight_im,
+                    now_re,
+                    now_im,
+                ):
                     continue
                 for pair in range(pairs):
                     for i in range(tones):

@@ -36,7 +36,9 @@ def printable(text: str) -> str:
 def inside(folder: Path, name: str) -> Path | None:
     """A file or folder in ``folder`` or below, links followed; None where the name leads elsewhere, or nowhere at all."""
     try:
-        if not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(folder.resolve()):
+        if not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(
+            folder.resolve()
+        ):
             return folder / name
     except (OSError, RuntimeError, ValueError):  # a circle of links, a null character
         pass
@@ -47,17 +49,29 @@ def check_number(where: str, key: str, value: object, least: float, most: float)
     """A finite number from ``least`` to ``most``, as a float."""
     number = _number(value)
     if number is None or not least <= number <= most:
-        raise InputError(f"{where}: {key} = {shown(value)}; it must be a number from {least:g} to {most:g}")
+        raise InputError(
+            f"{where}: {key} = {shown(value)}; it must be a number from {least:g} to {most:g}"
+        )
     return number
 
 
-def check_vector(where: str, key: str, value: object, size: int, most: float = 1000.0) -> tuple[float, ...]:
+def check_vector(
+    where: str, key: str, value: object, size: int, most: float = 1000.0
+) -> tuple[float, ...]:
     """So many finite numbers, none larger than ``most`` in size, as a tuple of floats."""
-    if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str | bytes) and len(value) == size:
-        numbers = [number for number in map(_number, value) if number is not None and abs(number) <= most]
+    if (
+        isinstance(value, Sequence | np.ndarray)
+        and not isinstance(value, str | bytes)
+        and len(value) == size
+    ):
+        numbers = [
+            number for number in map(_number, value) if number is not None and abs(number) <= most
+        ]
         if len(numbers) == size:
             return tuple(numbers)
-    raise InputError(f"{where}: {key} = {shown(value)}; it must be {size} numbers from {-most:g} to {most:g}")
+    raise InputError(
+        f"{where}: {key} = {shown(value)}; it must be {size} numbers from {-most:g} to {most:g}"
+    )
 
 
 def check_text(where: str, key: str, value: object) -> str:
@@ -67,7 +81,9 @@ def check_text(where: str, key: str, value: object) -> str:
     raise InputError(f"{where}: {key} = {shown(value)}; it must be a string of one line, not empty")
 
 
-def array_to_fill(where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
+def array_to_fill(
+    where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike
+) -> NDArray[Any]:
     """The array that was given to be filled; where none was, a new one."""
     if out is None:
         return np.empty(shape, dtype=dtype)

@@ -39,7 +39,11 @@ _OTHER_KINDS = {
 _PATIENCE_S = 1.0
 """Waited, at the end, for a file that is just taking its name."""
 
-DISK_ERRORS = frozenset(getattr(errno, name) for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS") if hasattr(errno, name))
+DISK_ERRORS = frozenset(
+    getattr(errno, name)
+    for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")
+    if hasattr(errno, name)
+)
 """Numbers of errors that say that a disk takes no more."""
 
 _T = TypeVar("_T")
@@ -70,21 +74,27 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
     target = Path(path)
     with suppress(OSError):
         if not stat.S_ISREG(target.stat().st_mode):
-            raise InputError(f"cannot write '{target}': what has that name is no file; give another path")
+            raise InputError(
+                f"cannot write '{target}': what has that name is no file; give another path"
+            )
     # Not by the process alone: on a shared disk another machine may write the same file.
     beside = target.with_name(f".{target.name}.{secrets.token_hex(_TOKEN_BYTES)}.part")
     with unfinished(lambda: beside.unlink(missing_ok=True)):
         try:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
         except OSError as error:
-            raise InputError(f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written") from None
+            raise InputError(
+                f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written"
+            ) from None
         try:
             with file:
                 yield file
             with uninterruptible():
                 os.replace(beside, target)
         except OSError as error:
-            raise InputError(f"cannot write '{target}': {error.strerror}; give another path or make room") from error
+            raise InputError(
+                f"cannot write '{target}': {error.strerror}; give another path or make room"
+            ) from error
         finally:
             beside.unlink(missing_ok=True)
 
@@ -200,7 +210,9 @@ def check_place(path: Path | None, option: str = "--json") -> None:
     """
     if path is None:
         return
-    folder = Path(os.path.realpath(path)).parent  # links that lead in a circle stay as they are, and are replaced
+    folder = Path(
+        os.path.realpath(path)
+    ).parent  # links that lead in a circle stay as they are, and are replaced
     try:
         if not folder.is_dir():
             raise InputError(f"{option} {path}: there is no folder '{folder}'; make it first")
@@ -230,7 +242,9 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
         with atomic_file(path) as file:
             file.write(text.encode())
     except OSError as error:
-        raise InputError(f"cannot write '{path}': {error.strerror}; give another file (--json)") from None
+        raise InputError(
+            f"cannot write '{path}': {error.strerror}; give another file (--json)"
+        ) from None
     except InputError as error:
         raise InputError(f"{error} (--json)") from None
 
@@ -238,7 +252,9 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
 def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
     """The one that this is a name of, such as /dev/stdout; it may well be a file, which has to stay."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(OSError, ValueError, AttributeError):  # no such path; closed; none, or no file at all
+        with suppress(
+            OSError, ValueError, AttributeError
+        ):  # no such path; closed; none, or no file at all
             if os.path.samestat(os.stat(path), os.fstat(stream.fileno())):
                 return stream
     return None
@@ -286,7 +302,9 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
                             found[entry.filename.removesuffix(".npy")] = array
         except OSError:
             raise
-        except Exception as error:  # what readers of archives and of headers raise at damaged ones is of any type
+        except (
+            Exception
+        ) as error:  # what readers of archives and of headers raise at damaged ones is of any type
             raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
     return found
 
@@ -294,7 +312,11 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
 def _check_claim(member: Any, size: int) -> None:
     """Raise where an array would take more memory than its file has: NumPy takes it before it looks."""
     version = np.lib.format.read_magic(member)
-    read_header = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    read_header = (
+        np.lib.format.read_array_header_1_0
+        if version == (1, 0)
+        else np.lib.format.read_array_header_2_0
+    )
     shape, _, kind = read_header(member)
     if min(shape, default=1) < 0 or math.prod(shape) * max(kind.itemsize, 1) > size:
         raise ValueError("it claims more than it holds")
@@ -303,7 +325,11 @@ def _check_claim(member: Any, size: int) -> None:
 def _check_text(array: NDArray[Any]) -> None:
     """Raise where a text holds a number that is no character: Python cannot even show it."""
     if array.dtype.kind == "U" and array.dtype.itemsize:
-        letters = np.ascontiguousarray(array.astype(array.dtype.newbyteorder("="))).reshape(-1, 1).view(np.uint32)
+        letters = (
+            np.ascontiguousarray(array.astype(array.dtype.newbyteorder("=")))
+            .reshape(-1, 1)
+            .view(np.uint32)
+        )
         if ((letters > sys.maxunicode) | ((letters >= 0xD800) & (letters < 0xE000))).any():
             raise ValueError("a text holds what is no character")
 
@@ -341,7 +367,10 @@ def stored(file: Any, name: str) -> Any:
         data = data[step]
     if not isinstance(data, h5py.Dataset) or data.external or data.is_virtual:
         raise ValueError(f"{name} is not in this file")
-    if data.shape is None or math.prod(data.shape) * max(data.dtype.itemsize, 1) > file.id.get_filesize():
+    if (
+        data.shape is None
+        or math.prod(data.shape) * max(data.dtype.itemsize, 1) > file.id.get_filesize()
+    ):
         raise ValueError(f"{name} claims more than there is")
     return data
 
@@ -406,9 +435,13 @@ def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
     try:
         _check_regular(path, os.stat(path))
         # O_NONBLOCK means nothing to regular files. Windows has neither flag.
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        descriptor = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
     except ValueError as error:  # a null character, or half of one that UTF-16 writes as two
-        raise OSError(errno.EINVAL, f"no file can have this name ({' '.join(str(error).split())})") from None
+        raise OSError(
+            errno.EINVAL, f"no file can have this name ({' '.join(str(error).split())})"
+        ) from None
     try:
         _check_regular(path, os.fstat(descriptor))
         return open(descriptor, "rb")
@@ -423,7 +456,9 @@ def special_kind(path: str | os.PathLike[str]) -> str:
         kind = stat.S_IFMT(os.stat(path).st_mode)
     except (OSError, ValueError):
         return ""
-    return "" if kind in (stat.S_IFREG, stat.S_IFDIR) else _OTHER_KINDS.get(kind, "of an unknown kind")
+    return (
+        "" if kind in (stat.S_IFREG, stat.S_IFDIR) else _OTHER_KINDS.get(kind, "of an unknown kind")
+    )
 
 
 def _check_regular(path: str | os.PathLike[str], status: os.stat_result) -> None:
@@ -457,6 +492,9 @@ def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
     """
     with open_regular(path) as file:
         # The size is asked first: what is read may take no more memory than what is allowed.
-        if os.fstat(file.fileno()).st_size > most_bytes or len(content := file.read(most_bytes + 1)) > most_bytes:
+        if (
+            os.fstat(file.fileno()).st_size > most_bytes
+            or len(content := file.read(most_bytes + 1)) > most_bytes
+        ):
             raise ValueError(f"more than {most_bytes / 1e6:g} MB")
         return content

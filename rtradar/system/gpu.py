@@ -35,7 +35,9 @@ def _found() -> tuple[int | None, str]:
     if driver.cuInit(0) or driver.cuDeviceGetCount(ctypes.byref(count)) or count.value < 1:
         return None, ""
     name = ctypes.create_string_buffer(_NAME_BYTES)
-    if driver.cuDeviceGet(ctypes.byref(device), 0) or driver.cuDeviceGetName(name, _NAME_BYTES, device):
+    if driver.cuDeviceGet(ctypes.byref(device), 0) or driver.cuDeviceGetName(
+        name, _NAME_BYTES, device
+    ):
         return None, ""
     driver.cuDriverGetVersion(ctypes.byref(version))
     return os.getpid(), f"{name.value.decode(errors='replace')}, driver {version.value}"
@@ -64,7 +66,10 @@ def gpu_for_ffts() -> tuple[str | None, str]:
     except Exception as error:  # whatever a broken installation raises
         return None, f"{gpu_name()}, but torch fails: {first_line(error)}"
     if not there:
-        return None, f"{gpu_name()}, which torch {torch.__version__} cannot use; install a CUDA build of torch"
+        return (
+            None,
+            f"{gpu_name()}, which torch {torch.__version__} cannot use; install a CUDA build of torch",
+        )
     return "cuda", f"{gpu_name()}, wherever it is found to be faster"
 
 

@@ -104,7 +104,9 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
             _remove_leftovers(place, but=_read_list(place, kind).get("unfinished"))
             work = stack.enter_context(_new_work_folder(place))
         except OSError as error:
-            raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+            raise InputError(
+                f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+            ) from None
 
         moving = False
 
@@ -113,7 +115,9 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                 return  # what is moved and what is not belong together
             gone = f"{work.path.name}-gone"
             with suppress(OSError):
-                place.move(work.path.name, place, gone)  # nobody who still writes finds the way into it
+                place.move(
+                    work.path.name, place, gone
+                )  # nobody who still writes finds the way into it
             place.remove_tree(gone)
             for folder in made if place.is_in_place() else ():
                 with suppress(OSError):
@@ -129,7 +133,9 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         moving = True
                         _move(work, place, kind)
                     place.remove_tree(work.path.name)
-                    _remove_leftovers(place, but=None)  # what a killed command had still to move is replaced now
+                    _remove_leftovers(
+                        place, but=None
+                    )  # what a killed command had still to move is replaced now
             except BaseException as error:
                 if moving:
                     raise _parted(out, work.path, error) from None
@@ -140,7 +146,9 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         f"'{out}' was renamed, moved or removed while the command wrote into it; give a folder that stays (--out)"
                     ) from None
                 if why := _trouble_of_disk(error):
-                    raise InputError(f"cannot write to '{out}': {why}; make room, or give another folder (--out)") from None
+                    raise InputError(
+                        f"cannot write to '{out}': {why}; make room, or give another folder (--out)"
+                    ) from None
                 raise
 
 
@@ -161,10 +169,14 @@ def alone_in(folder: Path) -> Iterator[None]:
     try:
         place = _Directory.at(folder)
     except OSError as error:
-        raise InputError(f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)") from None
+        raise InputError(
+            f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)"
+        ) from None
     with place:
         if not place.lock():
-            raise InputError(f"another command writes into '{folder}'; wait for its end, or give another folder (--out)")
+            raise InputError(
+                f"another command writes into '{folder}'; wait for its end, or give another folder (--out)"
+            )
         yield
 
 
@@ -212,7 +224,9 @@ def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dic
             elif mode:
                 found[path] = mode
         elif kind.is_file(prefix + own) and own not in names and directory.mode(own):
-            found[path] = directory.mode(name)  # the same file to a file system that takes no notice of capitals
+            found[path] = directory.mode(
+                name
+            )  # the same file to a file system that takes no notice of capitals
     return found
 
 
@@ -234,11 +248,19 @@ def _entries(names: Iterable[str]) -> list[str]:
 def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
     """What the list of a folder says, ``files`` and perhaps ``unfinished``; empty where it is none of ours."""
     told = _read_json(directory, kind.listing)
-    if not isinstance(told, dict) or not isinstance(files := told.get("files"), list) or kind.listing not in files:
+    if (
+        not isinstance(told, dict)
+        or not isinstance(files := told.get("files"), list)
+        or kind.listing not in files
+    ):
         return {}
     unfinished = told.get("unfinished")
     found: dict[str, Any] = {"files": frozenset(name for name in files if isinstance(name, str))}
-    return found | ({"unfinished": unfinished} if isinstance(unfinished, str) and _WORK.fullmatch(unfinished) else {})
+    return found | (
+        {"unfinished": unfinished}
+        if isinstance(unfinished, str) and _WORK.fullmatch(unfinished)
+        else {}
+    )
 
 
 def _read_json(directory: _Directory, name: str) -> Any:
@@ -255,17 +277,24 @@ def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
     return {
         name
         for name, mode in found.items()
-        if stat.S_ISREG(mode) and (name in files or (stores and name.startswith(stores) and _STORE.match(name)))
+        if stat.S_ISREG(mode)
+        and (name in files or (stores and name.startswith(stores) and _STORE.match(name)))
     }
 
 
 def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> None:
     found = _existing(place, kind)
     foreign = sorted(found.keys() - _owned(found, _read_list(place, kind).get("files", ())))
-    odd = [name for name in foreign if kind.is_folder(name) or not (stat.S_ISREG(found[name]) or stat.S_ISLNK(found[name]))]
+    odd = [
+        name
+        for name in foreign
+        if kind.is_folder(name) or not (stat.S_ISREG(found[name]) or stat.S_ISLNK(found[name]))
+    ]
     if overwrite and odd:
         is_not = "no folder" if kind.is_folder(odd[0]) else "no file"
-        raise InputError(f"'{place.path}' holds '{odd[0]}', which is {is_not}; move it away, or give another folder (--out)")
+        raise InputError(
+            f"'{place.path}' holds '{odd[0]}', which is {is_not}; move it away, or give another folder (--out)"
+        )
     if foreign and not overwrite:
         more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
         raise InputError(
@@ -279,7 +308,9 @@ def _check_made(work: _Directory, kind: OutputFiles) -> None:
     made = list(_all_files(work))
     unforeseen = [name for name in made if not kind.is_file(name)]
     if unforeseen or kind.listing not in made:
-        raise AssertionError(f"{[*unforeseen, kind.listing][0]}: not foreseen, or a listing that was not written")
+        raise AssertionError(
+            f"{[*unforeseen, kind.listing][0]}: not foreseen, or a listing that was not written"
+        )
 
 
 # -- moving --------------------------------------------------------------------------------------------------------------
@@ -415,7 +446,9 @@ class _Directory:
 
     def open_file(self, name: str, *, write: bool = False) -> IO[bytes]:
         """A regular file, to read, or a new one to write; OSError where the entry is anything else."""
-        flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(os, "O_BINARY", 0)
+        flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(
+            os, "O_BINARY", 0
+        )
         flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
         descriptor = os.open(self._name(name), flags, 0o666, dir_fd=self._descriptor)
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
@@ -447,7 +480,11 @@ class _Directory:
     @property
     def number(self) -> int:
         """That the file system has given it."""
-        return os.stat(self.path).st_ino if self._descriptor is None else os.fstat(self._descriptor).st_ino
+        return (
+            os.stat(self.path).st_ino
+            if self._descriptor is None
+            else os.fstat(self._descriptor).st_ino
+        )
 
     def is_own(self) -> bool:
         """Whether it belongs to the user who asks."""
@@ -456,7 +493,9 @@ class _Directory:
     def is_in_place(self) -> bool:
         """Whether its path still leads to it."""
         try:
-            return self._descriptor is None or os.path.samestat(os.stat(self.path), os.fstat(self._descriptor))
+            return self._descriptor is None or os.path.samestat(
+                os.stat(self.path), os.fstat(self._descriptor)
+            )
         except OSError:
             return False
 
@@ -478,7 +517,9 @@ class _Directory:
         if self._descriptor is None:
             yield
             return
-        with _Directory(self.path, os.open(".", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._descriptor)) as again:
+        with _Directory(
+            self.path, os.open(".", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._descriptor)
+        ) as again:
             again.lock(wait=True)
             yield
 
@@ -486,13 +527,24 @@ class _Directory:
         return str(self.path / name) if self._descriptor is None else name
 
 
-_BY_DESCRIPTOR = {os.open, os.stat, os.mkdir, os.rename, os.unlink, os.rmdir} <= os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
+_BY_DESCRIPTOR = {
+    os.open,
+    os.stat,
+    os.mkdir,
+    os.rename,
+    os.unlink,
+    os.rmdir,
+} <= os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
 
 
 def _trouble_of_disk(error: BaseException) -> str:
     """What the disk has against more files, in few words; empty where something else went wrong."""
     number = error.errno if isinstance(error, OSError) else None
-    if number is None and isinstance(error, OSError | RuntimeError) and (told := _HDF5_ERRNO.search(str(error))):
+    if (
+        number is None
+        and isinstance(error, OSError | RuntimeError)
+        and (told := _HDF5_ERRNO.search(str(error)))
+    ):
         number = int(told[1])
     return os.strerror(number) if number is not None and number in DISK_ERRORS else ""
 

@@ -63,7 +63,9 @@ class Registry(Mapping[str, Callable[..., Any]]):
         if name in self:
             raise InputError(f"{self.noun} '{name}' is there already; choose another name")
         if not callable(make):
-            raise InputError(f"{self.noun} '{name}': a {type(make).__name__} cannot be called; give a function or a class")
+            raise InputError(
+                f"{self.noun} '{name}': a {type(make).__name__} cannot be called; give a function or a class"
+            )
         self._registered[name] = make
 
     def find(self, name: str, *, instead: str = "") -> Callable[..., Any]:
@@ -83,14 +85,20 @@ class Registry(Mapping[str, Callable[..., Any]]):
             Where it cannot be loaded, or two packages have one of that name.
         """
         if name not in self:
-            raise InputError(f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}")
+            raise InputError(
+                f"{self.noun} '{name}' is unknown; allowed: {', '.join(self)}{instead}"
+            )
         return self[name]
 
     def __getitem__(self, name: str) -> Callable[..., Any]:
         installed = self._installed.get(name, [])
         if len(installed) + (name in self.built_in) + (name in self._registered) > 1:
-            owners = ["rtradar"] * (name in self.built_in) + [_package(entry) for entry in installed]
-            raise ExtensionError(f"{self.noun} '{name}' is claimed by {' and by '.join(owners)}; uninstall one of them")
+            owners = ["rtradar"] * (name in self.built_in) + [
+                _package(entry) for entry in installed
+            ]
+            raise ExtensionError(
+                f"{self.noun} '{name}' is claimed by {' and by '.join(owners)}; uninstall one of them"
+            )
         if name in self._registered:
             return self._registered[name]
         if name in self.built_in:
@@ -102,7 +110,9 @@ class Registry(Mapping[str, Callable[..., Any]]):
         with self.guarded(name):
             made = installed[0].load()
         if not callable(made):
-            raise ExtensionError(f"{self.owner(name)}: {installed[0].value} is a {type(made).__name__}, not a function or class")
+            raise ExtensionError(
+                f"{self.owner(name)}: {installed[0].value} is a {type(made).__name__}, not a function or class"
+            )
         return made
 
     def __iter__(self) -> Iterator[str]:
@@ -117,7 +127,9 @@ class Registry(Mapping[str, Callable[..., Any]]):
     def owner(self, name: str) -> str:
         """What a message calls it: the kind, the name, and the package that it comes from."""
         installed = self._installed.get(name, [])
-        return f"{self.noun} '{name}'" + (f" of package {_package(installed[0])}" if installed else "")
+        return f"{self.noun} '{name}'" + (
+            f" of package {_package(installed[0])}" if installed else ""
+        )
 
     @contextmanager
     def guarded(self, name: str) -> Iterator[None]:
@@ -160,9 +172,14 @@ def _readable_entries(group: str) -> list[EntryPoint]:
         name = "of unknown name"
         try:
             name = package.name
-            found.setdefault(name, list(package.entry_points.select(group=group)))  # of two of one name the first is imported
+            found.setdefault(
+                name, list(package.entry_points.select(group=group))
+            )  # of two of one name the first is imported
         except Exception as error:
-            warnings.warn(f"package {name}: its entry points cannot be read ({_first_line(error)}); reinstall it", stacklevel=2)
+            warnings.warn(
+                f"package {name}: its entry points cannot be read ({_first_line(error)}); reinstall it",
+                stacklevel=2,
+            )
     return [entry for entries in found.values() for entry in entries]
 
 

@@ -67,7 +67,9 @@ class FileBackedRows:
                 f"a long recording, {self._bytes / 1e6:.0f} MB so far, finds no room in {tempfile.tempdir or 'any folder'} "
                 f"for temporary files ({error.strerror}); let the environment variable TMPDIR name one that has some"
             ) from None
-        self._waiting = [np.empty((0, *rows.shape[1:]))]  # which keeps the shape of a row, and none of the memory
+        self._waiting = [
+            np.empty((0, *rows.shape[1:]))
+        ]  # which keeps the shape of a row, and none of the memory
 
     def rows(self) -> NDArray[np.float64]:
         """All rows so far, at least one block of them; to be asked for once."""
@@ -115,5 +117,9 @@ def release_pages(*arrays: NDArray[np.float64]) -> None:
         owner: Any = array
         while isinstance(owner, np.ndarray):
             owner = owner.base
-        if isinstance(owner, memoryview) and isinstance(owner.obj, mmap.mmap) and hasattr(mmap, "MADV_DONTNEED"):
+        if (
+            isinstance(owner, memoryview)
+            and isinstance(owner.obj, mmap.mmap)
+            and hasattr(mmap, "MADV_DONTNEED")
+        ):
             owner.obj.madvise(mmap.MADV_DONTNEED)

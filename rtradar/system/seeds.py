@@ -33,8 +33,14 @@ def check_seed(where: str, seed: object) -> int:
     InputError
         Where it is anything else.
     """
-    if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or not 0 <= seed <= MOST_SEED:
-        raise InputError(f"{where}seed = {shown(seed)}; it must be a whole number from 0 to {MOST_SEED}")
+    if (
+        isinstance(seed, bool)
+        or not isinstance(seed, int | np.integer)
+        or not 0 <= seed <= MOST_SEED
+    ):
+        raise InputError(
+            f"{where}seed = {shown(seed)}; it must be a whole number from 0 to {MOST_SEED}"
+        )
     return int(seed)
 
 

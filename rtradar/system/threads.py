@@ -34,7 +34,13 @@ def _cores() -> int:
 
 def environment_of(threads: int) -> dict[str, str]:
     """Environment that holds a new process to that many threads: ours, those of compiled loops, and of linear algebra."""
-    own = THREADS_VARIABLE, "NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"
+    own = (
+        THREADS_VARIABLE,
+        "NUMBA_NUM_THREADS",
+        "OMP_NUM_THREADS",
+        "OPENBLAS_NUM_THREADS",
+        "MKL_NUM_THREADS",
+    )
     return dict.fromkeys(own, str(threads))
 
 

@@ -39,7 +39,9 @@ def read_toml(path: Path, what: str, cure: str) -> Table:
     except OSError as error:
         raise InputError(f"{where}: {error.strerror}; {cure}") from None
     except ValueError:
-        raise InputError(f"{where} is larger than {_MOST_BYTES / 1e6:g} MB: it is no {what}") from None
+        raise InputError(
+            f"{where} is larger than {_MOST_BYTES / 1e6:g} MB: it is no {what}"
+        ) from None
     try:
         # Windows' editors begin a file with a byte order mark, which is no part of its text.
         return tomllib.loads(content.decode("utf-8-sig"))
@@ -53,7 +55,9 @@ def table_at(key: str, table: Table, parent: str = "") -> Table:
     """The table of that key; empty where there is none."""
     value = table.get(key, {})
     if not isinstance(value, dict):
-        raise InputError(f"{parent}{shown(key)[1:-1]} = {shown(value)}; it must be a table: [{parent}{shown(key)[1:-1]}]")
+        raise InputError(
+            f"{parent}{shown(key)[1:-1]} = {shown(value)}; it must be a table: [{parent}{shown(key)[1:-1]}]"
+        )
     return value
 
 
@@ -61,13 +65,17 @@ def tables_at(key: str, table: Table) -> list[tuple[str, Table]]:
     """Tables of a list, each with its place in the file; none where there is no such key."""
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(piece, dict) for piece in value):
-        raise InputError(f"{key} = {shown(value)}; it must be a list of tables: [[{key}]] once for each")
+        raise InputError(
+            f"{key} = {shown(value)}; it must be a list of tables: [[{key}]] once for each"
+        )
     if len(value) > _MOST_PIECES:
         raise InputError(f"[[{key}]] stands there {len(value)} times; {_MOST_PIECES} are allowed")
     return [(f"[[{key}]] number {number} ", piece) for number, piece in enumerate(value, start=1)]
 
 
-def check_keys(where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]) -> None:
+def check_keys(
+    where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]
+) -> None:
     """Refuse keys that are unknown, and tables that lack one; ``where`` ends with a blank if it is not empty."""
     allowed = (*needed, *optional)
     for key in table:

@@ -69,7 +69,9 @@ class BodyTracer:
         else:
             import drjit as dr
 
-            registry = [int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes]
+            registry = [
+                int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes
+            ]
             self._part_of = np.full(max(registry) + 1, -1, dtype=np.int64)
             self._part_of[registry] = np.arange(len(registry))
 
@@ -88,14 +90,21 @@ class BodyTracer:
         centres, frames = self._pose
         self._waiting = False
         self._centre = (centres.max(axis=0) + centres.min(axis=0)) / 2
-        self._ball = float((np.linalg.norm(centres - self._centre, axis=1) + self._semi_axes.max(axis=1)).max()) * 1.01
+        self._ball = (
+            float(
+                (np.linalg.norm(centres - self._centre, axis=1) + self._semi_axes.max(axis=1)).max()
+            )
+            * 1.01
+        )
         matrices = np.zeros((len(centres), 4, 4))
         matrices[:, :3, :3] = frames * self._semi_axes[:, None, :]
         matrices[:, :3, 3] = centres - self._centre
         matrices[:, 3, 3] = 1
         pose_body_scene(self._mi, self._parameters, matrices)
 
-    def sees(self, origins: NDArray[np.float64], targets: NDArray[np.float64], own: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def sees(
+        self, origins: NDArray[np.float64], targets: NDArray[np.float64], own: NDArray[np.int64]
+    ) -> NDArray[np.bool_]:
         """Whether no other part stands between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
 
         A target lies on part ``own (ray,)``, which cannot hide it, or on none, -1. Rays that pass every outline at a distance are
@@ -106,7 +115,9 @@ class BodyTracer:
         clear = clearances(origins, targets, own, *self._pose, self._semi_axes)
         seen = clear > 0
         doubtful = np.flatnonzero(np.abs(clear) < DOUBTFUL)
-        rays, whose = outline_rays(origins[doubtful], targets[doubtful], own[doubtful], *self._pose, self._semi_axes)
+        rays, whose = outline_rays(
+            origins[doubtful], targets[doubtful], own[doubtful], *self._pose, self._semi_axes
+        )
         seen[doubtful] = True
         seen[doubtful[whose[self._sphere.meets(rays)]]] = False
         return seen
@@ -122,10 +133,14 @@ class BodyTracer:
         starts = origins - self._centre
         # Distance along the ray to where it enters the ball around the body; rays that miss it miss the body.
         along = -np.einsum("ij,ij->i", starts, directions)
-        half_chord = np.sqrt(np.maximum(self._ball**2 - np.einsum("ij,ij->i", starts, starts) + along**2, 0.0))
+        half_chord = np.sqrt(
+            np.maximum(self._ball**2 - np.einsum("ij,ij->i", starts, starts) + along**2, 0.0)
+        )
         ahead = np.maximum(along - half_chord, 0.0)
         starts = starts + ahead[:, None] * directions
-        part, distance, triangle, barycentric = (self._trace_scalar if self._scalar else self._trace)(starts, directions)
+        part, distance, triangle, barycentric = (
+            self._trace_scalar if self._scalar else self._trace
+        )(starts, directions)
         met = part >= 0
         local = np.full(origins.shape, np.nan)
         corners = self._vertices[self._faces[triangle[met]]]
@@ -135,26 +150,39 @@ class BodyTracer:
         local[met] = on_sphere * self._semi_axes[part[met]]
         return Hits(part, np.where(met, distance + ahead, np.inf), local)
 
-    def _trace(self, starts: NDArray[np.float64], directions: NDArray[np.float64]) -> tuple[Any, Any, Any, Any]:
+    def _trace(
+        self, starts: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[Any, Any, Any, Any]:
         import drjit as dr
 
         mi = self._mi
-        found = self._scene.ray_intersect_preliminary(rays_of(mi, starts, directions), coherent=False)
+        found = self._scene.ray_intersect_preliminary(
+            rays_of(mi, starts, directions), coherent=False
+        )
         instance = dr.reinterpret_array(mi.UInt32, found.instance)
         dr.eval(found.t, found.prim_index, found.prim_uv, instance)
         distance = found.t.numpy().astype(np.float64)
         part = np.where(np.isfinite(distance), self._part_of[instance.numpy()], -1)
         # A ray that misses leaves its coordinates unset, and what stands there need not be a number.
         barycentric = np.where(part >= 0, found.prim_uv.numpy(), np.float32(0))
-        return part, distance, found.prim_index.numpy().astype(np.int64), barycentric.astype(np.float64).T
+        return (
+            part,
+            distance,
+            found.prim_index.numpy().astype(np.int64),
+            barycentric.astype(np.float64).T,
+        )
 
-    def _trace_scalar(self, starts: NDArray[np.float64], directions: NDArray[np.float64]) -> tuple[Any, Any, Any, Any]:
+    def _trace_scalar(
+        self, starts: NDArray[np.float64], directions: NDArray[np.float64]
+    ) -> tuple[Any, Any, Any, Any]:
         mi = self._mi
         rays = len(starts)
         part, triangle = np.full(rays, -1, dtype=np.int64), np.zeros(rays, dtype=np.int64)
         distance, barycentric = np.full(rays, np.inf), np.zeros((rays, 2))
         for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
-            found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction)))
+            found = self._scene.ray_intersect_preliminary(
+                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
+            )
             if found.is_valid():
                 part[ray] = self._part_of[found.instance.id()]
                 distance[ray] = found.t

@@ -37,7 +37,9 @@ class Surfaces(Protocol):
         """Whether nothing but the surface that a point lies on, ``own (ray,)``, is nearer to its antenna, both (ray, 3)."""
         ...
 
-    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    def meets(
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
         """Surface (ray,) met first from points on surfaces ``own``, on the side of the normals, and how far, in float32 [m].
 
         ``directions (ray, 3)`` are unit vectors; the way is infinite where nothing is met.
@@ -123,14 +125,19 @@ class BodySurfaces:
         part, distance = self._tracer.first_parts(antennas, directions / range_m[:, None])
         return ~((part != own) & (distance < range_m * (1 - _BEHIND)))
 
-    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    def meets(
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
         """As `Surfaces.meets`."""
         lifted = points + _LIFT_OF_PART * self._axes.max(axis=1)[own][:, None] * normals
         return self._tracer.first_parts(lifted, directions)
 
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
         """As `Surfaces.distance`: where the line enters the ellipsoid."""
-        o, d = self._stretched(surface, origins - self._centres[surface]), self._stretched(surface, directions)
+        o, d = (
+            self._stretched(surface, origins - self._centres[surface]),
+            self._stretched(surface, directions),
+        )
         square, half, rest = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
         root = half**2 - square * rest
         return np.where(root > 0, (-half - np.sqrt(np.maximum(root, 0.0))) / square, np.nan)
@@ -170,7 +177,9 @@ class MeshSurfaces:
         size = np.linalg.norm(across, axis=1, keepdims=True)
         self._normals = np.where(size > 0, across / np.where(size > 0, size, 1.0), [0.0, 0.0, 1.0])
         self._places = corners[:, 0]
-        self._scene = mi.load_dict({"type": "scene", "target": triangle_mesh(mi, vertices - self._centre, faces)})
+        self._scene = mi.load_dict(
+            {"type": "scene", "target": triangle_mesh(mi, vertices - self._centre, faces)}
+        )
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """As `Surfaces.sees`."""
@@ -179,7 +188,9 @@ class MeshSurfaces:
         nearer = met < np.linalg.norm(points - antennas, axis=1) - 1e-6 * self._ball
         return ~((face != own) & nearer)
 
-    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    def meets(
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
         """As `Surfaces.meets`."""
         return self._first_hits(points + _LIFT_OF_MESH * self._ball * normals, directions)
 
@@ -213,7 +224,9 @@ class MeshSurfaces:
         mi = self._mi
         face, distance = np.full(len(starts), -1, dtype=np.int64), np.full(len(starts), np.inf)
         for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
-            found = self._scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction)))
+            found = self._scene.ray_intersect_preliminary(
+                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
+            )
             if found.is_valid():
                 face[ray], distance[ray] = found.prim_index, found.t
         return face, distance

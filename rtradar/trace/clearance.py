@@ -8,7 +8,7 @@ from rtradar.kernels.jit import inlined
 
 
 @inlined()
-def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-def]
+def clearance(antenna, point, centre, frame, axes):
     """Least distance of the way from antenna to point from the ellipsoid's middle, in its own unit, less 1.
 
     Negative where the way goes through, or the point is inside. All in world axes (3,), columns of ``frame`` the directions
@@ -28,7 +28,7 @@ def clearance(antenna, point, centre, frame, axes):  # type: ignore[no-untyped-d
 
 
 @inlined()
-def beside_ball(start_square, along, span):  # type: ignore[no-untyped-def]
+def beside_ball(start_square, along, span):
     """Least distance of a way from the middle of the unit ball, less 1.
 
     Of where the way starts the square, of the way its own square (``span``), and the product of both (``along``).
@@ -38,12 +38,14 @@ def beside_ball(start_square, along, span):  # type: ignore[no-untyped-def]
 
 
 @inlined()
-def into_ball(part, other, antenna, centres, frames, semi_axes, turn, shift, start):  # type: ignore[no-untyped-def]
+def into_ball(part, other, antenna, centres, frames, semi_axes, turn, shift, start):
     """From the axes of a part to those of another in which it is the unit ball; and the antenna in these."""
     for i in range(3):
         shift[i], start[i] = 0.0, 0.0
         for j in range(3):
-            shift[i] += frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
+            shift[i] += (
+                frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
+            )
             start[i] += frames[other, j, i] * (antenna[j] - centres[other, j]) / semi_axes[other, i]
             turn[i, j] = 0.0
             for k in range(3):

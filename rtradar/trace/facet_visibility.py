@@ -24,7 +24,7 @@ _NEAR = 0.01
 
 
 @inlined(fastmath=True)
-def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):  # type: ignore[no-untyped-def]
+def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):
     """What a occluder, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
 
     ``first`` becomes its number where it certainly hides a vertex, and does so before ``entry``, the share of the way at
@@ -36,9 +36,24 @@ def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):  # type
     outside, inside = (1 + _NEAR) ** 2, (1 - _NEAR) ** 2
     count = 0
     for vertex in range(len(x)):
-        w0 = turn[0, 0] * x[vertex] + turn[0, 1] * y[vertex] + turn[0, 2] * z[vertex] + (shift[0] - s0)
-        w1 = turn[1, 0] * x[vertex] + turn[1, 1] * y[vertex] + turn[1, 2] * z[vertex] + (shift[1] - s1)
-        w2 = turn[2, 0] * x[vertex] + turn[2, 1] * y[vertex] + turn[2, 2] * z[vertex] + (shift[2] - s2)
+        w0 = (
+            turn[0, 0] * x[vertex]
+            + turn[0, 1] * y[vertex]
+            + turn[0, 2] * z[vertex]
+            + (shift[0] - s0)
+        )
+        w1 = (
+            turn[1, 0] * x[vertex]
+            + turn[1, 1] * y[vertex]
+            + turn[1, 2] * z[vertex]
+            + (shift[1] - s1)
+        )
+        w2 = (
+            turn[2, 0] * x[vertex]
+            + turn[2, 1] * y[vertex]
+            + turn[2, 2] * z[vertex]
+            + (shift[2] - s2)
+        )
         span = w0 * w0 + w1 * w1 + w2 * w2
         back = -(s0 * w0 + s1 * w1 + s2 * w2)
         # Least square of the distance along the way, times its span: no division.
@@ -55,7 +70,7 @@ def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):  # type
 
 
 @inlined(fastmath={"contract"})
-def _facing(local, x, y, z, axes, margin, faces, begin):  # type: ignore[no-untyped-def]
+def _facing(local, x, y, z, axes, margin, faces, begin):
     """Whether a vertex ``faces`` an antenna, or not away by more than the margin.
 
     A vertex that faces away is seen through its own part: only what is met before the share ``begin`` of the way, where
@@ -79,7 +94,7 @@ def _facing(local, x, y, z, axes, margin, faces, begin):  # type: ignore[no-unty
 
 
 @inlined()
-def _grown(rays):  # type: ignore[no-untyped-def]
+def _grown(rays):
     """Twice the room; number by number, as to assign slices takes seconds to compile."""
     rows, columns = rays.shape
     out = np.empty((rows, 2 * columns), dtype=rays.dtype)
@@ -90,18 +105,38 @@ def _grown(rays):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidden):  # type: ignore[no-untyped-def]
+def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidden):
     """Name what certainly hides a vertex, and the rays that have to be followed for others.
 
     Of each ray: where it starts, which way it goes and how far, in axes in which what it may meet is the unit ball (7,);
     the place in ``hidden`` that it answers for, and what hides it if the ray meets anything (2,).
     """
     every, n_vertices = len(centres), vertices.shape[2]
-    turn, shift, start, local, way = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    low, high, near, far = np.empty((every, VIEWS)), np.empty((every, VIEWS)), np.empty(every), np.empty(every)
+    turn, shift, start, local, way = (
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+    )
+    low, high, near, far = (
+        np.empty((every, VIEWS)),
+        np.empty((every, VIEWS)),
+        np.empty(every),
+        np.empty(every),
+    )
     chosen, occluders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
-    faces, begins, begin, places = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices), np.empty((3, n_vertices))
-    rays, whose, count = np.empty((7, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64), 0
+    faces, begins, begin, places = (
+        np.empty(n_vertices),
+        np.empty(n_vertices),
+        np.empty(n_vertices),
+        np.empty((3, n_vertices)),
+    )
+    rays, whose, count = (
+        np.empty((7, 4096), dtype=np.float32),
+        np.empty((2, 4096), dtype=np.int64),
+        0,
+    )
     entry, first, nearest = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     wider = np.empty((every, 3))
     for part in range(every):
@@ -136,8 +171,13 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                 entry[i], first[i] = math.inf, -1.0
             before, slot = count, (a * len(parts) + n) * n_vertices
             for k in range(found):
-                into_ball(part, occluders[k], antennas[a], centres, frames, semi_axes, turn, shift, start)
-                if _pass(x, y, z, start, turn, shift, float(occluders[k]), entry, first, nearest) == 0:
+                into_ball(
+                    part, occluders[k], antennas[a], centres, frames, semi_axes, turn, shift, start
+                )
+                if (
+                    _pass(x, y, z, start, turn, shift, float(occluders[k]), entry, first, nearest)
+                    == 0
+                ):
                     continue
                 for i in range(facing):
                     if nearest[i] < 0 or nearest[i] > begin[i]:
@@ -146,12 +186,21 @@ def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidde
                         rays, whose = _grown(rays), _grown(whose)
                     span = 0.0
                     for j in range(3):
-                        way[j] = turn[j, 0] * x[i] + turn[j, 1] * y[i] + turn[j, 2] * z[i] + shift[j] - start[j]
+                        way[j] = (
+                            turn[j, 0] * x[i]
+                            + turn[j, 1] * y[i]
+                            + turn[j, 2] * z[i]
+                            + shift[j]
+                            - start[j]
+                        )
                         span += way[j] * way[j]
                     distance = math.sqrt(span)
                     ahead = max(nearest[i] - 2 / distance, 0.0)
                     for j in range(3):
-                        rays[j, count], rays[3 + j, count] = start[j] + ahead * way[j], way[j] / distance
+                        rays[j, count], rays[3 + j, count] = (
+                            start[j] + ahead * way[j],
+                            way[j] / distance,
+                        )
                     rays[6, count] = (1 - ahead) * distance
                     whose[0, count], whose[1, count] = i, occluders[k]
                     count += 1

@@ -13,26 +13,37 @@ VIEWS = 8
 
 
 @inlined()
-def _normalize(vector):  # type: ignore[no-untyped-def]
+def _normalize(vector):
     length = math.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2)
     for i in range(3):
         vector[i] /= length
 
 
 @inlined()
-def _cross(a, b, out):  # type: ignore[no-untyped-def]
-    out[0], out[1], out[2] = a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def _cross(a, b, out):
+    out[0], out[1], out[2] = (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
 
 
 @inlined()
-def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type: ignore[no-untyped-def]
+def outlines(antenna, centres, frames, semi_axes, low, high, near, far):
     """How parts stand before an antenna: from where to where (part, view) across the view, and along it (part,).
 
     Across: the slopes x.d / x.w of the planes through the antenna that touch the ellipsoid, w the way to the middle of the
     body and d a direction across it; infinite where a part reaches beside the antenna.
     """
     # Number by number: operations on whole small arrays take seconds to compile.
-    way, side, first, second, place, w = np.zeros(3), np.zeros(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    way, side, first, second, place, w = (
+        np.zeros(3),
+        np.zeros(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+        np.empty(3),
+    )
     for part in range(len(centres)):
         for i in range(3):
             way[i] += centres[part, i] / len(centres)
@@ -62,7 +73,11 @@ def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type
             for i in range(3):
                 d = 0.0
                 for j in range(3):
-                    d += semi_axes[part, i] * frames[part, j, i] * (cosine * first[j] + sine * second[j])
+                    d += (
+                        semi_axes[part, i]
+                        * frames[part, j, i]
+                        * (cosine * first[j] + sine * second[j])
+                    )
                 across += place[i] * (cosine * first[i] + sine * second[i])
                 dd += d * d
                 dw += d * w[i]
@@ -77,7 +92,7 @@ def outlines(antenna, centres, frames, semi_axes, low, high, near, far):  # type
 
 
 @inlined()
-def may_hide(part, other, low, high, near, far):  # type: ignore[no-untyped-def]
+def may_hide(part, other, low, high, near, far):
     """Whether one part may stand before another: it begins before that ends, and no view shows a gap between them."""
     if near[other] >= far[part]:
         return False

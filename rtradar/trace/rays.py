@@ -30,7 +30,10 @@ def rays_of(mi: Any, starts: ArrayLike, ways: ArrayLike, reach: ArrayLike | None
     -------
     mitsuba.Ray3f
     """
-    rows = np.concatenate([np.transpose(starts), np.transpose(ways)] + ([] if reach is None else [np.asarray(reach)[None]]))
+    rows = np.concatenate(
+        [np.transpose(starts), np.transpose(ways)]
+        + ([] if reach is None else [np.asarray(reach)[None]])
+    )
     values = [mi.Float(row) for row in _aligned(rows)]
     ray = mi.Ray3f(mi.Point3f(*values[:3]), mi.Vector3f(*values[3:6]))
     if reach is not None:

@@ -38,10 +38,18 @@ class RoomTracer:
         if pieces:
             counts = np.cumsum([0, *(len(piece.vertices) for piece in pieces)])
             vertices = np.concatenate([piece.vertices for piece in pieces])
-            faces = np.concatenate([piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)])
+            faces = np.concatenate(
+                [piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)]
+            )
             self._centre = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
             self._ball = float(np.linalg.norm(vertices - self._centre, axis=1).max()) * 1.01
-            mesh = mi.Mesh("furniture", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False)
+            mesh = mi.Mesh(
+                "furniture",
+                len(vertices),
+                len(faces),
+                has_vertex_normals=False,
+                has_vertex_texcoords=False,
+            )
             parameters = mi.traverse(mesh)
             parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
             parameters["faces"] = np.ravel(faces).astype(np.uint32)
@@ -61,7 +69,9 @@ class RoomTracer:
         (...) bool
             False everywhere without furniture, and where two points are no more than twice `CLEAR_M` apart.
         """
-        origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+        origins, targets = np.broadcast_arrays(
+            np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
+        )
         out = np.zeros(origins.shape[:-1], dtype=bool)
         if self._scene is None or out.size == 0:
             return out
@@ -81,13 +91,19 @@ class RoomTracer:
             met[asked] = self._met(entry, ways[asked], (last - first)[asked])
         return met.reshape(out.shape)
 
-    def _met(self, starts: NDArray[np.float64], ways: NDArray[np.float64], reach: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _met(
+        self, starts: NDArray[np.float64], ways: NDArray[np.float64], reach: NDArray[np.float64]
+    ) -> NDArray[np.bool_]:
         mi = self._mi
         if mi.variant().startswith("scalar"):
             found = []
-            for start, way, limit in zip(starts.tolist(), ways.tolist(), reach.tolist(), strict=True):
+            for start, way, limit in zip(
+                starts.tolist(), ways.tolist(), reach.tolist(), strict=True
+            ):
                 ray = mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*way))
                 ray.maxt = limit
                 found.append(bool(self._scene.ray_test(ray)))
             return np.array(found)
-        return np.asarray(self._scene.ray_test(rays_of(mi, starts, ways, reach), coherent=False).numpy())
+        return np.asarray(
+            self._scene.ray_test(rays_of(mi, starts, ways, reach), coherent=False).numpy()
+        )

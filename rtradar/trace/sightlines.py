@@ -58,7 +58,7 @@ def clearances(
 
 
 @inlined()
-def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
+def _bundle(places, own, counts, middle, reach):
     """Mean (own, 3) of one end of the lines to each part, and how far (own,) squared they stray from it; added to zeros."""
     for ray in range(len(own)):
         for i in range(3):
@@ -71,11 +71,15 @@ def _bundle(places, own, counts, middle, reach):  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-def]
+def _near(origins, targets, own, centres, longest):
     """Which parts come near any of the lines to a part, (own, part)."""
     # One more than there are parts: targets that are on none come last.
     parts = len(centres)
-    middles, reach, counts = np.zeros((parts + 1, 2, 3)), np.zeros((parts + 1, 2)), np.zeros(parts + 1)
+    middles, reach, counts = (
+        np.zeros((parts + 1, 2, 3)),
+        np.zeros((parts + 1, 2)),
+        np.zeros(parts + 1),
+    )
     for ray in range(len(own)):
         counts[own[ray]] += 1
     _bundle(origins, own, counts, middles[:, 0], reach[:, 0])
@@ -91,8 +95,14 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
             if other != part and counts[part] > 0:
                 c = centres[other]
                 gap0, gap1, gap2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
-                share = min(1.0, max(0.0, (gap0 * way0 + gap1 * way1 + gap2 * way2) / max(span, 1e-300)))
-                square = (gap0 - share * way0) ** 2 + (gap1 - share * way1) ** 2 + (gap2 - share * way2) ** 2
+                share = min(
+                    1.0, max(0.0, (gap0 * way0 + gap1 * way1 + gap2 * way2) / max(span, 1e-300))
+                )
+                square = (
+                    (gap0 - share * way0) ** 2
+                    + (gap1 - share * way1) ** 2
+                    + (gap2 - share * way2) ** 2
+                )
                 # The bundle of lines narrows from one end to the other; as wide as where it is before this part.
                 before = max(0.0, share - _NEAR * longest[other] / max(length, 1e-300))
                 wide = max(first + before * (last - first), last) if first > last else last
@@ -101,7 +111,7 @@ def _near(origins, targets, own, centres, longest):  # type: ignore[no-untyped-d
 
 
 @compiled()
-def _clearances(origins, targets, own, centres, frames, axes, longest, near, out):  # type: ignore[no-untyped-def]
+def _clearances(origins, targets, own, centres, frames, axes, longest, near, out):
     for ray in range(len(origins)):
         least = 1.0
         o, t = origins[ray], targets[ray]
@@ -142,11 +152,13 @@ def outline_rays(
         Line of sight of each.
     """
     starts, ends, places, turns, axes = _contiguous(origins, targets, centres, frames, semi_axes)
-    return _outline_rays(starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, turns, axes)
+    return _outline_rays(
+        starts, ends, np.ascontiguousarray(own, dtype=np.int64), places, turns, axes
+    )
 
 
 @compiled()
-def _outline_rays(origins, targets, own, centres, frames, axes):  # type: ignore[no-untyped-def]
+def _outline_rays(origins, targets, own, centres, frames, axes):
     most = len(origins) * len(centres)
     rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
     start, way = np.empty(3), np.empty(3)
@@ -158,8 +170,12 @@ def _outline_rays(origins, targets, own, centres, frames, axes):  # type: ignore
             for i in range(3):
                 start[i], way[i] = 0.0, 0.0
                 for j in range(3):
-                    start[i] += frames[part, j, i] * (origins[ray, j] - centres[part, j]) / axes[part, i]
-                    way[i] += frames[part, j, i] * (targets[ray, j] - origins[ray, j]) / axes[part, i]
+                    start[i] += (
+                        frames[part, j, i] * (origins[ray, j] - centres[part, j]) / axes[part, i]
+                    )
+                    way[i] += (
+                        frames[part, j, i] * (targets[ray, j] - origins[ray, j]) / axes[part, i]
+                    )
                 span += way[i] * way[i]
                 along -= start[i] * way[i]
             nearest = min(1.0, max(0.0, along / span))

@@ -34,7 +34,9 @@ class UnitSphere:
     def __init__(self, mi: Any) -> None:
         self._mi = mi
         vertices, faces = unit_sphere(SUBDIVISIONS)
-        self._scene = mi.load_dict({"type": "scene", "unit_sphere": triangle_mesh(mi, vertices, faces)})
+        self._scene = mi.load_dict(
+            {"type": "scene", "unit_sphere": triangle_mesh(mi, vertices, faces)}
+        )
 
     def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which rays (7, ray) meet it: start and direction in its axes, and how far they go."""

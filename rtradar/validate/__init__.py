@@ -18,7 +18,19 @@ from rtradar.validate.claims import Claim, choose, claims, validation_folder
 from rtradar.validate.outcome import Outcome, Row, by_key, run_claim, used_up, worst
 from rtradar.validate.readme import BEGIN, END, KEYS, around_table, markdown, write_readme
 
-__all__ = ["BEGIN", "END", "KEYS", "Claim", "Outcome", "Row", "claims", "markdown", "used_up", "validate", "validation_folder"]
+__all__ = [
+    "BEGIN",
+    "END",
+    "KEYS",
+    "Claim",
+    "Outcome",
+    "Row",
+    "claims",
+    "markdown",
+    "used_up",
+    "validate",
+    "validation_folder",
+]
 
 _HEAD = f"{'key':<14} {'script':<18} {'rows':>5} {'judged':>6} {'failed':>6} {'error/limit':>11} {'seconds':>8}"
 
@@ -76,7 +88,9 @@ def validate(
     check_place(json_path)
     if readme is not None:
         if quick or only is not None:
-            raise InputError("--readme: the table is of all claims and cases; leave out --quick and --only")
+            raise InputError(
+                "--readme: the table is of all claims and cases; leave out --quick and --only"
+            )
         around_table(readme)
     chosen = choose(claims(validation_folder()), only)
     if figures is not None:
@@ -114,7 +128,8 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
     content = {
         "passed": passed,
         "quick": quick,
-        "versions": {"python": platform.python_version()} | {name: version(name) for name in ("rtradar", "mitsuba", "numpy")},
+        "versions": {"python": platform.python_version()}
+        | {name: version(name) for name in ("rtradar", "mitsuba", "numpy")},
         "cores": os.cpu_count(),
         "scripts": [
             {
@@ -130,7 +145,10 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
         # JSON has no NaN and no infinity.
         "rows": [
             {"script": outcome.claim.script.name}
-            | {name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in row.items()}
+            | {
+                name: None if isinstance(value, float) and not math.isfinite(value) else value
+                for name, value in row.items()
+            }
             for outcome in outcomes
             for row in outcome.rows
         ],

@@ -47,9 +47,13 @@ def claims(folder: Path) -> list[Claim]:
     found = []
     for script in sorted(folder.glob("*.py")):
         tree = ast.parse(script.read_text(encoding="utf-8"), str(script))
-        measures = any(isinstance(node, ast.FunctionDef) and node.name == "measure" for node in tree.body)
+        measures = any(
+            isinstance(node, ast.FunctionDef) and node.name == "measure" for node in tree.body
+        )
         asks = any(
-            isinstance(node, ast.ImportFrom) and node.module == "rows" and any(alias.name == "main" for alias in node.names)
+            isinstance(node, ast.ImportFrom)
+            and node.module == "rows"
+            and any(alias.name == "main" for alias in node.names)
             for node in tree.body
         )
         if measures and asks:
@@ -77,7 +81,9 @@ def choose(found: Sequence[Claim], only: str | None) -> list[tuple[Claim, str | 
         Where no script is there, or none has that name or key.
     """
     if not found:
-        raise InputError(f"there are no validation scripts in '{validation_folder()}'; install rtradar again, or use a checkout")
+        raise InputError(
+            f"there are no validation scripts in '{validation_folder()}'; install rtradar again, or use a checkout"
+        )
     if only is None:
         return [(claim, None) for claim in found]
     by_name = [(claim, None) for claim in found if claim.name == only.removesuffix(".py")]
@@ -89,5 +95,7 @@ def choose(found: Sequence[Claim], only: str | None) -> list[tuple[Claim, str | 
     if not chosen:
         keys = sorted({key for claim in found for key in claim.keys})
         names = sorted({claim.name for claim in found} - set(keys))
-        raise InputError(f"--only {only}: no such claim; allowed keys: {', '.join(keys)}; or a script: {', '.join(names)}")
+        raise InputError(
+            f"--only {only}: no such claim; allowed keys: {', '.join(keys)}; or a script: {', '.join(names)}"
+        )
     return chosen

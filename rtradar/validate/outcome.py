@@ -48,7 +48,9 @@ class Outcome:
         return [row for row in self.rows if not row["passed"]]
 
 
-def run_claim(claim: Claim, *, key: str | None = None, quick: bool = False, figures: Path | None = None) -> Outcome:
+def run_claim(
+    claim: Claim, *, key: str | None = None, quick: bool = False, figures: Path | None = None
+) -> Outcome:
     """Run one script and read its rows."""
     began, spent = time.perf_counter(), _children_s()
     with temporary_folder("rtradar-validate-") as folder:
@@ -56,19 +58,27 @@ def run_claim(claim: Claim, *, key: str | None = None, quick: bool = False, figu
         command = [sys.executable, str(claim.script), "--json", str(written)]
         command += ["--quick"] if quick else []
         command += ["--figure", str(figures)] if figures else []
-        done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False)
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False
+        )
         rows: list[Row] = []
         trouble = ""
         try:
             rows = json.loads(written.read_text(encoding="utf-8"))["rows"]
             if not rows:
                 trouble = "gave no rows"
-            elif done.returncode not in (0, 1) or (done.returncode == 1 and all(row["passed"] for row in rows)):
+            elif done.returncode not in (0, 1) or (
+                done.returncode == 1 and all(row["passed"] for row in rows)
+            ):
                 trouble = f"ended with status {done.returncode}: {_last_line(done.stderr)}"
         except (OSError, ValueError, KeyError, TypeError):
-            trouble = f"ended with status {done.returncode} and left no rows: {_last_line(done.stderr)}"
+            trouble = (
+                f"ended with status {done.returncode} and left no rows: {_last_line(done.stderr)}"
+            )
     kept = [row for row in rows if key is None or row["key"] == key]
-    return Outcome(claim, kept, time.perf_counter() - began, _children_s() - spent, " ".join(trouble.split()))
+    return Outcome(
+        claim, kept, time.perf_counter() - began, _children_s() - spent, " ".join(trouble.split())
+    )
 
 
 def _children_s() -> float:
@@ -104,4 +114,8 @@ def by_key(rows: Sequence[Row]) -> dict[str, list[Row]]:
 def worst(rows: Sequence[Row]) -> Row | None:
     """The judged row that is nearest to its limit, or farthest beyond it; None where none is judged."""
     of_judged = [row for row in rows if row["tolerance"] is not None]
-    return max(of_judged, key=lambda row: (not row["passed"], used_up(row["error"], row["tolerance"])), default=None)
+    return max(
+        of_judged,
+        key=lambda row: (not row["passed"], used_up(row["error"], row["tolerance"])),
+        default=None,
+    )

@@ -24,12 +24,21 @@ from rtradar.radar import Radar
 
 CHIRPS = 1596 * 3  # three frames of the paper's radar
 RATES = Rates(1e10, 1e8, 1e10, 1e6, 1e6, 1e6, 1e6)
-BASELINE = Baseline({"echoes and IF": Spread(8.0, 8.0), "cfar": Spread(2.0, 2.0)}, Spread(10.0, 10.0), 12, 133)
+BASELINE = Baseline(
+    {"echoes and IF": Spread(8.0, 8.0), "cfar": Spread(2.0, 2.0)}, Spread(10.0, 10.0), 12, 133
+)
 
 
 def summary(scatter_s: float) -> dict[str, Any]:
     return {
-        "stages": {"scatter": scatter_s, "signal": 1.0, "cloud": 0.5, "angle": 0.25, "write": 0.25, "pictures": 1.0},
+        "stages": {
+            "scatter": scatter_s,
+            "signal": 1.0,
+            "cloud": 0.5,
+            "angle": 0.25,
+            "write": 0.25,
+            "pictures": 1.0,
+        },
         "wall_s": scatter_s + 3.5,  # half a second elsewhere
         "warmup_s": 0.25,
         "capture_s": 0.3,
@@ -49,7 +58,9 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
     def run(self: Runner, case: Case) -> Run:
         first = not any(other.fidelity == case.fidelity for other in done)
         done.append(case)
-        scatter = {"analytic-paper": 1.0, "analytic": 2.0, "specular": 6.0}[case.fidelity] * (5 if "77" in case.radar else 1)
+        scatter = {"analytic-paper": 1.0, "analytic": 2.0, "specular": 6.0}[case.fidelity] * (
+            5 if "77" in case.radar else 1
+        )
         return Run(scatter + 3.5 + 0.25 + 1.0 + (7.0 if first else 0.0), summary(scatter))
 
     monkeypatch.setattr(Runner, "run", run)
@@ -59,16 +70,32 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> list[Case]:
     return done
 
 
-def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["bench", "--fidelity", "analytic-paper,analytic,specular", "--repeats", "2", "--only", "models"]
-    assert main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
+def test_all_that_is_measured_is_in_the_json(
+    machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "bench",
+        "--fidelity",
+        "analytic-paper,analytic,specular",
+        "--repeats",
+        "2",
+        "--only",
+        "models",
+    ]
+    assert (
+        main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
+    )
     found = json.loads((tmp_path / "b.json").read_text())
     assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
     assert found["settings"]["repeats"] == 2
     assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
     rows = found["models"]
     assert [(row["radar"], row["fidelity"], row["cores"]) for row in rows] == [
-        *((radar, fidelity, "all") for radar in ("paper-12ghz", "paper-77ghz") for fidelity in found["settings"]["fidelities"]),
+        *(
+            (radar, fidelity, "all")
+            for radar in ("paper-12ghz", "paper-77ghz")
+            for fidelity in found["settings"]["fidelities"]
+        ),
         ("paper-12ghz", "analytic-paper", "one"),
     ]
     specular = rows[2]
@@ -80,7 +107,15 @@ def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path
     assert specular["stages"]["elsewhere"]["median"] == 0.5
     assert specular["stages"]["signal"]["floor"] == pytest.approx(2 * 21 * CHIRPS * 8 * 256 / 1e10)
     assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0, "floor": None, "rule": ""}
-    assert [row["first_use"] is None for row in rows] == [False, False, False, True, True, True, True]
+    assert [row["first_use"] is None for row in rows] == [
+        False,
+        False,
+        False,
+        True,
+        True,
+        True,
+        True,
+    ]
     assert found["growth"]["chirps"][0] == {
         "radar": "paper-77ghz",
         "of_radar": "paper-12ghz",
@@ -96,18 +131,41 @@ def test_all_that_is_measured_is_in_the_json(machine: list[Case], tmp_path: Path
     assert said.err == ""  # no progress bar where there is no terminal
 
 
-def test_models_take_turns_after_their_first_use(machine: list[Case], capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["--radar", "paper-12ghz", "--fidelity", "analytic,specular", "--repeats", "2", "--only", "models"]
+def test_models_take_turns_after_their_first_use(
+    machine: list[Case], capsys: pytest.CaptureFixture[str]
+) -> None:
+    words = [
+        "--radar",
+        "paper-12ghz",
+        "--fidelity",
+        "analytic,specular",
+        "--repeats",
+        "2",
+        "--only",
+        "models",
+    ]
     assert main(["bench", *words]) == 0
     assert [case.fidelity for case in machine] == ["analytic", "specular"] * 3
 
 
 def test_growth_with_length_channels_and_echoes(
-    machine: list[Case], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    machine: list[Case],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     echoes = [{"echoes": 21, "samples": 1000, "signal_s": 5e-6}]
     monkeypatch.setattr(rtradar.bench, "with_echoes", lambda radar: echoes)
-    words = ["bench", "--quick", "--only", "growth", "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]
+    words = [
+        "bench",
+        "--quick",
+        "--only",
+        "growth",
+        "--json",
+        str(tmp_path / "b.json"),
+        "--figure",
+        str(tmp_path / "b.png"),
+    ]
     assert main(words) == 0
     growth = json.loads((tmp_path / "b.json").read_text())["growth"]
     assert growth["fidelity"] == "specular"
@@ -120,7 +178,10 @@ def test_growth_with_length_channels_and_echoes(
 
 
 def test_without_the_validation_scripts_the_table_says_so(
-    machine: list[Case], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    machine: list[Case],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(rtradar.bench, "measure_baseline", paper.measure_baseline)
     monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
@@ -129,7 +190,9 @@ def test_without_the_validation_scripts_the_table_says_so(
     assert json.loads((tmp_path / "b.json").read_text())["models"][0]["paper_over"] is None
 
 
-def test_the_baseline_is_timed_in_a_process_of_its_own(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_the_baseline_is_timed_in_a_process_of_its_own(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     (tmp_path / "paper_numpy.py").write_text(
         "import json, sys\n"
         "assert sys.argv[1:5] == ['--radar', 'paper-77ghz', '--repeats', '2'] and '--cycles' in sys.argv\n"
@@ -139,7 +202,9 @@ def test_the_baseline_is_timed_in_a_process_of_its_own(monkeypatch: pytest.Monke
     )
     monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
     found = paper.measure_baseline("paper-77ghz", 2, quick=True)
-    assert found == Baseline({"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133)
+    assert found == Baseline(
+        {"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133
+    )
     (tmp_path / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
     with pytest.raises(RunError, match=r"paper_numpy.py: ArithmeticError: the abacus is broken"):
         paper.measure_baseline("paper-77ghz", 2, quick=True)
@@ -153,7 +218,10 @@ def test_a_run_that_fails_is_one_line_and_status_1(
 
     monkeypatch.setattr(Runner, "run", fails)
     assert main(["bench", "--quick"]) == 1
-    assert capsys.readouterr().err == "rtradar: bench: analytic, radar paper-12ghz: rtradar: no backend works\n"
+    assert (
+        capsys.readouterr().err
+        == "rtradar: bench: analytic, radar paper-12ghz: rtradar: no backend works\n"
+    )
 
 
 def stand_in(folder: Path, script: str) -> str:
@@ -164,7 +232,9 @@ def stand_in(folder: Path, script: str) -> str:
     return str(program)
 
 
-def test_a_process_has_caches_of_its_own_and_gives_its_summary(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_process_has_caches_of_its_own_and_gives_its_summary(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     (tmp_path / "summary.json").write_text(json.dumps(summary(2.0)))
     # The last word is the file for the summary.
     script = f'env > {tmp_path}/env; echo "$@" > {tmp_path}/words; for last; do :; done; cp {tmp_path}/summary.json "$last"'
@@ -175,17 +245,26 @@ def test_a_process_has_caches_of_its_own_and_gives_its_summary(monkeypatch: pyte
     run = Runner(folder).run(Case("paper-77ghz", "fresnel", 0.5, one_core=runs.can_pin()))
     assert run.to_cloud_s == 4.0
     assert run.from_start_to_cloud_s == pytest.approx(run.process_s - 1.5)
-    environment = dict(line.split("=", 1) for line in (tmp_path / "env").read_text().splitlines() if "=" in line)
+    environment = dict(
+        line.split("=", 1) for line in (tmp_path / "env").read_text().splitlines() if "=" in line
+    )
     for name in ("HOME", "XDG_CACHE_HOME", "NUMBA_CACHE_DIR"):
         assert environment[name].startswith(str(folder / "fresnel"))
-    assert "run synthetic:walk --duration 0.5 --radar paper-77ghz --fidelity fresnel" in (tmp_path / "words").read_text()
+    assert (
+        "run synthetic:walk --duration 0.5 --radar paper-77ghz --fidelity fresnel"
+        in (tmp_path / "words").read_text()
+    )
     if runs.can_pin():
         assert os.sched_getaffinity(0) == cores  # back on all
     assert [item.name for item in folder.iterdir()] == ["fresnel"]  # what the run wrote is gone
 
 
-def test_a_process_that_fails_says_its_last_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr(runs.sys, "executable", stand_in(tmp_path, "echo first >&2; echo 'rtradar: no' >&2; exit 2"))
+def test_a_process_that_fails_says_its_last_line(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(
+        runs.sys, "executable", stand_in(tmp_path, "echo first >&2; echo 'rtradar: no' >&2; exit 2")
+    )
     with pytest.raises(RunError, match=r"^bench: specular, radar mine.toml: rtradar: no$"):
         Runner(tmp_path).run(Case("mine.toml", "specular", 0.5))
 
@@ -193,7 +272,9 @@ def test_a_process_that_fails_says_its_last_line(monkeypatch: pytest.MonkeyPatch
 def test_arrays_of_fewer_and_more_channels_go_through_toml(tmp_path: Path) -> None:
     radars = arrays(Radar.preset("paper-77ghz"))
     assert [radar.n_channels for radar in radars] == [24, 48, 96, 192]
-    shaped = Radar(tx_antenna=Antenna(pattern="cosine", exponent=4), transmit_power_dbm=12, noise_figure_db=11)
+    shaped = Radar(
+        tx_antenna=Antenna(pattern="cosine", exponent=4), transmit_power_dbm=12, noise_figure_db=11
+    )
     for radar in [*radars, shaped]:
         (tmp_path / "radar.toml").write_text(as_toml(radar))
         assert Radar.load(tmp_path / "radar.toml") == radar

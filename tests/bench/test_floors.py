@@ -18,7 +18,9 @@ RATES = Rates(
     spectrogram_ffts=40.0,
     angle_ffts=5.0,
 )
-WORK = Work(chirps=240, rx=2, samples=16, echoes=3, windows=5, cycles=10, channels=4, detections=30, lines=2)
+WORK = Work(
+    chirps=240, rx=2, samples=16, echoes=3, windows=5, cycles=10, channels=4, detections=30, lines=2
+)
 
 
 def test_each_stage_has_the_largest_of_its_floors() -> None:
@@ -47,7 +49,9 @@ def test_a_slow_memory_is_the_floor_of_what_moves_much() -> None:
 
 
 def test_the_size_of_a_run_by_the_papers_radar() -> None:
-    work = Work.of(Radar.preset("paper-12ghz"), chirps=48_000, windows=117, echoes=21, detections=20_000)
+    work = Work.of(
+        Radar.preset("paper-12ghz"), chirps=48_000, windows=117, echoes=21, detections=20_000
+    )
     assert (work.channels, work.cycles, work.lines) == (96, 133, 2)
     assert work.if_samples == 48_000 * 8 * 256
     assert work.spectrogram_columns == 646  # starts at cycles 0, 6, ... 3870 of 4000

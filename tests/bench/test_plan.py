@@ -9,8 +9,17 @@ from rtradar.cli import main
 
 
 def test_quick_is_less_of_everything_unless_asked_for() -> None:
-    plan = plan_of(radar=None, fidelity="specular , fresnel", repeats=None, duration_s=0.25, quick=True, only=None)
-    assert plan == Plan(("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True)
+    plan = plan_of(
+        radar=None,
+        fidelity="specular , fresnel",
+        repeats=None,
+        duration_s=0.25,
+        quick=True,
+        only=None,
+    )
+    assert plan == Plan(
+        ("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True
+    )
     assert plan.growing_durations_s == (0.25, 0.5)
     assert Plan().growing_durations_s == (3.0, 6.0, 12.0, 30.0, 60.0)
 
@@ -31,7 +40,9 @@ def test_every_model_with_every_radar_and_the_papers_on_one_core() -> None:
     ]
     assert cases[4:] == [Case("paper-12ghz", "analytic-paper", 1.0, one_core=True)]
     assert model_cases(plan, one_core=False) == cases[:4]
-    assert not any(case.one_core for case in model_cases(Plan(fidelities=("specular",)), one_core=True))
+    assert not any(
+        case.one_core for case in model_cases(Plan(fidelities=("specular",)), one_core=True)
+    )
 
 
 @pytest.mark.parametrize(
@@ -40,16 +51,24 @@ def test_every_model_with_every_radar_and_the_papers_on_one_core() -> None:
         (["--radar", "paper-60ghz"], "radar 'paper-60ghz' is unknown; allowed"),
         (["--radar", "paper-12ghz,"], "--radar paper-12ghz,: name each once"),
         (["--fidelity", "specular,specular"], "--fidelity specular,specular: name each once"),
-        (["--fidelity", "exact"], "--fidelity exact: there is no such model; allowed: analytic-paper"),
+        (
+            ["--fidelity", "exact"],
+            "--fidelity exact: there is no such model; allowed: analytic-paper",
+        ),
         (["--repeats", "0"], "--repeats 0: it must be a whole number, at least 1"),
         (["--repeats", "some"], "invalid whole number"),
-        (["--duration", "0.05"], "--duration 0.05: it holds no whole frame of radar 'paper-12ghz'; give at least 0.1 s"),
+        (
+            ["--duration", "0.05"],
+            "--duration 0.05: it holds no whole frame of radar 'paper-12ghz'; give at least 0.1 s",
+        ),
         (["--only", "floors"], "--only floors: there is no such part; allowed: models, growth"),
         (["--json", "nowhere/b.json"], "--json nowhere/b.json: there is no folder"),
         (["--figure", "nowhere/b.png"], "--figure nowhere/b.png: there is no folder"),
     ],
 )
-def test_bad_input_is_one_line_and_status_2(words: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_input_is_one_line_and_status_2(
+    words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["bench", *words]) == 2
     err = capsys.readouterr().err
     assert said in err

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench.times import ELSEWHERE, Spread, by_stage, paired_ratio, to_cloud_s, with_elsewhere
+from rtradar.bench.times import (
+    ELSEWHERE,
+    Spread,
+    by_stage,
+    paired_ratio,
+    to_cloud_s,
+    with_elsewhere,
+)
 
 
 def test_best_and_median() -> None:
@@ -13,7 +20,15 @@ def test_best_and_median() -> None:
 
 
 def test_what_leads_to_the_cloud_is_all_but_other_products_and_files() -> None:
-    stages = {"scatter": 1.0, "cloud": 0.5, "angle": 2.0, "spectrogram": 0.25, "write": 0.125, "pictures": 4.0, "report": 8.0}
+    stages = {
+        "scatter": 1.0,
+        "cloud": 0.5,
+        "angle": 2.0,
+        "spectrogram": 0.25,
+        "write": 0.125,
+        "pictures": 4.0,
+        "report": 8.0,
+    }
     # 16.375 s in stages, and 0.125 s elsewhere.
     assert to_cloud_s(stages, wall_s=16.0) == 1.625
     assert with_elsewhere(stages, wall_s=16.0)[ELSEWHERE] == 0.125

@@ -32,8 +32,16 @@ def body() -> Body:
 
 def test_21_parts_of_the_given_thickness(body: Body) -> None:
     assert len(body.part_names) == len(set(body.part_names)) == 21
-    expected = {f"{side} {name}": radius for side in ("left", "right") for name, radius in RADII.items()}
-    expected |= {"lower torso": 0.10, "middle torso": 0.10, "upper torso": 0.10, "neck": 0.04, "head": 0.06}
+    expected = {
+        f"{side} {name}": radius for side in ("left", "right") for name, radius in RADII.items()
+    }
+    expected |= {
+        "lower torso": 0.10,
+        "middle torso": 0.10,
+        "upper torso": 0.10,
+        "neck": 0.04,
+        "head": 0.06,
+    }
     assert set(body.part_names) == set(expected)
     for name, (a, b, _) in zip(body.part_names, body.semi_axes, strict=True):
         assert a == b == expected[name]
@@ -54,7 +62,9 @@ def test_ellipsoids_sit_on_their_bones(activity: str, share: float) -> None:
     first, last = joints[0, list(body.motion.parents[1:])], joints[0, 1:]
     np.testing.assert_allclose(centres[0] + axes[:, 2:] * frames[0, :, :, 2], last, atol=1e-12)
     np.testing.assert_allclose(centres[0] - axes[:, 2:] * frames[0, :, :, 2], first, atol=1e-12)
-    np.testing.assert_allclose(np.swapaxes(frames[0], 1, 2) @ frames[0], np.tile(np.eye(3), (21, 1, 1)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.swapaxes(frames[0], 1, 2) @ frames[0], np.tile(np.eye(3), (21, 1, 1)), atol=1e-12
+    )
     np.testing.assert_allclose(np.linalg.det(frames[0]), 1, atol=1e-12)
 
 
@@ -76,7 +86,10 @@ def test_frames_belong_to_the_bone(body: Body) -> None:
 
 def test_scaling() -> None:
     motion = synthetic_motion("walk", height_m=1.6, build=1.1)
-    plain, thick = Body.from_motion(motion), Body.from_motion(replace(motion, girth=1.5 * motion.girth))
+    plain, thick = (
+        Body.from_motion(motion),
+        Body.from_motion(replace(motion, girth=1.5 * motion.girth)),
+    )
     np.testing.assert_allclose(thick.semi_axes, plain.semi_axes * [1.5, 1.5, 1.0])
     assert plain.semi_axes[PART_NAMES.index("head"), 0] == pytest.approx(0.06 * 1.1 * 1.6 / 1.75)
     big = Body.from_motion(motion.scaled(1.2))
@@ -103,12 +116,22 @@ MIRROR, STRETCH = np.diag([1.0, 1.0, -1.0]), np.diag([1.0, 1.0, 1.0 + 1e-5])
     [
         ({"centres": np.zeros((2, 2))}, r"centres has shape \(2, 2\); it must be \('part', 3\)"),
         ({"centres": np.zeros((3, 3))}, r"frames has shape \(2, 3, 3\)"),
-        ({"centres": np.zeros((0, 3)), "frames": np.zeros((0, 3, 3)), "semi_axes": np.zeros((0, 3))}, "at least 1 in part"),
+        (
+            {
+                "centres": np.zeros((0, 3)),
+                "frames": np.zeros((0, 3, 3)),
+                "semi_axes": np.zeros((0, 3)),
+            },
+            "at least 1 in part",
+        ),
         ({"centres": 0.0}, r"centres has shape \(\)"),
         ({"semi_axes": np.ones(3)}, r"semi_axes has shape \(3,\)"),
         ({"centres": np.full((2, 3), np.inf)}, "centres holds NaN or infinity"),
         ({"semi_axes": [[1.0, 1.0, np.nan]] * 2}, "semi_axes holds NaN or infinity"),
-        ({"semi_axes": [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]}, "the least is 0.0 m; every semi-axis must be positive"),
+        (
+            {"semi_axes": [[1.0, 1.0, 1.0], [1.0, 0.0, 1.0]]},
+            "the least is 0.0 m; every semi-axis must be positive",
+        ),
         ({"frames": [np.eye(3), MIRROR]}, "orthonormal and right-handed"),
         ({"frames": [STRETCH, np.eye(3)]}, "orthonormal and right-handed"),
         ({"frames": [np.eye(3), -np.eye(3)]}, "orthonormal and right-handed"),
@@ -125,9 +148,13 @@ def test_left_is_left(body: Body) -> None:
     centres = body.at([0.0]).centres[0]
     # Facing -x, toward the radar, the left side is -y.
     for name in RADII:
-        assert centres[PART_NAMES.index(f"left {name}"), 1] < centres[PART_NAMES.index(f"right {name}"), 1]
+        assert (
+            centres[PART_NAMES.index(f"left {name}"), 1]
+            < centres[PART_NAMES.index(f"right {name}"), 1]
+        )
     heights = [
-        centres[PART_NAMES.index(name), 2] for name in ("left foot", "left shank", "left thigh", "lower torso", "neck", "head")
+        centres[PART_NAMES.index(name), 2]
+        for name in ("left foot", "left shank", "left thigh", "lower torso", "neck", "head")
     ]
     assert heights == sorted(heights)
 

@@ -19,7 +19,12 @@ def test_unit_sphere_is_the_right_size_in_the_mean(subdivisions: int) -> None:
     # Mean of |x|^2 by the midpoints of the edges, exact for squares.
     corners = vertices[faces]
     midpoints = (corners + np.roll(corners, 1, axis=1)) / 2
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = (
+        np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
+        / 2
+    )
     mean = np.sum(areas * np.mean(np.sum(midpoints**2, axis=2), axis=1)) / areas.sum()
     assert mean == pytest.approx(1.0, abs=1e-14)
     radii = np.linalg.norm(vertices, axis=1)
@@ -57,4 +62,6 @@ def test_vertices_lie_on_scaled_ellipsoids() -> None:
     pose = Body.from_motion(synthetic_motion("walk")).ellipsoids(0.2)
     vertices, _ = ellipsoid_meshes(pose, 2)
     local = (vertices - pose.centres[:, None]) @ pose.frames / pose.semi_axes[:, None]
-    np.testing.assert_allclose(np.linalg.norm(local, axis=2), np.linalg.norm(unit_sphere(2)[0][0]), rtol=1e-12)
+    np.testing.assert_allclose(
+        np.linalg.norm(local, axis=2), np.linalg.norm(unit_sphere(2)[0][0]), rtol=1e-12
+    )

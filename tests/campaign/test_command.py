@@ -39,11 +39,18 @@ def test_a_plan_then_the_whole(
     assert main([*words, "--plan"]) == 0
     said = capsys.readouterr().out
     assert "12 samples\n  by label: walk 12\n" in said
-    assert "synthetic-8 1, and 4 more" not in said  # eight are shown, by name: 0, 1, 10, 11, 2, 3, 4, 5
+    assert (
+        "synthetic-8 1, and 4 more" not in said
+    )  # eight are shown, by name: 0, 1, 10, 11, 2, 3, 4, 5
     assert "synthetic-5 1, and 4 more" in said
     assert "10 are missing: about 20 s on 1 worker," in said
     told = json.loads((tmp_path / "told.json").read_text())
-    assert (told["samples"], told["made"], told["missing"], told["estimated_s"]) == (12, 2, 10, 20.0)
+    assert (told["samples"], told["made"], told["missing"], told["estimated_s"]) == (
+        12,
+        2,
+        10,
+        20.0,
+    )
     assert main(words) == 0
     assert "2 were there, 10 made" in capsys.readouterr().out
     assert len(list((tmp_path / "out").glob("*.npz"))) == 12
@@ -65,7 +72,10 @@ def test_large_figures_are_said_in_large_units() -> None:
         "estimated_bytes": 2.5e9,
     }
     said = in_words(report)
-    assert "1 were there, 2 were damaged, 4 made in 10 min by 2 workers (3.0 s and 1.0 GB each)" in said
+    assert (
+        "1 were there, 2 were damaged, 4 made in 10 min by 2 workers (3.0 s and 1.0 GB each)"
+        in said
+    )
     assert "4 are missing: about 10.0 h on 2 workers, and 2.5 GB" in said
 
 
@@ -78,11 +88,15 @@ def test_large_figures_are_said_in_large_units() -> None:
         (7200.0, 15e6, "about 2.0 h on 1 worker, and 15.0 MB"),
     ],
 )
-def test_units_change_where_two_of_the_next_are_full(seconds: float, size: float, said: str) -> None:
+def test_units_change_where_two_of_the_next_are_full(
+    seconds: float, size: float, said: str
+) -> None:
     plan = {"samples": 3, "by": {}, "whole": 1, "damaged": 0, "made": 0, "missing": 2, "workers": 1}
     told = in_words({**plan, "estimated_s": seconds, "estimated_bytes": size})
     assert told == f"3 samples\n1 were there\n2 are missing: {said}"
-    assert in_words({**plan, "missing": 0, "estimated_s": 0.0, "estimated_bytes": 0.0}).endswith("\nnone is missing")
+    assert in_words({**plan, "missing": 0, "estimated_s": 0.0, "estimated_bytes": 0.0}).endswith(
+        "\nnone is missing"
+    )
 
 
 @pytest.mark.parametrize(
@@ -99,7 +113,19 @@ def test_bad_input_gets_one_clear_line_and_leaves_nothing(
     text: str, options: list[str], named: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "set.toml").write_text(text)
-    assert main(["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out"), *options]) == 2
+    assert (
+        main(
+            [
+                "dataset",
+                "build",
+                str(tmp_path / "set.toml"),
+                "--out",
+                str(tmp_path / "out"),
+                *options,
+            ]
+        )
+        == 2
+    )
     said = capsys.readouterr()
     assert said.out == ""
     assert said.err.count("\n") == 1
@@ -111,7 +137,9 @@ def test_without_dask_it_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "set.toml").write_text(SPEC)
     words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
     code = f"import sys; sys.modules['dask'] = None; from rtradar.cli import main; sys.exit(main({words}))"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    found = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False
+    )
     assert found.returncode == 2
     assert found.stderr.count("\n") == 1
     assert "in a checkout: pip install -e '.[campaign]'" in found.stderr

@@ -47,7 +47,9 @@ def planned(folder: Path, text: str, seed: int = 0) -> list[Recipe]:
 
 
 def actors(count: int, *labels: str) -> str:
-    return "".join(f'[[synthetic]]\nlabel = "{label}"\ncount = {count}\nsubjects = 3\n' for label in labels)
+    return "".join(
+        f'[[synthetic]]\nlabel = "{label}"\ncount = {count}\nsubjects = 3\n' for label in labels
+    )
 
 
 def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
@@ -58,7 +60,9 @@ def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
 
 def test_every_take_meets_every_setting(tmp_path: Path) -> None:
     each = '[each]\nradar = ["paper-12ghz", "paper-77ghz"]\nfidelity = ["analytic", "specular"]\n'
-    found = planned(tmp_path, HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5))
+    found = planned(
+        tmp_path, HEAD + each + actors(5, "walk", "kick") + recording(tmp_path, hop_s=0.5)
+    )
     assert len(found) == (5 + 5 + 5) * 4  # 3 s every 0.5 s: five intervals of 1 s
     told = counts(found)
     assert told["label"] == {"kick": 20, "walk": 40}
@@ -69,7 +73,9 @@ def test_every_take_meets_every_setting(tmp_path: Path) -> None:
 
 
 def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
-    found = planned(tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk"))
+    found = planned(
+        tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk")
+    )
     by_take: dict[str, list[Recipe]] = {}
     for recipe in found:
         by_take.setdefault(recipe.parameters["recording"], []).append(recipe)
@@ -82,8 +88,14 @@ def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
 def test_ids_do_not_depend_on_what_else_there_is_or_where(tmp_path: Path) -> None:
     other = tmp_path / "elsewhere"
     other.mkdir()
-    few = {recipe.identity for recipe in planned(tmp_path, HEAD + actors(3, "walk") + recording(tmp_path))}
-    many = {recipe.identity for recipe in planned(other, HEAD + actors(9, "kick", "walk") + recording(other, hop_s=0.5))}
+    few = {
+        recipe.identity
+        for recipe in planned(tmp_path, HEAD + actors(3, "walk") + recording(tmp_path))
+    }
+    many = {
+        recipe.identity
+        for recipe in planned(other, HEAD + actors(9, "kick", "walk") + recording(other, hop_s=0.5))
+    }
     assert len(few) == 4
     assert few < many
 
@@ -113,8 +125,13 @@ def test_what_is_drawn_is_the_same_tomorrow(tmp_path: Path) -> None:
     (recipe,) = planned(tmp_path, HEAD + actors(1, "walk"))
     # The first eight digits that sha256sum gives for (0, 'walk', 0), and for ('subject', 0).
     assert recipe.parameters["seed"] == recipe.parameters["take"] == 0x94DE7F0B
-    take, subject = (np.random.default_rng([seed, 0]).random(8) for seed in (0x94DE7F0B, 0xC9D761C3))
-    told = {key: recipe.parameters[key] for key in ("heading_deg", "snr_db", "tempo", "amplitude", "build", "height_m")}
+    take, subject = (
+        np.random.default_rng([seed, 0]).random(8) for seed in (0x94DE7F0B, 0xC9D761C3)
+    )
+    told = {
+        key: recipe.parameters[key]
+        for key in ("heading_deg", "snr_db", "tempo", "amplitude", "build", "height_m")
+    }
     assert told == {
         "heading_deg": round(-30 + 60 * take[0], 4),
         "snr_db": round(10 + 20 * take[1], 4),
@@ -125,10 +142,14 @@ def test_what_is_drawn_is_the_same_tomorrow(tmp_path: Path) -> None:
     }
 
 
-def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(tmp_path: Path) -> None:
+def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
+    tmp_path: Path,
+) -> None:
     drawn = "[drawn]\nheading_deg = [7, 7]\noffset_x_m = [0.25, 0.25]\noffset_y_m = [-0.5, -0.5]\n"
     each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\nradar_position_m = [[-3, 0, 1.5]]\n"
-    (recipe,) = planned(tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk"))
+    (recipe,) = planned(
+        tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk")
+    )
     told = recipe.parameters
     assert (told["heading_deg"], told["snr_db"]) == (7, 3)
     assert told["person_position_m"] == list(recipe.scene.person_position_m) == [1.25, 1.5]
@@ -147,19 +168,26 @@ def test_nothing_but_the_motion_tells_the_label(tmp_path: Path) -> None:
         "build": (0.8, 1.25),
         "height_m": (1.55, 1.95),
     }.items():
-        values = {label: np.array([r.parameters[key] for r in found if r.label == label]) for label in ("walk", "kick")}
+        values = {
+            label: np.array([r.parameters[key] for r in found if r.label == label])
+            for label in ("walk", "kick")
+        }
         for drawn in values.values():
             assert drawn.min() >= low
             assert drawn.max() <= high
         if key not in ("build", "height_m"):  # which are those of the same three people
             # Means of 60 uniform values each: five standard deviations of their difference.
-            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * (high - low) / np.sqrt(12) * np.sqrt(2 / 60)
+            assert abs(values["walk"].mean() - values["kick"].mean()) < 5 * (high - low) / np.sqrt(
+                12
+            ) * np.sqrt(2 / 60)
 
 
 def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
     bodies: dict[str, set[tuple[float, float]]] = {}
     for recipe in planned(tmp_path, HEAD + actors(6, "walk", "punch")):
-        bodies.setdefault(recipe.parameters["subject"], set()).add((recipe.parameters["build"], recipe.parameters["height_m"]))
+        bodies.setdefault(recipe.parameters["subject"], set()).add(
+            (recipe.parameters["build"], recipe.parameters["height_m"])
+        )
     assert len(bodies) == 3
     assert all(len(body) == 1 for body in bodies.values())
     assert len(set.union(*bodies.values())) == 3
@@ -168,7 +196,9 @@ def test_a_subject_has_one_body_in_all_activities(tmp_path: Path) -> None:
 def test_a_range_that_changes_moves_no_other(tmp_path: Path) -> None:
     (one,) = planned(tmp_path, HEAD + actors(1, "walk"))
     (other,) = planned(tmp_path, HEAD + "tempo = [1.0, 1.0]\n" + actors(1, "walk"))
-    assert {key for key in one.parameters if one.parameters[key] != other.parameters[key]} == {"tempo"}
+    assert {key for key in one.parameters if one.parameters[key] != other.parameters[key]} == {
+        "tempo"
+    }
 
 
 def test_parameters_are_plain_json_and_tell_what_a_reader_needs(tmp_path: Path) -> None:
@@ -188,24 +218,32 @@ def test_what_is_sent_of_a_recording_is_what_its_interval_needs(tmp_path: Path) 
 
 def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
     text = recording(tmp_path)
-    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace("31", "30")  # 29 / 15 s = 1.93333...
+    third = BVH.replace("Frame Time: 0.1", f"Frame Time: {1 / 15}").replace(
+        "31", "30"
+    )  # 29 / 15 s = 1.93333...
     (tmp_path / "walk.bvh").write_text(third.rstrip().rpartition("\n")[0] + "\n")
     (recipe,) = planned(tmp_path, text)
     packed = recipe.packed().motion
     assert packed is not None
     assert recipe.interval_s == 1.933333
     assert packed.duration_s == pytest.approx(29 / 15, abs=1e-6)
-    (later,) = planned(tmp_path, text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666"))
+    (later,) = planned(
+        tmp_path, text.replace("[[recordings]]", "[[recordings]]\nstart_s = 0.266666")
+    )
     assert later.interval_s == 1.666667
     assert later.packed().motion is not None
 
 
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"recording 'walk.bvh' from 0 s stands there twice; leave one out"):
+    with pytest.raises(
+        InputError, match=r"recording 'walk.bvh' from 0 s stands there twice; leave one out"
+    ):
         planned(tmp_path, HEAD + recording(tmp_path) * 2)
 
 
-def test_a_recording_of_too_many_intervals_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_recording_of_too_many_intervals_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("rtradar.campaign.spec.MOST_SAMPLES", 20)
     text = "[windows]\nduration_s = 1.0\nhop_s = 0.1\n" + recording(tmp_path)
     with pytest.raises(InputError, match="these are 21 samples, 21 intervals under 1 combinations"):

@@ -15,7 +15,12 @@ FOUR = ("jumping_jack", "kick", "punch", "walk")
 
 @pytest.mark.parametrize(
     ("name", "each", "settings"),
-    [("paper_400", 100, 1), ("transfer_free_space", 50, 4), ("transfer_room", 50, 2), ("noise_100", 25, 1)],
+    [
+        ("paper_400", 100, 1),
+        ("transfer_free_space", 50, 4),
+        ("transfer_room", 50, 2),
+        ("noise_100", 25, 1),
+    ],
 )
 def test_every_activity_has_as_many(name: str, each: int, settings: int) -> None:
     found = recipes(read_spec(validation_folder() / f"{name}.toml"))
@@ -24,9 +29,23 @@ def test_every_activity_has_as_many(name: str, each: int, settings: int) -> None
 
 
 def test_both_sets_of_the_transfer_have_the_same_motions() -> None:
-    drawn = ("recording", "tempo", "amplitude", "build", "height_m", "heading_deg", "snr_db", "person_position_m", "take", "seed")
+    drawn = (
+        "recording",
+        "tempo",
+        "amplitude",
+        "build",
+        "height_m",
+        "heading_deg",
+        "snr_db",
+        "person_position_m",
+        "take",
+        "seed",
+    )
     free, room = (
-        {recipe.parameters["recording"]: recipe for recipe in recipes(read_spec(validation_folder() / f"transfer_{name}.toml"))}
+        {
+            recipe.parameters["recording"]: recipe
+            for recipe in recipes(read_spec(validation_folder() / f"transfer_{name}.toml"))
+        }
         for name in ("free_space", "room")
     )
     assert free.keys() == room.keys()
@@ -35,7 +54,9 @@ def test_both_sets_of_the_transfer_have_the_same_motions() -> None:
         assert differs <= {"person_position_m"}  # which is where the room says, and the same offset
 
 
-def test_real_recordings_are_of_all_activities(mocap: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_real_recordings_are_of_all_activities(
+    mocap: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("RTRADAR_MOCAP", str(mocap))
     told = counts(recipes(read_spec(validation_folder() / "real_recordings.toml")))
     assert tuple(told["label"]) == FOUR

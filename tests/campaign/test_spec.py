@@ -42,7 +42,11 @@ def test_what_is_left_out_has_a_value(tmp_path: Path) -> None:
     spec = read_spec(write(tmp_path, SMALL))
     assert (spec.seed, spec.pfa, spec.clutter_removal) == (0, 1e-6, "none")
     (setting,) = spec.settings
-    assert (setting.radar.name, setting.scene.name, setting.fidelity) == ("paper-12ghz", "free-space", "specular")
+    assert (setting.radar.name, setting.scene.name, setting.fidelity) == (
+        "paper-12ghz",
+        "free-space",
+        "specular",
+    )
     assert spec.drawn["snr_db"] == (20.0, 20.0)
     assert spec.actors[0].seeds == (0, 1, 2)
     assert spec.actors[0].subjects == tuple(range(10))
@@ -60,13 +64,30 @@ LISTS = {
     ("text", "count"),
     [
         (SMALL + f"[each]\nheading_deg = {LISTS['heading_deg']}\n", 0),
-        (SMALL + "[each]\n" + "".join(f"{key} = {values}\n" for key, values in LISTS.items()), 3 * 10**11),
+        (
+            SMALL + "[each]\n" + "".join(f"{key} = {values}\n" for key, values in LISTS.items()),
+            3 * 10**11,
+        ),
         (SMALL.replace("count = 3", "count = 1000000"), 0),
-        (SMALL.replace("count = 3", "count = 1000000") + '[each]\nfidelity = ["specular", "analytic"]', 2 * 10**6),
-        (SMALL.replace("duration_s = 2.0", "duration_s = 1\nhop_s = 1e-3\nend_s = 1e5"), 3 * (99_999_000 + 1)),
+        (
+            SMALL.replace("count = 3", "count = 1000000")
+            + '[each]\nfidelity = ["specular", "analytic"]',
+            2 * 10**6,
+        ),
+        (
+            SMALL.replace("duration_s = 2.0", "duration_s = 1\nhop_s = 1e-3\nend_s = 1e5"),
+            3 * (99_999_000 + 1),
+        ),
         ("[windows]\nduration_s = 1\nhop_s = 1e-3\nend_s = 1e5" + RECORDING, 99_999_001),
     ],
-    ids=["a thousand", "combinations", "a million takes", "two million takes", "windows of takes", "windows of a recording"],
+    ids=[
+        "a thousand",
+        "combinations",
+        "a million takes",
+        "two million takes",
+        "windows of takes",
+        "windows of a recording",
+    ],
 )
 def test_samples_are_counted_before_they_are_made(tmp_path: Path, text: str, count: int) -> None:
     (tmp_path / "walk.bvh").write_text("")
@@ -75,7 +96,10 @@ def test_samples_are_counted_before_they_are_made(tmp_path: Path, text: str, cou
     began = time.perf_counter()
     try:
         if count:
-            with pytest.raises(InputError, match=rf"these are {count} samples, .* 1000000 are allowed: split the file"):
+            with pytest.raises(
+                InputError,
+                match=rf"these are {count} samples, .* 1000000 are allowed: split the file",
+            ):
                 read_spec(path)
         else:
             read_spec(path)
@@ -83,7 +107,9 @@ def test_samples_are_counted_before_they_are_made(tmp_path: Path, text: str, cou
     finally:
         tracemalloc.stop()
     assert peak < 200e6
-    assert time.perf_counter() - began < 30  # some seconds with the memory watched; hours without the count
+    assert (
+        time.perf_counter() - began < 30
+    )  # some seconds with the memory watched; hours without the count
 
 
 def test_every_combination_is_a_setting(tmp_path: Path) -> None:
@@ -110,7 +136,9 @@ def test_files_are_sought_beside_the_data_set_file(tmp_path: Path) -> None:
     assert spec.settings[0].radar.samples_per_chirp == 128
 
 
-def test_recordings_may_lie_where_the_environment_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_recordings_may_lie_where_the_environment_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "far").mkdir()
     (tmp_path / "far" / "walk.bvh").write_text("")
     monkeypatch.setenv("RTRADAR_FAR", str(tmp_path / "far"))
@@ -120,7 +148,12 @@ def test_recordings_may_lie_where_the_environment_says(tmp_path: Path, monkeypat
 
 def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> None:
     (tmp_path / "walk.bvh").write_text("")
-    spec = read_spec(write(tmp_path, "[windows]\nduration_s = 2.0\nhop_s = 1.0" + RECORDING + "start_s = 0.5\nend_s = 4.0"))
+    spec = read_spec(
+        write(
+            tmp_path,
+            "[windows]\nduration_s = 2.0\nhop_s = 1.0" + RECORDING + "start_s = 0.5\nend_s = 4.0",
+        )
+    )
     assert spec.recordings[0].windows == Windows(0.5, 2.0, 1.0, 4.0)
 
 
@@ -138,41 +171,85 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         (SMALL + "seeds = [1]", "give count or seeds, one of them"),
         (SMALL.replace("count = 3", ""), "give count or seeds, one of them"),
         (SMALL.replace("count = 3", "count = 0"), "count = 0; it must be at least 1"),
-        (SMALL.replace("count = 3", "seeds = [1, 1]"), "seeds = [1, 1]; it must be a list of different whole numbers"),
+        (
+            SMALL.replace("count = 3", "seeds = [1, 1]"),
+            "seeds = [1, 1]; it must be a list of different whole numbers",
+        ),
         (SMALL.replace("count = 3", 'seeds = ["a"]'), "seeds = 'a'; it must be a whole number"),
-        (SMALL.replace("walk", "dance"), "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack"),
+        (
+            SMALL.replace("walk", "dance"),
+            "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack",
+        ),
         (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' stands there twice"),
-        (SMALL.replace("duration_s = 2.0", ""), "duration_s is missing; synthetic actors have no end"),
-        (SMALL.replace("duration_s = 2.0", "duration_s = -1"), "duration_s = -1; it must be a number"),
+        (
+            SMALL.replace("duration_s = 2.0", ""),
+            "duration_s is missing; synthetic actors have no end",
+        ),
+        (
+            SMALL.replace("duration_s = 2.0", "duration_s = -1"),
+            "duration_s = -1; it must be a number",
+        ),
         (SMALL.replace("duration_s = 2.0", "hop_s = 1"), "hop_s needs duration_s"),
-        (SMALL.replace("duration_s = 2.0", "duration_s = 2\nend_s = 1"), "end_s = 1 leaves no room"),
-        (SMALL.replace("duration_s = 2.0", "duration_s = 2\nlength = 1"), "[windows] unknown key 'length'"),
+        (
+            SMALL.replace("duration_s = 2.0", "duration_s = 2\nend_s = 1"),
+            "end_s = 1 leaves no room",
+        ),
+        (
+            SMALL.replace("duration_s = 2.0", "duration_s = 2\nlength = 1"),
+            "[windows] unknown key 'length'",
+        ),
         (SMALL + "[each]\ncolour = [1]", "[each] unknown key 'colour'"),
-        (SMALL + "[each]\nradar = 'paper-12ghz'", "[each] radar = 'paper-12ghz'; it must be a list"),
+        (
+            SMALL + "[each]\nradar = 'paper-12ghz'",
+            "[each] radar = 'paper-12ghz'; it must be a list",
+        ),
         (SMALL + "[each]\nradar = []", "[each] radar = []; it must be a list, not empty"),
         (SMALL + "[each]\nradar = ['paper-13ghz']", "[each] radar: radar 'paper-13ghz' is unknown"),
         (SMALL + "[each]\nradar = ['none.toml']", "No such file"),
         (SMALL + "[each]\nradar = [1]", "[each]: radar = 1; it must be a string"),
         (SMALL + "[each]\nscene = ['moon']", "[each] scene: scene 'moon' is unknown"),
-        (SMALL + "[each]\nfidelity = ['perfect']", "fidelity = 'perfect' is unknown; allowed: analytic-paper"),
+        (
+            SMALL + "[each]\nfidelity = ['perfect']",
+            "fidelity = 'perfect' is unknown; allowed: analytic-paper",
+        ),
         (SMALL + "[each]\nsnr_db = [1, 1]", "a value stands there twice"),
         (SMALL + "[each]\nsnr_db = ['loud']", "snr_db = 'loud'; it must be a number"),
-        (SMALL + "[each]\nperson_position_m = [[0]]", "person_position_m = [0]; it must be 2 numbers"),
-        (SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]", "snr_db stands under [each] and under [drawn]"),
+        (
+            SMALL + "[each]\nperson_position_m = [[0]]",
+            "person_position_m = [0]; it must be 2 numbers",
+        ),
+        (
+            SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]",
+            "snr_db stands under [each] and under [drawn]",
+        ),
         (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
         (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range: [least, most]"),
-        (SMALL + "[drawn]\ntempo = [1.2, 0.8]", "[drawn] tempo = [1.2, 0.8]; the least must come first"),
-        (SMALL + "[drawn]\ntempo = [1.2, 9]", "[drawn]: tempo = 9; it must be a number from 0.4 to 2"),
+        (
+            SMALL + "[drawn]\ntempo = [1.2, 0.8]",
+            "[drawn] tempo = [1.2, 0.8]; the least must come first",
+        ),
+        (
+            SMALL + "[drawn]\ntempo = [1.2, 9]",
+            "[drawn]: tempo = 9; it must be a number from 0.4 to 2",
+        ),
         (RECORDING, "[[recordings]] number 1 file = 'walk.bvh': there is no such file"),
-        (RECORDING.replace("licence", "license"), "unknown key 'license'; allowed: file, label, subject, licence"),
+        (
+            RECORDING.replace("licence", "license"),
+            "unknown key 'license'; allowed: file, label, subject, licence",
+        ),
         (RECORDING.replace('licence = "CC0"', ""), "licence is missing; needed: file"),
-        (RECORDING.replace('"her"', "7"), "[[recordings]] number 1: subject = 7; it must be a string"),
+        (
+            RECORDING.replace('"her"', "7"),
+            "[[recordings]] number 1: subject = 7; it must be a string",
+        ),
         ('folder = "none"' + SMALL, "folder = 'none': there is no such folder"),
         ('folder = "${RTRADAR_NOWHERE}"' + SMALL, "the environment has no such variable"),
         ("[", "is not TOML"),
     ],
 )
-def test_nonsense_is_refused_in_one_line_that_names_the_key(tmp_path: Path, text: str, says: str) -> None:
+def test_nonsense_is_refused_in_one_line_that_names_the_key(
+    tmp_path: Path, text: str, says: str
+) -> None:
     with pytest.raises(InputError) as caught:
         read_spec(write(tmp_path, text))
     message = str(caught.value)
@@ -196,8 +273,13 @@ WHOLE: dict[str, Any] = {
         "radar_position_m": [[-4.0, 1.0, 1.0]],
     },
     "drawn": {"snr_db": [10.0, 20.0], "tempo": [0.9, 1.1]},
-    "synthetic": [{"label": "walk", "count": 2, "subjects": 2}, {"label": "kick", "seeds": [1], "subjects": [5]}],
-    "recordings": [{"file": "walk.bvh", "label": "walk", "subject": "her", "licence": "CC0", "start_s": 0.5}],
+    "synthetic": [
+        {"label": "walk", "count": 2, "subjects": 2},
+        {"label": "kick", "seeds": [1], "subjects": [5]},
+    ],
+    "recordings": [
+        {"file": "walk.bvh", "label": "walk", "subject": "her", "licence": "CC0", "start_s": 0.5}
+    ],
 }
 junk = st.recursive(
     st.none()
@@ -206,14 +288,22 @@ junk = st.recursive(
     | st.floats()
     | st.text(max_size=5)
     | st.sampled_from(["walk", "${HOME}", "../x.toml"]),
-    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=2),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=2)
+    ),
     max_leaves=4,
 )
 
 
 def places(value: object, here: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """The way to every value inside."""
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    items = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     return [way for key, inner in items for way in [(*here, key), *places(inner, (*here, key))]]
 
 
@@ -242,7 +332,10 @@ def test_whatever_stands_where_a_value_should_gets_one_line_or_is_one(
 
 
 def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"data set file '.*none.toml': No such file or directory; give a TOML file"):
+    with pytest.raises(
+        InputError,
+        match=r"data set file '.*none.toml': No such file or directory; give a TOML file",
+    ):
         read_spec(tmp_path / "none.toml")
 
 
@@ -254,15 +347,24 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
         (Windows(duration_s=2.0), 3.0, [(0.0, 2.0)]),
         (Windows(0.5, 1.0, 1.0), 3.5, [(0.5, 1.0), (1.5, 1.0), (2.5, 1.0)]),
         (Windows(0.5, 1.0, 1.0), 3.4, [(0.5, 1.0), (1.5, 1.0)]),
-        (Windows(0.0, 0.3, 0.1), 0.6, [(0.0, 0.3), (0.1, 0.3), (0.2, 0.3), (0.3, 0.3)]),  # 0.6 - 0.3 is less than 3 x 0.1
+        (
+            Windows(0.0, 0.3, 0.1),
+            0.6,
+            [(0.0, 0.3), (0.1, 0.3), (0.2, 0.3), (0.3, 0.3)],
+        ),  # 0.6 - 0.3 is less than 3 x 0.1
         (Windows(0.0, 1.0, 0.5, 2.0), 9.0, [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]),
     ],
 )
-def test_intervals_fill_the_recording(windows: Windows, length_s: float, expected: list[tuple[float, float]]) -> None:
+def test_intervals_fill_the_recording(
+    windows: Windows, length_s: float, expected: list[tuple[float, float]]
+) -> None:
     assert windows.of("walk", length_s) == expected
 
 
-@pytest.mark.parametrize("windows", [Windows(duration_s=3.0), Windows(start_s=2.5), Windows(end_s=2.5), Windows(2.0, 1.0, 0.5)])
+@pytest.mark.parametrize(
+    "windows",
+    [Windows(duration_s=3.0), Windows(start_s=2.5), Windows(end_s=2.5), Windows(2.0, 1.0, 0.5)],
+)
 def test_a_recording_that_is_too_short_is_named(windows: Windows) -> None:
     with pytest.raises(InputError, match=r"recording 'walk' has 2 s, too short"):
         windows.of("walk", 2.0)

@@ -80,16 +80,29 @@ def test_what_is_missing_is_made_once(client: Client, tmp_path: Path) -> None:
     store = Store.look(RECIPES, tmp_path)
     assert (store.whole, store.damaged, len(store.missing)) == (4, 0, 5)
     done = work(client, store.missing, tmp_path, fake)
-    assert sorted(outcome.identity for outcome in done) == sorted(recipe.identity for recipe in store.missing)
-    assert {outcome.size for outcome in done} == {sample_path(tmp_path, RECIPES[5].identity).stat().st_size}
+    assert sorted(outcome.identity for outcome in done) == sorted(
+        recipe.identity for recipe in store.missing
+    )
+    assert {outcome.size for outcome in done} == {
+        sample_path(tmp_path, RECIPES[5].identity).stat().st_size
+    }
     assert Store.look(RECIPES, tmp_path).missing == ()
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in before} == before
 
 
 @settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=15)
-@given(order=st.permutations(RECIPES), killed=st.integers(0, 9), spoiled=st.integers(0, 8), cut=st.integers(0, 600))
+@given(
+    order=st.permutations(RECIPES),
+    killed=st.integers(0, 9),
+    spoiled=st.integers(0, 8),
+    cut=st.integers(0, 600),
+)
 def test_order_kills_and_damage_leave_the_same_bytes(
-    tmp_path_factory: pytest.TempPathFactory, order: list[Recipe], killed: int, spoiled: int, cut: int
+    tmp_path_factory: pytest.TempPathFactory,
+    order: list[Recipe],
+    killed: int,
+    spoiled: int,
+    cut: int,
 ) -> None:
     undisturbed, folder = (tmp_path_factory.mktemp(name) for name in ("undisturbed", "disturbed"))
     for recipe in RECIPES:
@@ -118,20 +131,27 @@ def test_a_damaged_sample_is_found_and_made_anew(tmp_path: Path) -> None:
     assert path.read_bytes() == whole
 
 
-def test_a_sample_that_cannot_be_made_does_not_stop_the_others(client: Client, tmp_path: Path) -> None:
+def test_a_sample_that_cannot_be_made_does_not_stop_the_others(
+    client: Client, tmp_path: Path
+) -> None:
     def picky(recipe: Recipe) -> Made:
         if recipe.parameters["number"] == 3:
             raise InputError("the person stands in the wall")
         return fake(recipe)
 
     done = work(client, RECIPES, tmp_path, picky)
-    assert [outcome.trouble for outcome in done if outcome.trouble] == ["the person stands in the wall"]
+    assert [outcome.trouble for outcome in done if outcome.trouble] == [
+        "the person stands in the wall"
+    ]
     assert len(contents(tmp_path)) == 8
 
 
-def test_a_folder_that_cannot_be_written_stops_it_in_one_line(client: Client, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_stops_it_in_one_line(
+    client: Client, tmp_path: Path
+) -> None:
     with pytest.raises(
-        InputError, match=r"cannot write .*; 0 of 9 samples were made and are kept: run the same command"
+        InputError,
+        match=r"cannot write .*; 0 of 9 samples were made and are kept: run the same command",
     ) as caught:
         work(client, RECIPES, tmp_path / "none", fake)
     assert "\n" not in str(caught.value)
@@ -148,7 +168,12 @@ def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> N
     (tmp_path / "set.toml").write_text(TINY)
     out = tmp_path / "new" / "out"
     planned = build_dataset(tmp_path / "set.toml", out, plan_only=True)
-    assert (planned["samples"], planned["whole"], planned["made"], planned["missing"]) == (2, 0, 2, 0)
+    assert (planned["samples"], planned["whole"], planned["made"], planned["missing"]) == (
+        2,
+        0,
+        2,
+        0,
+    )
     assert planned["by"]["label"] == {"walk": 2}
     assert planned["estimated_s"] == 0
     first = contents(out)
@@ -168,7 +193,9 @@ def test_a_data_set_from_its_file_to_its_clouds(here: None, tmp_path: Path) -> N
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="POSIX locks")
-def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_first(tmp_path: Path) -> None:
+def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_first(
+    tmp_path: Path,
+) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
     (tmp_path / "set.toml").write_text(TINY)
     out = tmp_path / "out"
@@ -181,8 +208,12 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     assert list(out.iterdir()) == [unfinished]
 
 
-@pytest.mark.parametrize(("scheduler", "left"), [(None, []), ("tcp://elsewhere:8786", [".0123.npz.0123456789ab.part"])])
-def test_half_samples_of_own_workers_go_as_the_process_has_to_end(tmp_path: Path, scheduler: str | None, left: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("scheduler", "left"), [(None, []), ("tcp://elsewhere:8786", [".0123.npz.0123456789ab.part"])]
+)
+def test_half_samples_of_own_workers_go_as_the_process_has_to_end(
+    tmp_path: Path, scheduler: str | None, left: list[str]
+) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
     (tmp_path / "set.toml").write_text(TINY)
     program = f"""
@@ -206,9 +237,13 @@ build.build_dataset(folder / "set.toml", folder / "out", scheduler={scheduler!r}
     assert [path.name for path in (tmp_path / "out").glob(".*.part")] == left
 
 
-def test_a_plan_estimates_what_it_does_not_make(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_estimates_what_it_does_not_make(
+    here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
-    text = TINY.replace("count = 2", "count = 7").replace('["analytic"]', '["analytic", "specular"]')
+    text = TINY.replace("count = 2", "count = 7").replace(
+        '["analytic"]', '["analytic", "specular"]'
+    )
     (tmp_path / "set.toml").write_text(text)
 
     def timed(recipe: Recipe) -> Made:
@@ -218,22 +253,33 @@ def test_a_plan_estimates_what_it_does_not_make(here: None, tmp_path: Path, monk
 
     monkeypatch.setattr(building, "make", timed)
     report = build_dataset(tmp_path / "set.toml", tmp_path / "out", plan_only=True)
-    assert (report["samples"], report["made"], report["missing"]) == (14, 4, 10)  # two of each fidelity
+    assert (report["samples"], report["made"], report["missing"]) == (
+        14,
+        4,
+        10,
+    )  # two of each fidelity
     assert report["estimated_s"] == pytest.approx(5 * 1.0 + 5 * 5.0)
     assert report["estimated_bytes"] == pytest.approx(10 * report["bytes"] / 4)
 
 
-def test_samples_that_cannot_be_made_are_told_in_one_line(here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_samples_that_cannot_be_made_are_told_in_one_line(
+    here: None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
-    (tmp_path / "set.toml").write_text(TINY + "[drawn]\noffset_x_m = [-4.0, -4.0]\noffset_y_m = [1.0, 1.0]")
+    (tmp_path / "set.toml").write_text(
+        TINY + "[drawn]\noffset_x_m = [-4.0, -4.0]\noffset_y_m = [1.0, 1.0]"
+    )
     with pytest.raises(
-        InputError, match=r"2 of 2 samples cannot be made, the other 0 are there; the first of them, .*synthetic:walk"
+        InputError,
+        match=r"2 of 2 samples cannot be made, the other 0 are there; the first of them, .*synthetic:walk",
     ):
         build_dataset(tmp_path / "set.toml", tmp_path / "out")
 
 
 @pytest.mark.slow
-def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pytest.FixtureRequest) -> None:
+def test_a_worker_killed_by_signal_9_loses_nothing(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
     cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import the tests
     request.addfinalizer(lambda: cloudpickle.unregister_pickle_by_value(sys.modules[__name__]))
     marked = [
@@ -248,7 +294,9 @@ def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pyte
         done = work(client, marked, killed, deadly)
     assert (tmp_path / "mark").exists()
     assert os.environ == environment
-    assert sorted(outcome.identity for outcome in done) == sorted(recipe.identity for recipe in marked)
+    assert sorted(outcome.identity for outcome in done) == sorted(
+        recipe.identity for recipe in marked
+    )
     for recipe in marked:
         make_and_store(recipe, str(undisturbed), fake)
     sweep(killed)
@@ -259,7 +307,9 @@ def test_a_worker_killed_by_signal_9_loses_nothing(tmp_path: Path, request: pyte
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Dr.Jit keeps kernels elsewhere there")
 @pytest.mark.parametrize("home", ["there", "not a folder", None])
-def test_workers_have_a_place_for_kernels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str | None) -> None:
+def test_workers_have_a_place_for_kernels(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: str | None
+) -> None:
     (tmp_path / "there").mkdir()
     (tmp_path / "not a folder").touch()
     monkeypatch.delenv("DRJIT_CACHE_DIR", raising=False)
@@ -285,13 +335,26 @@ def test_no_scheduler_is_said_in_one_line(monkeypatch: pytest.MonkeyPatch) -> No
 
 def test_a_scheduler_that_is_lost_is_said_in_one_line(tmp_path: Path) -> None:
     address = tmp_path / "scheduler.json"
-    command = ["-m", "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"]
-    scheduler = subprocess.Popen([sys.executable, *command, "--scheduler-file", str(address)], stderr=subprocess.DEVNULL)
+    command = [
+        "-m",
+        "distributed.cli.dask_scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        "0",
+        "--no-dashboard",
+    ]
+    scheduler = subprocess.Popen(
+        [sys.executable, *command, "--scheduler-file", str(address)], stderr=subprocess.DEVNULL
+    )
     try:
         with Client(scheduler_file=str(address), set_as_default=False) as client:
             # There are no workers: it waits until the scheduler dies.
             threading.Timer(0.2, scheduler.kill).start()
-            with pytest.raises(CampaignError, match=r"the scheduler was lost; 0 of 9 samples were made and are kept"):
+            with pytest.raises(
+                CampaignError,
+                match=r"the scheduler was lost; 0 of 9 samples were made and are kept",
+            ):
                 work(client, RECIPES, tmp_path, fake)
     finally:
         scheduler.kill()

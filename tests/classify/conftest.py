@@ -16,7 +16,15 @@ LABELS = ("kick", "punch", "walk")
 class MadeUpClouds:
     """Each motion is seen ``views`` times, by one model after the other; a recording shows one motion."""
 
-    def __init__(self, *, per_class: int = 6, views: int = 1, n_points: int = 48, subjects: int = 3, seed: int = 0) -> None:
+    def __init__(
+        self,
+        *,
+        per_class: int = 6,
+        views: int = 1,
+        n_points: int = 48,
+        subjects: int = 3,
+        seed: int = 0,
+    ) -> None:
         self._n_points, self._seed = n_points, seed
         self.rows: list[dict[str, Any]] = [
             {
@@ -46,7 +54,9 @@ class MadeUpClouds:
         random = np.random.default_rng([self._seed, index])
         time = random.uniform(0.5, 1.5, self._n_points)
         turns = 1 + LABELS.index(self.rows[index]["label"])
-        velocity = 2 * np.sin(2 * np.pi * turns * (time - 0.5)) + random.normal(0, 0.1, self._n_points)
+        velocity = 2 * np.sin(2 * np.pi * turns * (time - 0.5)) + random.normal(
+            0, 0.1, self._n_points
+        )
         return np.stack([time, 4 + random.normal(0, 0.1, self._n_points), velocity], axis=1)
 
     def spatial(self, index: int) -> NDArray[np.float64]:
@@ -75,6 +85,11 @@ def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     names = [f"{index:03d}" for index in range(len(clouds))]
     for index, (name, row) in enumerate(zip(names, clouds.rows, strict=True)):
         provenance = {key: value for key, value in row.items() if key != "label"}
-        write_sample(folder, name, Sample(clouds.points(index), row["label"], provenance), clouds.spatial(index))
+        write_sample(
+            folder,
+            name,
+            Sample(clouds.points(index), row["label"], provenance),
+            clouds.spatial(index),
+        )
     write_index(folder, names)
     return folder

@@ -23,13 +23,22 @@ def study_of(clouds: Any) -> Study:
     _, truth = classes_of(clouds)
     splits = make_splits(clouds, "folds", folds=3)
     outcomes: list[Outcome] = [
-        outcome_of(clouds, split, values_of(clouds, "folds"), truth, truth[split.test]) for split in splits
+        outcome_of(clouds, split, values_of(clouds, "folds"), truth, truth[split.test])
+        for split in splits
     ]
-    plan = {"fingerprint": fingerprint(clouds), "made": made(clouds), "split": "folds", "folds": 3, "seed": 0}
+    plan = {
+        "fingerprint": fingerprint(clouds),
+        "made": made(clouds),
+        "split": "folds",
+        "folds": 3,
+        "seed": 0,
+    }
     return Study(Path("study"), plan, outcomes)
 
 
-def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(made_up: Callable[..., Any]) -> None:
+def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
+    made_up: Callable[..., Any],
+) -> None:
     clouds = made_up(per_class=12)
     found = judge_baselines(clouds, study_of(clouds))
     assert list(found) == list(BASELINES)
@@ -46,7 +55,9 @@ def test_other_clouds_are_refused(made_up: Callable[..., Any]) -> None:
         judge_baselines(made_up(per_class=4), study_of(made_up(per_class=5)))
 
 
-def test_clouds_of_the_same_intervals_by_another_model_are_refused(made_up: Callable[..., Any]) -> None:
+def test_clouds_of_the_same_intervals_by_another_model_are_refused(
+    made_up: Callable[..., Any],
+) -> None:
     clouds, others = made_up(), made_up()
     for row in others.rows:
         row["fidelity"] = "specular"
@@ -66,10 +77,17 @@ def test_empty_clouds_and_single_points_have_features(made_up: Callable[..., Any
 def shape_of(points: np.ndarray) -> list[float]:
     """Spread, ends, percentiles and correlations by Python's own statistics."""
     columns = [column.tolist() for column in points.T]
-    twentieths = [statistics.quantiles(column, n=20, method="inclusive") for column in columns]  # 5, 10, ... 95 %
+    twentieths = [
+        statistics.quantiles(column, n=20, method="inclusive") for column in columns
+    ]  # 5, 10, ... 95 %
     percentiles = [[cuts[number] for cuts in twentieths] for number in (0, 4, 9, 14, 18)]
-    pairs = [statistics.correlation(columns[one], columns[other]) for one, other in ((0, 1), (0, 2), (1, 2))]
-    spread, least, most = ([of(column) for column in columns] for of in (statistics.pstdev, min, max))
+    pairs = [
+        statistics.correlation(columns[one], columns[other])
+        for one, other in ((0, 1), (0, 2), (1, 2))
+    ]
+    spread, least, most = (
+        [of(column) for column in columns] for of in (statistics.pstdev, min, max)
+    )
     return [*spread, *least, *most, *np.ravel(percentiles), *pairs]
 
 
@@ -83,10 +101,16 @@ def test_features_by_the_book(made_up: Callable[..., Any]) -> None:
     eighths: list[list[float]] = [[] for _ in range(8)]
     for time, _, velocity in points:
         eighths[min(int((time - first) / (last - first) * 8), 7)].append(velocity)
-    moments = [value for some in eighths for value in (statistics.fmean(some), statistics.pstdev(some))]
+    moments = [
+        value for some in eighths for value in (statistics.fmean(some), statistics.pstdev(some))
+    ]
     # Sums of 120 numbers in another order.
-    np.testing.assert_allclose(rdt_features(clouds)[2], [*shape_of(centred), slow, *moments], rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(spatial_features(clouds)[2], [*shape_of(centred), math.log(121)], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        rdt_features(clouds)[2], [*shape_of(centred), slow, *moments], rtol=1e-9, atol=1e-12
+    )
+    np.testing.assert_allclose(
+        spatial_features(clouds)[2], [*shape_of(centred), math.log(121)], rtol=1e-9, atol=1e-12
+    )
 
 
 def test_a_coordinate_that_is_not_measured_has_no_features(made_up: Callable[..., Any]) -> None:
@@ -105,11 +129,18 @@ def test_a_coordinate_that_is_not_measured_has_no_features(made_up: Callable[...
     np.testing.assert_array_equal(found[:, ~of_z], whole[:, ~of_z])
 
 
-def test_metadata_are_numbers_as_they_are_and_names_a_column_each(made_up: Callable[..., Any]) -> None:
+def test_metadata_are_numbers_as_they_are_and_names_a_column_each(
+    made_up: Callable[..., Any],
+) -> None:
     clouds = made_up(per_class=1)
     told = [(math.inf, [1.0, 2.0], "rays"), (None, [3.0, 4.0], "auto"), (12.5, [5.0, 6.0], "rays")]
     for row, (snr, place, fidelity) in zip(clouds.rows, told, strict=True):
-        row |= {"heading_deg": -9.0, "snr_db": snr, "person_position_m": place, "fidelity": fidelity}
+        row |= {
+            "heading_deg": -9.0,
+            "snr_db": snr,
+            "person_position_m": place,
+            "fidelity": fidelity,
+        }
     # Duration, heading, SNR, both of the place, radar, scene, two fidelities; what is infinite or unknown stands far outside.
     np.testing.assert_array_equal(
         metadata_features(clouds),

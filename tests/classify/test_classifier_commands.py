@@ -39,10 +39,37 @@ def test_a_study_is_trained_and_evaluated(
     collection: Path, trained: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     paper = tmp_path / "paper"
-    assert rtradar("train", collection, "--out", paper, "--recipe", "paper", *TINY, "--split", "subject", "--fold", "2") == 0
+    assert (
+        rtradar(
+            "train",
+            collection,
+            "--out",
+            paper,
+            "--recipe",
+            "paper",
+            *TINY,
+            "--split",
+            "subject",
+            "--fold",
+            "2",
+        )
+        == 0
+    )
     assert "1 of 2 trained" in capsys.readouterr().out
     out = tmp_path / "evaluated"
-    assert rtradar("evaluate", trained, paper, "--baselines", "--out", out, "--json", tmp_path / "numbers.json") == 0
+    assert (
+        rtradar(
+            "evaluate",
+            trained,
+            paper,
+            "--baselines",
+            "--out",
+            out,
+            "--json",
+            tmp_path / "numbers.json",
+        )
+        == 0
+    )
     said = capsys.readouterr().out
     assert "lean, 24 points" in said
     assert "1 of 2 trained" in said
@@ -53,24 +80,36 @@ def test_a_study_is_trained_and_evaluated(
     lean = content["groups"][0]
     assert lean["summary"]["test_clouds"] == 36  # each cloud once
     assert sum(map(sum, lean["confusion"])) == 36
-    pictures = {"accuracy.png", "confusion-1.png", "confusion-2.png", "learning-1.png", "learning-2.png"}
+    pictures = {
+        "accuracy.png",
+        "confusion-1.png",
+        "confusion-2.png",
+        "learning-1.png",
+        "learning-2.png",
+    }
     tables = {"evaluation.json", "table.txt", "trainings.csv", "history.csv"}
     assert {path.name for path in out.iterdir()} == pictures | tables
     assert all((out / name).read_bytes().startswith(b"\x89PNG") for name in pictures)
     assert len((out / "history.csv").read_text().splitlines()) == 1 + 2 * 2 + 2
 
 
-def test_a_trained_network_can_be_asked_about_other_clouds(trained: Path, made_up: Callable[..., Any]) -> None:
+def test_a_trained_network_can_be_asked_about_other_clouds(
+    trained: Path, made_up: Callable[..., Any]
+) -> None:
     network, recipe, classes = load_network(trained, 2)
     clouds = made_up(per_class=2, seed=5)
     examples = Examples(stack_clouds(clouds), torch.zeros(6, dtype=torch.int64), classes)
     assert classes == ("kick", "punch", "walk")
-    assert np.exp(predict(network, examples, recipe)).sum(axis=1) == pytest.approx(np.ones(6), abs=1e-5)
+    assert np.exp(predict(network, examples, recipe)).sum(axis=1) == pytest.approx(
+        np.ones(6), abs=1e-5
+    )
     with pytest.raises(InputError, match="training-03"):
         load_network(trained, 3)
 
 
-def test_every_model_is_asked_by_every_other(collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_every_model_is_asked_by_every_other(
+    collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert rtradar("train", collection, "--out", tmp_path, *TINY, "--split", "across:fidelity") == 0
     assert rtradar("evaluate", tmp_path) == 0
     assert "trained on" in capsys.readouterr().out
@@ -81,14 +120,21 @@ def test_every_model_is_asked_by_every_other(collection: Path, tmp_path: Path, c
 
 
 def test_what_is_done_is_not_done_again(
-    collection: Path, trained: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    collection: Path,
+    trained: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(study, "train_network", lambda *given, **also: pytest.fail("it trains again"))
+    monkeypatch.setattr(
+        study, "train_network", lambda *given, **also: pytest.fail("it trains again")
+    )
     assert rtradar("train", collection, "--out", trained, *TINY) == 0
     assert "2 of 2 trained" in capsys.readouterr().out
 
 
-def test_trainings_of_one_folder_learn_from_the_same_clouds(made_up: Callable[..., Any], tmp_path: Path) -> None:
+def test_trainings_of_one_folder_learn_from_the_same_clouds(
+    made_up: Callable[..., Any], tmp_path: Path
+) -> None:
     recipe = RECIPES["lean"].changed(points=24, epochs=1)
     clouds, others = made_up(), made_up(seed=1)
     train_study(clouds, tmp_path, recipe, folds=2, only=[1])
@@ -112,7 +158,10 @@ def test_a_folder_that_cannot_be_is_said_in_one_line(
 
 
 def test_an_interrupted_command_says_how_to_go_on(
-    collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    collection: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     def interrupted(*given: Any, **also: Any) -> None:
         raise KeyboardInterrupt
@@ -120,7 +169,9 @@ def test_an_interrupted_command_says_how_to_go_on(
     monkeypatch.setattr(study, "train_network", interrupted)
     assert rtradar("train", collection, "--out", tmp_path, *TINY) == 1
     said = capsys.readouterr().err
-    assert said.splitlines()[-1].startswith("rtradar: stopped by the user; the same command goes on")
+    assert said.splitlines()[-1].startswith(
+        "rtradar: stopped by the user; the same command goes on"
+    )
 
 
 BAD = [
@@ -158,7 +209,10 @@ def test_bad_folders_are_refused_in_one_line(
     for words, said in [
         (["train", tmp_path / "none", "--out", tmp_path / "out"], "none"),
         (["train", collection, "--out", tmp_path / "file", *TINY], "--out"),
-        (["train", collection, "--out", tmp_path / "out", *TINY, "--points", "49"], "--points 49: the clouds hold 48"),
+        (
+            ["train", collection, "--out", tmp_path / "out", *TINY, "--points", "49"],
+            "--points 49: the clouds hold 48",
+        ),
         (["evaluate", tmp_path / "none"], "holds no trainings"),
         (["evaluate", trained, "--out", tmp_path / "file"], "--out"),
         (["evaluate", trained, "--data", collection], "--data"),
@@ -174,8 +228,12 @@ def test_bad_folders_are_refused_in_one_line(
 
 
 @pytest.mark.parametrize("name", ["plan.json", "training-01/outcome.json"])
-def test_damaged_files_are_named(collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str) -> None:
-    assert rtradar("train", collection, "--out", tmp_path, *TINY, "--fold", "1", "--epochs", "1") == 0
+def test_damaged_files_are_named(
+    collection: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    assert (
+        rtradar("train", collection, "--out", tmp_path, *TINY, "--fold", "1", "--epochs", "1") == 0
+    )
     (tmp_path / name).write_text('{"recipe":')
     capsys.readouterr()
     assert rtradar("evaluate", tmp_path) == 2
@@ -186,10 +244,16 @@ def test_damaged_files_are_named(collection: Path, tmp_path: Path, capsys: pytes
 
 @pytest.mark.parametrize("package", ["torch", "sklearn"])
 def test_a_missing_extra_is_named(
-    collection: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], package: str
+    collection: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    package: str,
 ) -> None:
     find = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", lambda name, *of: None if name == package else find(name, *of))
+    monkeypatch.setattr(
+        importlib.util, "find_spec", lambda name, *of: None if name == package else find(name, *of)
+    )
     for name in [name for name in sys.modules if name.startswith("rtradar.classify")]:
         monkeypatch.delitem(sys.modules, name)
     for command in (["train", collection, "--out", tmp_path / "out"], ["evaluate", tmp_path]):

@@ -18,7 +18,9 @@ CLOUDS = 20_000
 
 def example() -> Outcome:
     names = np.array(["a", "b"])
-    return Outcome("fold 1", "", np.array([3, 5]), np.array([0, 1]), np.array([0, 0]), names, names, [EPOCH])
+    return Outcome(
+        "fold 1", "", np.array([3, 5]), np.array([0, 1]), np.array([0, 0]), names, names, [EPOCH]
+    )
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
@@ -58,7 +60,9 @@ def test_what_is_no_outcome_is_damaged(tmp_path: Path, changes: dict[str, Any]) 
         load_outcome(tmp_path / "outcome.json")
 
 
-@pytest.mark.parametrize("text", ["", "[]", "null", '{"name": "fold 1"', "[" * 10**5, "\xff", '{"truth": [0]}'])
+@pytest.mark.parametrize(
+    "text", ["", "[]", "null", '{"name": "fold 1"', "[" * 10**5, "\xff", '{"truth": [0]}']
+)
 def test_what_is_no_json_of_ours_is_damaged(tmp_path: Path, text: str) -> None:
     (tmp_path / "outcome.json").write_bytes(text.encode("latin-1"))
     with pytest.raises(InputError, match="is damaged; remove it"):
@@ -67,7 +71,9 @@ def test_what_is_no_json_of_ours_is_damaged(tmp_path: Path, text: str) -> None:
 
 def test_one_long_name_takes_no_memory_for_all(tmp_path: Path) -> None:
     """NumPy would give each name the room of the longest: 8 GB here, for a file of 0.3 MB."""
-    many = {name: [0] * CLOUDS for name in ("indices", "truth", "predicted")} | {"recordings": [""] * CLOUDS}
+    many = {name: [0] * CLOUDS for name in ("indices", "truth", "predicted")} | {
+        "recordings": [""] * CLOUDS
+    }
     changes = many | {"tested_on": ["x" * 100_000] + [""] * (CLOUDS - 1)}
     (tmp_path / "outcome.json").write_text(json.dumps(example().as_dict() | changes))
     with pytest.raises(InputError, match="is damaged; remove it"):

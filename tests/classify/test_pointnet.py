@@ -19,7 +19,9 @@ def clouds(n_clouds: int = 4, n_points: int = 30, n_features: int = 3) -> torch.
     return torch.randn(n_clouds, n_points, n_features)
 
 
-@pytest.mark.parametrize("recipe", [PAPER, COARSE, PAPER.changed(input_transform=False, feature_transform=False)])
+@pytest.mark.parametrize(
+    "recipe", [PAPER, COARSE, PAPER.changed(input_transform=False, feature_transform=False)]
+)
 def test_the_order_of_points_does_not_matter(recipe: Recipe) -> None:
     network = PointNet(3, recipe)
     for _ in range(3):  # away from the beginning, where T-Nets do nothing
@@ -27,7 +29,9 @@ def test_the_order_of_points_does_not_matter(recipe: Recipe) -> None:
     network.eval()
     points = clouds()
     with torch.no_grad():
-        torch.testing.assert_close(network(points[:, torch.randperm(30)]), network(points), rtol=1e-4, atol=1e-5)
+        torch.testing.assert_close(
+            network(points[:, torch.randperm(30)]), network(points), rtol=1e-4, atol=1e-5
+        )
 
 
 def test_a_repeated_point_changes_nothing() -> None:
@@ -40,7 +44,9 @@ def test_a_repeated_point_changes_nothing() -> None:
 @pytest.mark.parametrize("size", [3, 64])
 def test_transforms_begin_as_the_identity(size: int) -> None:
     net = TransformNet(size, torch.float32)
-    torch.testing.assert_close(net(clouds(n_features=size)), torch.eye(size).expand(4, size, size), rtol=0, atol=0)
+    torch.testing.assert_close(
+        net(clouds(n_features=size)), torch.eye(size).expand(4, size, size), rtol=0, atol=0
+    )
 
 
 def test_answers_are_probabilities_and_the_identity_is_not_skew() -> None:
@@ -56,7 +62,10 @@ class Plain(nn.Module):
     def __init__(self, layer: PointwiseLayer | PooledLayer) -> None:
         super().__init__()
         outputs, inputs = layer.linear.weight.shape
-        self.convolution, self.norm = nn.Conv1d(inputs, outputs, 1, bias=False), nn.BatchNorm1d(outputs, momentum=None)
+        self.convolution, self.norm = (
+            nn.Conv1d(inputs, outputs, 1, bias=False),
+            nn.BatchNorm1d(outputs, momentum=None),
+        )
         self.double()
         with torch.no_grad():
             self.convolution.weight.copy_(layer.linear.weight[..., None])

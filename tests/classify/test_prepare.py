@@ -30,7 +30,9 @@ def test_a_unit_sphere_is_centred_and_just_filled(points: torch.Tensor) -> None:
 def test_physical_scaling_keeps_sizes_and_the_zero_of_velocity(points: torch.Tensor) -> None:
     back = scaled(points, "physical") * SCALES
     torch.testing.assert_close(back[..., 2], points[..., 2])
-    torch.testing.assert_close(back[..., 1] - back[:, :1, 1], points[..., 1] - points[:, :1, 1], rtol=1e-4, atol=1e-5)
+    torch.testing.assert_close(
+        back[..., 1] - back[:, :1, 1], points[..., 1] - points[:, :1, 1], rtol=1e-4, atol=1e-5
+    )
     torch.testing.assert_close(back[..., :2].mean(dim=1), torch.zeros(5, 2), rtol=0, atol=1e-5)
 
 
@@ -49,7 +51,9 @@ def test_clouds_of_any_number_of_points_become_one_array(made_up: Callable[..., 
     assert stacked.dtype == np.float32
     for cloud, own in zip(stacked[:2], whole, strict=False):
         from_the_middle = own - [own[:, 0].mean(), 0.0, 0.0]
-        assert {tuple(row) for row in cloud.tolist()} == {tuple(row) for row in from_the_middle.astype(np.float32).tolist()}
+        assert {tuple(row) for row in cloud.tolist()} == {
+            tuple(row) for row in from_the_middle.astype(np.float32).tolist()
+        }
     assert not stacked[2].any()
     assert np.array_equal(stacked, stack_clouds(clouds).numpy())
 
@@ -73,8 +77,12 @@ def test_physical_variations_are_those_of_another_recording(points: torch.Tensor
     plain = (scaled(points[:1], "physical") * SCALES).expand(400, -1, -1)
     varied = for_training(points[:1].expand(400, -1, -1), "physical", "physical") * SCALES
     shift = varied.mean(dim=1)[:, :2]
-    assert shift.abs().amax(dim=0).tolist() == pytest.approx([0.1, 0.1], abs=2e-3)  # the largest of 400 draws
-    assert shift.mean(dim=0).tolist() == pytest.approx([0, 0], abs=0.015)  # five standard deviations
+    assert shift.abs().amax(dim=0).tolist() == pytest.approx(
+        [0.1, 0.1], abs=2e-3
+    )  # the largest of 400 draws
+    assert shift.mean(dim=0).tolist() == pytest.approx(
+        [0, 0], abs=0.015
+    )  # five standard deviations
     varied[..., :2] -= shift[:, None]
     factor = (varied * plain).sum(dim=1) / (plain**2).sum(dim=1)
     time, distance, velocity = factor.unbind(dim=1)
@@ -86,21 +94,29 @@ def test_physical_variations_are_those_of_another_recording(points: torch.Tensor
     # A velocity is a range over a time.
     torch.testing.assert_close(velocity, distance / time, rtol=0, atol=0.02)
     jitter = (varied - factor[:, None] * plain).std(dim=(0, 1))
-    torch.testing.assert_close(jitter, torch.tensor([0.008, 0.012, 0.035]), rtol=0.02, atol=0)  # 160 000 draws
+    torch.testing.assert_close(
+        jitter, torch.tensor([0.008, 0.012, 0.035]), rtol=0.02, atol=0
+    )  # 160 000 draws
 
 
-def test_turned_clouds_are_turned_in_the_plane_of_time_and_velocity_and_jittered(points: torch.Tensor) -> None:
+def test_turned_clouds_are_turned_in_the_plane_of_time_and_velocity_and_jittered(
+    points: torch.Tensor,
+) -> None:
     plain = scaled(points[:1], "unit-sphere").expand(400, -1, -1)
     turned = for_training(points[:1].expand(400, -1, -1), "turned", "unit-sphere")
     before, after = (torch.complex(cloud[..., 0], cloud[..., 2]) for cloud in (plain, turned))
     turn = (after * before.conj()).sum(dim=1) / (before.abs() ** 2).sum(dim=1)
-    torch.testing.assert_close(turn.abs(), torch.ones(400), rtol=0, atol=0.02)  # jitter; a turn, no stretch
+    torch.testing.assert_close(
+        turn.abs(), torch.ones(400), rtol=0, atol=0.02
+    )  # jitter; a turn, no stretch
     quadrants = torch.bincount((turn.angle() / (math.pi / 2) + 2).long().clamp(0, 3), minlength=4)
     assert (quadrants - 100).abs().amax() < 45  # five standard deviations of a fair draw
     rest = torch.stack([(after - turn[:, None] * before).real, turned[..., 1] - plain[..., 1]])
     assert rest[1].abs().amax().item() == pytest.approx(0.05, abs=1e-6)
     # 0.02, of which 1.2 % are held at 0.05.
-    torch.testing.assert_close(rest.std(dim=(1, 2)), torch.tensor([0.0199, 0.0199]), rtol=0.02, atol=0)
+    torch.testing.assert_close(
+        rest.std(dim=(1, 2)), torch.tensor([0.0199, 0.0199]), rtol=0.02, atol=0
+    )
 
 
 def test_without_augmentation_clouds_are_scaled_alone(points: torch.Tensor) -> None:

@@ -16,7 +16,9 @@ from rtradar.classify.scores import (
 )
 
 
-def outcome(truth: list[int], predicted: list[int], trained_on: str = "", tested_on: str = "") -> Outcome:
+def outcome(
+    truth: list[int], predicted: list[int], trained_on: str = "", tested_on: str = ""
+) -> Outcome:
     asked = np.array(list(tested_on)) if tested_on else np.full(len(truth), "")
     return Outcome(
         "fold 1",
@@ -66,4 +68,12 @@ def test_every_value_is_asked_by_every_other() -> None:
     assert mean.tolist() == [[0.75, 0.5], [0.0, 1.0]]
     assert spread[0].tolist() == pytest.approx([0.25 * np.sqrt(2), 0.0])
     assert np.isnan(spread[1]).all()
-    assert transfer_table(values, mean, spread).splitlines()[1].split() == ["a", "75.0", "+-", "35.4", "50.0", "+-", "0.0"]
+    assert transfer_table(values, mean, spread).splitlines()[1].split() == [
+        "a",
+        "75.0",
+        "+-",
+        "35.4",
+        "50.0",
+        "+-",
+        "0.0",
+    ]

@@ -10,7 +10,15 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rtradar.classify.splits import Split, check, chosen, make_splits, moments_of, recordings_of, values_of
+from rtradar.classify.splits import (
+    Split,
+    check,
+    chosen,
+    make_splits,
+    moments_of,
+    recordings_of,
+    values_of,
+)
 from rtradar.errors import InputError
 
 
@@ -48,8 +56,13 @@ def tables(draw: st.DrawFn) -> Table:
             "source": draw(st.sampled_from(["synthetic", "recorded"])),
         }
         for _ in range(draw(st.integers(1, 4))):
-            interval = {"start_s": draw(st.sampled_from([0.0, 0.5, 1.0, 2.0])), "duration_s": draw(st.sampled_from([0.5, 1.0]))}
-            seen_by = draw(st.lists(st.sampled_from(["analytic", "specular"]), min_size=1, max_size=3))
+            interval = {
+                "start_s": draw(st.sampled_from([0.0, 0.5, 1.0, 2.0])),
+                "duration_s": draw(st.sampled_from([0.5, 1.0])),
+            }
+            seen_by = draw(
+                st.lists(st.sampled_from(["analytic", "specular"]), min_size=1, max_size=3)
+            )
             rows += [recording | interval | {"fidelity": fidelity} for fidelity in seen_by]
     return Table(draw(st.permutations(rows)))
 
@@ -57,7 +70,12 @@ def tables(draw: st.DrawFn) -> Table:
 @pytest.mark.parametrize("scheme", ["folds", "recording", "across:fidelity"])
 def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
     def row(name: str, content: str, label: str) -> dict[str, Any]:
-        told = {"recording": name, "recording_digest": content, "label": label, "fidelity": "specular"}
+        told = {
+            "recording": name,
+            "recording_digest": content,
+            "label": label,
+            "fidelity": "specular",
+        }
         return told | {"start_s": 0.0, "duration_s": 1.0}
 
     rows = []
@@ -66,13 +84,23 @@ def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
             # The same file in two data sets, of which each names it from a folder of its own, and once with another skeleton.
             one, other = f"{label}/{number}.amc", f"{number}-{label}.amc"
             content = f"{label}{number}"
-            rows += [row(one, content, label), row(other, content, label), row(other, f"{content} and another .asf", label)]
-        rows += [row(f"synthetic:{label}:{number}", "", label) for number in range(4)]  # these have none
+            rows += [
+                row(one, content, label),
+                row(other, content, label),
+                row(other, f"{content} and another .asf", label),
+            ]
+        rows += [
+            row(f"synthetic:{label}:{number}", "", label) for number in range(4)
+        ]  # these have none
     table = Table(rows)
     assert len(set(recordings_of(table).tolist())) == 2 * (4 + 4)
     for split in make_splits(table, scheme, folds=4):
         train, test = (
-            {rows[index]["recording_digest"].split()[0] for index in side if rows[index]["recording_digest"]}
+            {
+                rows[index]["recording_digest"].split()[0]
+                for index in side
+                if rows[index]["recording_digest"]
+            }
             for side in (split.train, split.test)
         )
         assert not train & test
@@ -81,7 +109,10 @@ def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
 def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
     # Folds follow from the numbers: trainings that are gone on with shall find those that they began with.
     names = np.random.default_rng(0).permutation([f"{number}.amc" for number in range(40)] * 3)
-    rows = [{"recording": name, "recording_digest": f"{name[::-1]}", "label": "walk"} for name in names.tolist()]
+    rows = [
+        {"recording": name, "recording_digest": f"{name[::-1]}", "label": "walk"}
+        for name in names.tolist()
+    ]
     assert recordings_of(Table(rows)).tolist() == np.unique(names, return_inverse=True)[1].tolist()
 
 
@@ -91,13 +122,18 @@ def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
     folds=st.sampled_from([None, 2, 3]),
     seed=st.integers(0, 5),
 )
-def test_no_moment_of_a_recording_is_on_both_sides(table: Table, scheme: str, folds: int | None, seed: int) -> None:
+def test_no_moment_of_a_recording_is_on_both_sides(
+    table: Table, scheme: str, folds: int | None, seed: int
+) -> None:
     try:
         splits = make_splits(table, scheme, folds=folds, seed=seed)
     except InputError:
         return  # too few recordings for it, and said so
     recording, start = table.column("recording"), table.column("start_s")
-    end, kept_apart = start + table.column("duration_s"), {"subject": "subject", "recording": "recording", "recorded": "source"}
+    end, kept_apart = (
+        start + table.column("duration_s"),
+        {"subject": "subject", "recording": "recording", "recorded": "source"},
+    )
     for split in splits:
         assert not set(split.train) & set(split.test)
         for one in split.train:
@@ -110,7 +146,9 @@ def test_no_moment_of_a_recording_is_on_both_sides(table: Table, scheme: str, fo
             assert set(table.column("fidelity")[split.train]) == {split.trained_on}
             assert not set(recording[split.train]) & set(recording[split.test])
     if scheme not in ("recorded", "across:fidelity"):
-        assert sorted(np.concatenate([split.test for split in splits]).tolist()) == list(range(len(table)))
+        assert sorted(np.concatenate([split.test for split in splits]).tolist()) == list(
+            range(len(table))
+        )
 
 
 def test_the_papers_folds_are_stratified(made_up: Callable[..., Any]) -> None:
@@ -125,7 +163,9 @@ def test_the_seed_decides(made_up: Callable[..., Any]) -> None:
     clouds = made_up(per_class=20)
     first, again, other = (make_splits(clouds, "folds", seed=seed) for seed in (1, 1, 2))
     assert all(np.array_equal(one.test, two.test) for one, two in zip(first, again, strict=True))
-    assert not all(np.array_equal(one.test, two.test) for one, two in zip(first, other, strict=True))
+    assert not all(
+        np.array_equal(one.test, two.test) for one, two in zip(first, other, strict=True)
+    )
 
 
 def test_across_learns_from_every_value_and_asks_about_all(made_up: Callable[..., Any]) -> None:
@@ -134,8 +174,13 @@ def test_across_learns_from_every_value_and_asks_about_all(made_up: Callable[...
     assert [split.trained_on for split in splits] == ["analytic"] * 3 + ["specular"] * 3
     fidelity = clouds.column("fidelity")
     assert all(set(fidelity[split.test]) == {"analytic", "specular"} for split in splits)
-    assert all(np.array_equal(one.test, two.test) for one, two in zip(splits[:3], splits[3:], strict=True))
-    assert set(values_of(clouds, "across:fidelity,scene")) == {"analytic / free-space", "specular / free-space"}
+    assert all(
+        np.array_equal(one.test, two.test) for one, two in zip(splits[:3], splits[3:], strict=True)
+    )
+    assert set(values_of(clouds, "across:fidelity,scene")) == {
+        "analytic / free-space",
+        "specular / free-space",
+    }
 
 
 def test_intervals_that_overlap_are_one_moment() -> None:
@@ -152,7 +197,9 @@ def test_a_leak_is_never_handed_out() -> None:
     split = Split("fold 1", np.array([0, 1]), np.array([2, 3]))
     labels = np.array(["walk"] * 4)
     check(split, np.array([0, 1, 2, 3]), labels)
-    with pytest.raises(InputError, match="1 intervals are on both sides, the first is that of cloud 1"):
+    with pytest.raises(
+        InputError, match="1 intervals are on both sides, the first is that of cloud 1"
+    ):
         check(split, np.array([0, 2, 2, 3]), labels)
     with pytest.raises(InputError, match="no training cloud shows kick"):
         check(split, np.arange(4), np.array(["walk", "walk", "kick", "walk"]))
@@ -167,13 +214,21 @@ def test_a_leak_is_never_handed_out() -> None:
         ("across:colour", None, "no column 'colour'"),
     ],
 )  # fmt: skip
-def test_splits_that_cannot_be_are_refused(made_up: Callable[..., Any], scheme: str, folds: int | None, said: str) -> None:
+def test_splits_that_cannot_be_are_refused(
+    made_up: Callable[..., Any], scheme: str, folds: int | None, said: str
+) -> None:
     with pytest.raises(InputError, match=said):
         make_splits(made_up(), scheme, folds=folds)
 
 
 def test_one_source_cannot_be_split_by_source() -> None:
-    row = {"recording": "a", "start_s": 0.0, "duration_s": 1.0, "label": "walk", "source": "synthetic"}
+    row = {
+        "recording": "a",
+        "start_s": 0.0,
+        "duration_s": 1.0,
+        "label": "walk",
+        "source": "synthetic",
+    }
     with pytest.raises(InputError, match="no cloud has source 'recorded'"):
         make_splits(Table([row]), "recorded")
 

@@ -52,9 +52,13 @@ def test_eight_clouds_are_learnt_by_heart(examples: Examples, recipe: Recipe) ->
 
 
 @pytest.mark.parametrize(
-    "recipe", [TINY, PAPER.changed(points=32, epochs=4, augmentation="turned", precision="bfloat16")], ids=["lean", "paper"]
+    "recipe",
+    [TINY, PAPER.changed(points=32, epochs=4, augmentation="turned", precision="bfloat16")],
+    ids=["lean", "paper"],
 )
-def test_a_training_that_was_stopped_ends_as_one_that_was_not(examples: Examples, recipe: Recipe, tmp_path: Path) -> None:
+def test_a_training_that_was_stopped_ends_as_one_that_was_not(
+    examples: Examples, recipe: Recipe, tmp_path: Path
+) -> None:
     whole, history = train_network(examples, examples, recipe, seed=3)
 
     def stop(epoch: int, row: Row) -> None:
@@ -68,7 +72,12 @@ def test_a_training_that_was_stopped_ends_as_one_that_was_not(examples: Examples
     assert load_checkpoint(path).epochs == 2
     seen: list[int] = []
     again, taken_up = train_network(
-        examples, examples, recipe, seed=3, checkpoint=path, on_epoch=lambda epoch, row: seen.append(epoch)
+        examples,
+        examples,
+        recipe,
+        seed=3,
+        checkpoint=path,
+        on_epoch=lambda epoch, row: seen.append(epoch),
     )
     assert seen == [2, 3, 4]
     assert torch.equal(weights(again), weights(whole))
@@ -91,7 +100,9 @@ def test_the_seed_decides_and_nobody_elses_random_numbers_are_touched(examples: 
     assert not torch.equal(weights(first), weights(other))
 
 
-def test_no_cloud_is_dropped_and_none_stands_alone(examples: Examples, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_cloud_is_dropped_and_none_stands_alone(
+    examples: Examples, monkeypatch: pytest.MonkeyPatch
+) -> None:
     sizes: list[int] = []
     real = training.for_training
 
@@ -143,7 +154,9 @@ def test_a_full_disk_is_said_in_one_line(tmp_path: Path) -> None:
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, before[1]))
     try:
         with pytest.raises(InputError, match=r"cannot write '.*checkpoint\.pt': File too large"):
-            save_checkpoint(tmp_path / "checkpoint.pt", Checkpoint({"weights": torch.zeros(50_000)}, {}, 1, []))
+            save_checkpoint(
+                tmp_path / "checkpoint.pt", Checkpoint({"weights": torch.zeros(50_000)}, {}, 1, [])
+            )
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
     assert not list(tmp_path.iterdir())
@@ -165,7 +178,11 @@ def test_more_points_than_there_are_cannot_be_asked_for(examples: Examples) -> N
 
 def test_a_processor_without_bfloat16_is_not_asked_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
     cpu = torch.device("cpu")
-    for known, wanted in (({}, "float32"), ({"avx512_bf16": True}, "bfloat16"), ({"avx512_bf16": False}, "float32")):
+    for known, wanted in (
+        ({}, "float32"),
+        ({"avx512_bf16": True}, "bfloat16"),
+        ({"avx512_bf16": False}, "float32"),
+    ):
         monkeypatch.setattr(torch.cpu, "get_capabilities", lambda known=known: known, raising=False)
         assert pick_precision(cpu) == wanted
 

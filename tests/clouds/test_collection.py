@@ -20,7 +20,11 @@ SPATIAL = np.arange(12.0).reshape(4, 3)
 
 def sample(number: int, **provenance: Any) -> Sample:
     points = np.random.default_rng(number).random((5, 3))
-    return Sample(points, "walk" if number % 2 else "kick", {"subject": f"s{number}", "seed": number, **provenance})
+    return Sample(
+        points,
+        "walk" if number % 2 else "kick",
+        {"subject": f"s{number}", "seed": number, **provenance},
+    )
 
 
 @pytest.fixture
@@ -61,7 +65,9 @@ def test_a_column_of_lists_is_one_dimensional(tmp_path: Path) -> None:
     assert Collection(tmp_path).column("place").shape == (2,)
 
 
-def test_folders_are_joined_one_after_the_other(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_folders_are_joined_one_after_the_other(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     other = tmp_path_factory.mktemp("other")
     write_sample(other, "A", sample(3, start_s=2.0, tempo=1.5), SPATIAL)
     write_index(other, ["A"])
@@ -74,7 +80,9 @@ def test_folders_are_joined_one_after_the_other(folder: Path, tmp_path_factory: 
         found.column("colour")
 
 
-def test_a_sample_in_two_folders_is_refused(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_a_sample_in_two_folders_is_refused(
+    folder: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
     other = tmp_path_factory.mktemp("other")
     write_sample(other, "b", sample(0), SPATIAL)
     write_index(other, ["b"])
@@ -125,7 +133,9 @@ def test_a_file_cut_short_is_damage(folder: Path, length: int) -> None:
     content = (folder / "a.npz").read_bytes()
     (folder / "a.npz").write_bytes(content[:length])
     assert not is_whole(folder / "a.npz")
-    with pytest.raises(InputError, match=r"a\.npz' is damaged; mend the collection with: rtradar dataset build"):
+    with pytest.raises(
+        InputError, match=r"a\.npz' is damaged; mend the collection with: rtradar dataset build"
+    ):
         Collection(folder)
 
 
@@ -137,9 +147,15 @@ def test_no_file_is_not_whole(tmp_path: Path) -> None:
     ("spoil", "says"),
     [
         (lambda folder: (folder / "a.npz").unlink(), r"1 of 3 samples are missing"),
-        (lambda folder: (folder / INDEX).unlink(), r"holds no collection \(collection.json: No such file"),
+        (
+            lambda folder: (folder / INDEX).unlink(),
+            r"holds no collection \(collection.json: No such file",
+        ),
         (lambda folder: (folder / INDEX).write_text("{"), r"collection.json' is damaged"),
-        (lambda folder: (folder / INDEX).write_text('{"format": 99, "samples": []}'), r"no index of format 1"),
+        (
+            lambda folder: (folder / INDEX).write_text('{"format": 99, "samples": []}'),
+            r"no index of format 1",
+        ),
     ],
 )
 def test_what_is_no_collection_is_refused_in_one_line(folder: Path, spoil: Any, says: str) -> None:
@@ -150,7 +166,9 @@ def test_what_is_no_collection_is_refused_in_one_line(folder: Path, spoil: Any, 
 
 
 def test_a_column_that_is_not_there_names_those_that_are(folder: Path) -> None:
-    with pytest.raises(InputError, match="no sample has 'colour'; there are: seed, start_s, subject"):
+    with pytest.raises(
+        InputError, match="no sample has 'colour'; there are: seed, start_s, subject"
+    ):
         Collection(folder).column("colour")
 
 
@@ -162,7 +180,9 @@ def test_what_killed_writers_left_is_swept_and_nothing_else(folder: Path) -> Non
     assert sorted(path.name for path in folder.iterdir()) == before
 
 
-def test_a_disk_that_is_full_leaves_the_folder_as_it_was(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_disk_that_is_full_leaves_the_folder_as_it_was(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     before = {path.name: path.read_bytes() for path in folder.iterdir()}
 
     def full(_: int) -> None:

@@ -13,7 +13,9 @@ from rtradar.radar import Radar
 RADAR = Radar.preset("paper-12ghz")
 
 
-def random_volume(seed: int, shape: tuple[int, int, int], filling: float) -> tuple[np.ndarray, np.ndarray]:
+def random_volume(
+    seed: int, shape: tuple[int, int, int], filling: float
+) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     # Windows begin at cycle boundaries, so their spacing is not exactly even.
     return rng.random(shape) < filling, 0.05 + np.cumsum(0.025 + rng.uniform(-4e-4, 4e-4, shape[0]))
@@ -32,16 +34,22 @@ def stream(volume: np.ndarray, times: np.ndarray, n_points: int, seed: int = 0) 
     filling=st.sampled_from([0.02, 0.3, 0.5, 0.9, 1.0]),
 )
 @settings(max_examples=60, deadline=None)
-def test_slabs_make_the_whole_surface(seed: int, shape: tuple[int, int, int], filling: float) -> None:
+def test_slabs_make_the_whole_surface(
+    seed: int, shape: tuple[int, int, int], filling: float
+) -> None:
     volume, times = random_volume(seed, shape, filling)
     vertices, faces = rdt_isosurface(volume, times, RADAR)
     # As many points as triangles: every centre exactly once, in an order that the seed decides.
     result = stream(volume, times, max(1, len(faces)), seed=3).finish()
     assert result.n_triangles == len(faces)
     assert result.n_voxels == volume.sum()
-    np.testing.assert_array_equal(result.points, sample_centres(vertices, faces, max(1, len(faces)), seed=3))
+    np.testing.assert_array_equal(
+        result.points, sample_centres(vertices, faces, max(1, len(faces)), seed=3)
+    )
     centres = vertices[faces].mean(axis=1)
-    np.testing.assert_array_equal(np.sort(result.points.view("f8,f8,f8").ravel()), np.sort(centres.view("f8,f8,f8").ravel()))
+    np.testing.assert_array_equal(
+        np.sort(result.points.view("f8,f8,f8").ravel()), np.sort(centres.view("f8,f8,f8").ravel())
+    )
 
 
 @given(seed=st.integers(0, 2**32 - 1), n_points=st.integers(1, 400))
@@ -49,7 +57,9 @@ def test_slabs_make_the_whole_surface(seed: int, shape: tuple[int, int, int], fi
 def test_streamed_sample_is_the_sample_of_the_whole(seed: int, n_points: int) -> None:
     volume, times = random_volume(seed, (9, 8, 9), 0.1)
     result = stream(volume, times, n_points, seed=7).finish()
-    np.testing.assert_array_equal(result.points, sample_centres(*rdt_isosurface(volume, times, RADAR), n_points, seed=7))
+    np.testing.assert_array_equal(
+        result.points, sample_centres(*rdt_isosurface(volume, times, RADAR), n_points, seed=7)
+    )
 
 
 @given(seed=st.integers(0, 2**32 - 1), filling=st.sampled_from([0.05, 0.5, 1.0]))
@@ -109,7 +119,9 @@ def test_sampling_is_uniform() -> None:
     assert counts.sum() == 60 * 400
     # Without replacement the counts spread less than chi-square's law by the factor 1 - 60 / 200.
     spread = np.sum((counts - 120) ** 2 / 120) / (1 - 60 / 200)
-    assert 143 < spread < 267  # 199 degrees of freedom: 99.8 % lie within 143 and 267; the seeds are fixed
+    assert (
+        143 < spread < 267
+    )  # 199 degrees of freedom: 99.8 % lie within 143 and 267; the seeds are fixed
     # The order is random too: the first points are drawn from the whole line.
     first = np.array([sample_centres(vertices, faces, 60, seed)[0, 0] for seed in range(400)])
     assert chisquare(np.histogram(first, 10, (0, 200))[0]).pvalue > 1e-4
@@ -149,7 +161,14 @@ def test_mask_may_be_reused_by_the_caller() -> None:
         (lambda: RdtCloud(RADAR).push(np.ones((4, 4)), 0.0), "bool"),
         (lambda: RdtCloud(RADAR).push(np.ones((4, 4), bool), np.nan), "finite"),
         (lambda: stream(np.ones((2, 4, 4), bool), np.array([1.0, 1.0]), 5), "later"),
-        (lambda: [RdtCloud.push(c, np.ones((4, n), bool), n) for c in [RdtCloud(RADAR)] for n in (4, 5)], "before it"),
+        (
+            lambda: [
+                RdtCloud.push(c, np.ones((4, n), bool), n)
+                for c in [RdtCloud(RADAR)]
+                for n in (4, 5)
+            ],
+            "before it",
+        ),
         (lambda: rdt_isosurface(np.ones((4, 4), bool), [0.0], RADAR), "time, range, velocity"),
         (lambda: rdt_isosurface(np.ones((2, 4, 4), bool), [0.0], RADAR), "ascending"),
         (lambda: sample_centres(np.ones((3, 3)), [[0, 1, 2]], n_points=-1), "n_points"),

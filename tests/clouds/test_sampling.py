@@ -20,8 +20,12 @@ def stream(n: int, cuts: list[int], n_rows: int, seed: int = 0) -> UniformSample
 
 
 @settings(max_examples=50)
-@given(n=st.integers(0, 60), n_rows=st.integers(1, 40), cuts=st.lists(st.integers(0, 60), max_size=4))
-def test_rows_are_of_the_stream_without_repeats_however_it_is_cut(n: int, n_rows: int, cuts: list[int]) -> None:
+@given(
+    n=st.integers(0, 60), n_rows=st.integers(1, 40), cuts=st.lists(st.integers(0, 60), max_size=4)
+)
+def test_rows_are_of_the_stream_without_repeats_however_it_is_cut(
+    n: int, n_rows: int, cuts: list[int]
+) -> None:
     sample = stream(n, cuts, n_rows)
     rows = sample.rows()
     assert sample.n_seen == n

@@ -20,16 +20,23 @@ SINES = np.linspace(-0.85, 0.85, 341)  # steps of 0.005
 
 def hills(*spectra: dict[float, float]) -> np.ndarray:
     """Spectra (cell, sine) with Gaussian hills, sine: power; a parabola through the logarithms finds them exactly."""
-    total = [sum(power * np.exp(-(((SINES - sine) / 0.02) ** 2)) for sine, power in hill.items()) for hill in spectra]
+    total = [
+        sum(power * np.exp(-(((SINES - sine) / 0.02) ** 2)) for sine, power in hill.items())
+        for hill in spectra
+    ]
     return np.asarray(total, dtype=np.float32)
 
 
-def spectra(y: np.ndarray | None, z: np.ndarray | None, range_m: list[float], velocity: list[float]) -> AngleSpectra:
+def spectra(
+    y: np.ndarray | None, z: np.ndarray | None, range_m: list[float], velocity: list[float]
+) -> AngleSpectra:
     return AngleSpectra(SINES, y, z, np.array(range_m), np.array(velocity))
 
 
 def test_one_point_in_each_of_two_cells() -> None:
-    seen = spectra(hills({0.6: 2.0}, {-0.24: 1.0}), hills({0.0: 4.0}, {0.64: 1.0}), [5.0, 2.0], [1.5, -2.0])
+    seen = spectra(
+        hills({0.6: 2.0}, {-0.24: 1.0}), hills({0.0: 4.0}, {0.64: 1.0}), [5.0, 2.0], [1.5, -2.0]
+    )
     cloud = spatial_points(seen, RADAR, 0.75)
     # 3-4-5: x = 4, y = 3; then x = 2 sqrt(1 - 0.0576 - 0.4096) = 1.45986.
     expected = np.array([[0.0, 4.0, 1.0], [1.4598630 - 4, 1 - 0.48, 1 + 1.28]])
@@ -53,7 +60,9 @@ def test_the_strongest_stands_in_for_a_missing_peak() -> None:
 
 
 def test_no_direction_no_point() -> None:
-    seen = spectra(hills({0.8: 1.0}, {0.0: 1.0}), hills({0.7: 1.0}, {0.0: 1.0}), [3.0, 4.0], [0.0, 1.0])
+    seen = spectra(
+        hills({0.8: 1.0}, {0.0: 1.0}), hills({0.7: 1.0}, {0.0: 1.0}), [3.0, 4.0], [0.0, 1.0]
+    )
     cloud = spatial_points(seen, RADAR, 0.0)
     np.testing.assert_allclose(cloud.points, [[0.0, 1.0, 1.0]], atol=1e-4)
     np.testing.assert_array_equal(cloud.velocity, [1.0])
@@ -87,7 +96,9 @@ def test_a_silent_cell_has_no_point() -> None:
 
 
 def test_the_file_holds_the_cloud(tmp_path: Path) -> None:
-    cloud = SpatialCloud(np.arange(6.0).reshape(2, 3), np.array([1.0, 2]), np.array([3.0, 4]), np.array([5.0, 6]))
+    cloud = SpatialCloud(
+        np.arange(6.0).reshape(2, 3), np.array([1.0, 2]), np.array([3.0, 4]), np.array([5.0, 6])
+    )
     path = tmp_path / "cloud_xyz.npz"
     save_spatial_npz(path, cloud)
     with np.load(path) as file:

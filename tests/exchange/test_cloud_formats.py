@@ -23,7 +23,12 @@ def clouds(tmp_path: Path) -> tuple[Path, np.ndarray, SpatialCloud]:
     """A folder with both clouds of a run, and what is in them."""
     random = np.random.default_rng(1)
     points = random.standard_normal((N, 3))
-    spatial = SpatialCloud(random.standard_normal((N, 3)), random.standard_normal(N), random.random(N) * 1e-9, random.random(N))
+    spatial = SpatialCloud(
+        random.standard_normal((N, 3)),
+        random.standard_normal(N),
+        random.random(N) * 1e-9,
+        random.random(N),
+    )
     save_cloud_npz(tmp_path / "cloud_rdt.npz", points)
     save_ply(tmp_path / "cloud_rdt.ply", points)
     save_spatial_npz(tmp_path / "cloud_xyz.npz", spatial)
@@ -45,14 +50,18 @@ def test_the_clouds_of_a_run_are_read(clouds: tuple[Path, np.ndarray, SpatialClo
 
 @pytest.mark.parametrize("cloud", ["cloud_rdt.npz", "cloud_xyz.npz"])
 @pytest.mark.parametrize("suffix", CLOUD_FORMATS)
-def test_round_trips(clouds: tuple[Path, np.ndarray, SpatialCloud], cloud: str, suffix: str) -> None:
+def test_round_trips(
+    clouds: tuple[Path, np.ndarray, SpatialCloud], cloud: str, suffix: str
+) -> None:
     folder = clouds[0]
     first = read_cloud(folder / cloud)
     export(folder / cloud, folder / f"there{suffix}")
     export(folder / f"there{suffix}", folder / "back.npz")
     back = read_cloud(folder / "back.npz")
     assert (back.names, back.units) == (first.names, first.units)
-    kept = first.values.astype(np.float32) if suffix == ".pcd" else first.values  # PCD: float32, and nothing else lost
+    kept = (
+        first.values.astype(np.float32) if suffix == ".pcd" else first.values
+    )  # PCD: float32, and nothing else lost
     np.testing.assert_array_equal(back.values, kept)
 
 
@@ -65,7 +74,9 @@ def test_trimesh_opens_ply(clouds: tuple[Path, np.ndarray, SpatialCloud]) -> Non
     np.testing.assert_array_equal(raw["power"].ravel(), spatial.power)
 
 
-def test_pcd_is_laid_out_as_its_specification_says(clouds: tuple[Path, np.ndarray, SpatialCloud]) -> None:
+def test_pcd_is_laid_out_as_its_specification_says(
+    clouds: tuple[Path, np.ndarray, SpatialCloud],
+) -> None:
     folder, _, spatial = clouds
     export(folder / "cloud_xyz.npz", folder / "xyz.pcd")
     head, body = (folder / "xyz.pcd").read_bytes().split(b"DATA binary\n")
@@ -94,7 +105,9 @@ def test_an_empty_cloud_stays_one(tmp_path: Path) -> None:
 
 
 def test_what_is_no_cloud_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "a.ply").write_text("ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n")
+    (tmp_path / "a.ply").write_text(
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n"
+    )
     (tmp_path / "b.pcd").write_text("VERSION .7\nDATA ascii\n")
     (tmp_path / "c.npz").write_bytes(b"PK")
     np.savez(tmp_path / "d.npz", points=np.zeros((4, 2)))
@@ -114,7 +127,9 @@ def test_what_is_no_cloud_is_refused(tmp_path: Path) -> None:
 def test_a_coordinate_that_is_not_measured_stays_so(tmp_path: Path, suffix: str, axis: int) -> None:
     places = np.arange(12.0).reshape(4, 3)
     places[:, axis] = np.nan
-    save_spatial_npz(tmp_path / "cloud_xyz.npz", SpatialCloud(places, np.arange(4.0), np.ones(4), np.zeros(4)))
+    save_spatial_npz(
+        tmp_path / "cloud_xyz.npz", SpatialCloud(places, np.arange(4.0), np.ones(4), np.zeros(4))
+    )
     export(tmp_path / "cloud_xyz.npz", tmp_path / f"out{suffix}")
     np.testing.assert_array_equal(read_cloud(tmp_path / f"out{suffix}").values[:, :3], places)
     if suffix != ".npz":
@@ -125,7 +140,9 @@ def test_a_coordinate_that_is_not_measured_stays_so(tmp_path: Path, suffix: str,
 
 
 @given(data=st.data())
-def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+def test_junk_is_refused_in_one_line(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
     suffix = data.draw(st.sampled_from(list(CLOUD_FORMATS)))
     base = tmp_path_factory.getbasetemp()
     good = base / f"good_cloud{suffix}"
@@ -133,7 +150,9 @@ def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, d
         save_cloud_npz(base / "source_cloud.npz", np.ones((3, 3)))
         export(base / "source_cloud.npz", good)
     changed = bytearray(good.read_bytes())
-    for at, value in data.draw(st.lists(st.tuples(st.integers(0, len(changed) - 1), st.integers(0, 255)), max_size=20)):
+    for at, value in data.draw(
+        st.lists(st.tuples(st.integers(0, len(changed) - 1), st.integers(0, 255)), max_size=20)
+    ):
         changed[at] = value
     junk = base / f"junk_cloud{suffix}"
     junk.write_bytes(bytes(changed[: data.draw(st.integers(0, len(changed)))]))
@@ -145,9 +164,13 @@ def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, d
     assert "\n" not in refusal
 
 
-def test_the_command(clouds: tuple[Path, np.ndarray, SpatialCloud], capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(
+    clouds: tuple[Path, np.ndarray, SpatialCloud], capsys: pytest.CaptureFixture[str]
+) -> None:
     folder = clouds[0]
     assert main(["export", str(folder / "cloud_xyz.npz"), "--out", str(folder / "xyz.pcd")]) == 0
-    assert capsys.readouterr().out.startswith("50 points: x, y, z, velocity, power, time; float32; see ")
+    assert capsys.readouterr().out.startswith(
+        "50 points: x, y, z, velocity, power, time; float32; see "
+    )
     assert main(["export", str(folder / "none.npz"), "--out", str(folder / "xyz.pcd")]) == 2
     assert capsys.readouterr().err.count("\n") == 1

@@ -42,11 +42,17 @@ def make_run(folder: Path, chirps: int, seed: int = 0, chunk: int = 12) -> np.nd
     """A folder with IF samples and a summary; the samples (chirp, rx, sample) are returned."""
     random = np.random.default_rng(seed)
     shape = (chirps, RADAR.n_rx, RADAR.samples_per_chirp)
-    samples = (random.standard_normal((*shape, 2)) * 1e-3).astype(np.float32).view(np.complex64)[..., 0]
+    samples = (
+        (random.standard_normal((*shape, 2)) * 1e-3).astype(np.float32).view(np.complex64)[..., 0]
+    )
     folder.mkdir(parents=True, exist_ok=True)
-    array = zarr.create_array(folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64")
+    array = zarr.create_array(
+        folder / "if.zarr", shape=shape, chunks=(chunk, *shape[1:]), dtype="complex64"
+    )
     array[:] = samples
-    (folder / "summary.json").write_text(json.dumps({"parameters": {"radar": dataclasses.asdict(RADAR)}}))
+    (folder / "summary.json").write_text(
+        json.dumps({"parameters": {"radar": dataclasses.asdict(RADAR)}})
+    )
     return samples
 
 
@@ -67,7 +73,9 @@ def test_the_folder_itself_is_read_in_that_order(run: tuple[Path, np.ndarray]) -
 
 
 @pytest.mark.parametrize("suffix", [".mat", ".nc"])
-def test_our_reader_gives_equal_bits(run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str) -> None:
+def test_our_reader_gives_equal_bits(
+    run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str
+) -> None:
     folder, cube = run
     said = export(folder, tmp_path / f"cube{suffix}")
     assert said["shape"] == [10, 3, 4, 16]
@@ -77,10 +85,15 @@ def test_our_reader_gives_equal_bits(run: tuple[Path, np.ndarray], tmp_path: Pat
     assert read.radar == RADAR
 
 
-def test_int16_is_off_by_half_of_its_scale_at_most(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+def test_int16_is_off_by_half_of_its_scale_at_most(
+    run: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
     folder, cube = run
     scale = export(folder, tmp_path / "cube.bin")["scale"]
-    parts, whole = cube.view(np.float32).reshape(*cube.shape, 2).astype(np.float64), np.fromfile(tmp_path / "cube.bin", "<i2")
+    parts, whole = (
+        cube.view(np.float32).reshape(*cube.shape, 2).astype(np.float64),
+        np.fromfile(tmp_path / "cube.bin", "<i2"),
+    )
     # By the documented layout alone, without our reader.
     about = json.loads((tmp_path / "cube.json").read_text())
     assert about["axes"] == ["chirp", "tx", "rx", "sample", "iq"]
@@ -90,7 +103,10 @@ def test_int16_is_off_by_half_of_its_scale_at_most(run: tuple[Path, np.ndarray],
     assert off.max() <= about["quantisation"] * (1 + 1e-12)
     assert off.max() > 0.9 * scale / 2  # it is rounded, not kept
     read = read_if(tmp_path / "cube.bin")
-    assert np.abs(read.samples.view(np.float32).reshape(parts.shape) - parts).max() <= scale / 2 + 2**-24 * np.abs(parts).max()
+    assert (
+        np.abs(read.samples.view(np.float32).reshape(parts.shape) - parts).max()
+        <= scale / 2 + 2**-24 * np.abs(parts).max()
+    )
     assert read.radar == RADAR
 
 
@@ -114,7 +130,9 @@ def test_xarray_opens_netcdf(run: tuple[Path, np.ndarray], tmp_path: Path, engin
         assert "chirp_time" in data.if_real.coords
         assert data.if_real.attrs["units"] == "m"
         np.testing.assert_array_equal(data.tx_position, RADAR.tx)
-        np.testing.assert_array_equal(data.rx_position[2], RADAR.rx[4:])  # the z-line listens to the Tx of the z-line
+        np.testing.assert_array_equal(
+            data.rx_position[2], RADAR.rx[4:]
+        )  # the z-line listens to the Tx of the z-line
         assert data.attrs["start_frequency_hz"] == 12e9
 
 
@@ -134,7 +152,8 @@ def test_mat_is_laid_out_as_matlab_does(run: tuple[Path, np.ndarray], tmp_path: 
 
 
 @pytest.mark.skipif(
-    not shutil.which("octave-cli"), reason="octave-cli is not installed: nobody else reads .mat of version 7.3 here"
+    not shutil.which("octave-cli"),
+    reason="octave-cli is not installed: nobody else reads .mat of version 7.3 here",
 )
 def test_octave_opens_mat(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     folder, cube = run
@@ -145,14 +164,26 @@ def test_octave_opens_mat(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
         "y = permute(x, [4 3 2 1]); f = fopen('back.bin', 'w'); fwrite(f, [real(y(:))'; imag(y(:))'], 'single'); fclose(f);"
     )
     # Without a display it complains on leaving; what it printed counts.
-    found = subprocess.run(["octave-cli", "--norc", "--eval", script], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    found = subprocess.run(
+        ["octave-cli", "--norc", "--eval", script],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        timeout=60,
+    )
     assert found.stdout.split("\n")[:2] == ["10 3 4 16 ", "small"], found.stderr
-    assert [float(word) for word in found.stdout.split("\n")[2].split()] == [12e9, CENTRES[1, 2], RADAR.tx[2, 0]]
+    assert [float(word) for word in found.stdout.split("\n")[2].split()] == [
+        12e9,
+        CENTRES[1, 2],
+        RADAR.tx[2, 0],
+    ]
     assert (tmp_path / "back.bin").read_bytes() == cube.tobytes()
 
 
 @pytest.mark.parametrize("suffix", IF_FORMATS)
-def test_the_same_samples_give_the_same_file(run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str) -> None:
+def test_the_same_samples_give_the_same_file(
+    run: tuple[Path, np.ndarray], tmp_path: Path, suffix: str
+) -> None:
     export(run[0], tmp_path / f"cube{suffix}")
     first = (tmp_path / f"cube{suffix}").read_bytes()
     export(run[0], tmp_path / f"cube{suffix}")
@@ -161,7 +192,9 @@ def test_the_same_samples_give_the_same_file(run: tuple[Path, np.ndarray], tmp_p
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
 @pytest.mark.parametrize("suffix", IF_FORMATS)
-def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path, suffix: str) -> None:
+def test_a_long_recording_takes_no_more_memory_than_a_short_one(
+    tmp_path: Path, suffix: str
+) -> None:
     make_run(tmp_path / "short", 3000, chunk=600)
     make_run(tmp_path / "long", 90_000, chunk=600)  # 46 MB
     export(tmp_path / "short", tmp_path / f"short{suffix}")
@@ -173,10 +206,16 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(tmp_path: Path, 
     assert peak_memory_mb() - before < 6
 
 
-def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+def test_what_cannot_be_exported_is_refused_and_leaves_nothing(
+    run: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
     folder, _ = run
     for source, out, says in (
-        (folder, "cube.xyz", "no format has the suffix '.xyz'; allowed: .mat, .nc, .bin for IF samples, .npz, .ply, .pcd"),
+        (
+            folder,
+            "cube.xyz",
+            "no format has the suffix '.xyz'; allowed: .mat, .nc, .bin for IF samples, .npz, .ply, .pcd",
+        ),
         (folder, "cube.ply", "is a folder; name the cloud in it"),
         (tmp_path, "cube.mat", "holds no IF samples"),
         (folder / "summary.json", "cube.mat", "is no folder"),
@@ -192,7 +231,12 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, 
     (tmp_path / "cube.json").mkdir()
     with pytest.raises(InputError, match="a directory"):
         export(folder, tmp_path / "cube.bin")
-    for text in ("{", "{}", '{"parameters": {"radar": {"tx_y": -1}}}', '{"parameters": {"radar": {"colour": 1}}}'):
+    for text in (
+        "{",
+        "{}",
+        '{"parameters": {"radar": {"tx_y": -1}}}',
+        '{"parameters": {"radar": {"colour": 1}}}',
+    ):
         (folder / "summary.json").write_text(text)
         with pytest.raises(InputError, match="tells of no radar"):
             export(folder, tmp_path / "cube.mat")
@@ -205,7 +249,9 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(run: tuple[Path, 
     assert sorted(path.name for path in tmp_path.iterdir()) == ["cube.json", "walk"]
 
 
-def test_samples_that_a_later_run_into_the_folder_did_not_keep_are_refused(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+def test_samples_that_a_later_run_into_the_folder_did_not_keep_are_refused(
+    run: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
     summary = json.loads((run[0] / "summary.json").read_text())
     summary["parameters"]["save_if"] = False
     (run[0] / "summary.json").write_text(json.dumps(summary))
@@ -214,7 +260,9 @@ def test_samples_that_a_later_run_into_the_folder_did_not_keep_are_refused(run: 
     assert not (tmp_path / "x.mat").exists()
 
 
-def test_samples_that_are_not_finite_are_refused_as_int16(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
+def test_samples_that_are_not_finite_are_refused_as_int16(
+    run: tuple[Path, np.ndarray], tmp_path: Path
+) -> None:
     zarr.open_array(run[0] / "if.zarr", mode="r+")[5, 1, 2] = np.nan
     with pytest.raises(InputError, match="not finite"):
         export(run[0], tmp_path / "cube.bin")
@@ -236,7 +284,9 @@ def test_a_file_of_something_else_is_refused(run: tuple[Path, np.ndarray], tmp_p
 
 
 @given(data=st.data())
-def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, data: st.DataObject) -> None:
+def test_junk_is_refused_in_one_line(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
     suffix = data.draw(st.sampled_from(list(IF_FORMATS)))
     base = tmp_path_factory.getbasetemp()
     if not (base / f"good{suffix}").exists():
@@ -245,11 +295,15 @@ def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, d
         shutil.rmtree(base / "good")
     victim = base / (f"good{suffix}" if suffix != ".bin" else "good.json")
     changed = bytearray(victim.read_bytes())
-    for at, value in data.draw(st.lists(st.tuples(st.integers(0, len(changed) - 1), st.integers(0, 255)), max_size=30)):
+    for at, value in data.draw(
+        st.lists(st.tuples(st.integers(0, len(changed) - 1), st.integers(0, 255)), max_size=30)
+    ):
         changed[at] = value
     junk = base / f"junk{suffix}"
     junk.write_bytes((base / f"good{suffix}").read_bytes())
-    junk.with_suffix(victim.suffix).write_bytes(bytes(changed[: data.draw(st.integers(0, len(changed)))]))
+    junk.with_suffix(victim.suffix).write_bytes(
+        bytes(changed[: data.draw(st.integers(0, len(changed)))])
+    )
     refusal = ""
     try:
         assert read_if(junk).samples.ndim == 4  # what was hit does not matter to us
@@ -258,9 +312,13 @@ def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, d
     assert "\n" not in refusal
 
 
-def test_the_command(run: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command(
+    run: tuple[Path, np.ndarray], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     out = tmp_path / "cube.bin"
-    assert main(["export", str(run[0]), "--out", str(out), "--json", str(tmp_path / "said.json")]) == 0
+    assert (
+        main(["export", str(run[0]), "--out", str(out), "--json", str(tmp_path / "said.json")]) == 0
+    )
     assert capsys.readouterr().out.startswith("chirp 10, tx 3, rx 4, sample 16; int16; see ")
     said = json.loads((tmp_path / "said.json").read_text())
     assert said["axes"] == ["chirp", "tx", "rx", "sample"]

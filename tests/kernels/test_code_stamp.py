@@ -101,7 +101,9 @@ class Estate:
 @pytest.fixture
 def estate(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Estate]:
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path / "cache"))
-    monkeypatch.setattr(sys, "dont_write_bytecode", True)  # Python's own cache would take an edited file for the same
+    monkeypatch.setattr(
+        sys, "dont_write_bytecode", True
+    )  # Python's own cache would take an edited file for the same
     monkeypatch.syspath_prepend(tmp_path)
     before = dict(sys.modules)
     yield Estate(tmp_path)
@@ -128,16 +130,28 @@ def test_what_has_not_changed_comes_from_disk(estate: Estate) -> None:
         pytest.param("caller", "table[1]", "table[0]", 1111.0, id="its own text"),
         pytest.param("near", "beyond(number) *", "beyond(number) -", 21110.0, id="taken in"),
         pytest.param("near", "weight=1.0", "weight=3.0", 21131.0, id="default of an argument"),
-        pytest.param("near", "number * 100.0", "number * 200.0", 21211.0, id="another compiled function"),
-        pytest.param("near", "OFFSET = 1000.0", "OFFSET = 2000.0", 22111.0, id="constant of another module"),
+        pytest.param(
+            "near", "number * 100.0", "number * 200.0", 21211.0, id="another compiled function"
+        ),
+        pytest.param(
+            "near", "OFFSET = 1000.0", "OFFSET = 2000.0", 22111.0, id="constant of another module"
+        ),
         pytest.param("near", "20000.0", "30000.0", 31111.0, id="array of another module"),
-        pytest.param("far", "number * WEIGHT", "number - WEIGHT", 21092.0, id="taken in by what is taken in"),
-        pytest.param("far", "WEIGHT = 10.0", "WEIGHT = 40.0", 21141.0, id="constant of a third module"),
+        pytest.param(
+            "far", "number * WEIGHT", "number - WEIGHT", 21092.0, id="taken in by what is taken in"
+        ),
+        pytest.param(
+            "far", "WEIGHT = 10.0", "WEIGHT = 40.0", 21141.0, id="constant of a third module"
+        ),
         pytest.param("far", "number * SIGN", "number - SIGN", 21110.0, id="by the module's name"),
-        pytest.param("far", "SIGN = 1.0", "SIGN = 9.0", 21119.0, id="constant by the module's name"),
+        pytest.param(
+            "far", "SIGN = 1.0", "SIGN = 9.0", 21119.0, id="constant by the module's name"
+        ),
     ],
 )
-def test_an_edit_of_what_goes_into_it(estate: Estate, module: str, old: str, new: str, result: float) -> None:
+def test_an_edit_of_what_goes_into_it(
+    estate: Estate, module: str, old: str, new: str, result: float
+) -> None:
     assert estate.load().answer(1.0) == 21111.0
     estate.edit(module, old, new)
     edited = estate.load()
@@ -149,7 +163,11 @@ def test_an_edit_of_what_goes_into_it(estate: Estate, module: str, old: str, new
 
 
 @pytest.mark.parametrize(
-    ("old", "new"), [("fastmath=set()", "fastmath=True "), ("compiled(fastmath=False)", "compiled(fastmath=True )")]
+    ("old", "new"),
+    [
+        ("fastmath=set()", "fastmath=True "),
+        ("compiled(fastmath=False)", "compiled(fastmath=True )"),
+    ],
 )
 def test_what_numba_is_told_goes_into_it(estate: Estate, old: str, new: str) -> None:
     before = stamp_of(estate.load().answer)
@@ -171,7 +189,9 @@ def test_an_edit_of_what_does_not_go_into_it(estate: Estate) -> None:
 def test_an_edit_under_a_running_process(estate: Estate) -> None:
     running = estate.load()
     estate.edit("far", "number * WEIGHT", "number - WEIGHT")
-    assert running.answer(1.0) == 21111.0  # compiled from what was imported, and not kept as what stands in the file
+    assert (
+        running.answer(1.0) == 21111.0
+    )  # compiled from what was imported, and not kept as what stands in the file
     assert estate.load().answer(1.0) == 21092.0
 
 
@@ -186,7 +206,12 @@ def test_in_processes_of_their_own(estate: Estate, tmp_path: Path) -> None:
 
     def begin(seed: int) -> subprocess.Popen[str]:
         command = [sys.executable, "-c", words]
-        return subprocess.Popen(command, env={**environment, "PYTHONHASHSEED": str(seed)}, stdout=subprocess.PIPE, text=True)
+        return subprocess.Popen(
+            command,
+            env={**environment, "PYTHONHASHSEED": str(seed)},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
 
     at_once = [begin(seed) for seed in range(3)]
     assert [process.communicate()[0].split()[0] for process in at_once] == ["21111.0"] * 3
@@ -211,8 +236,13 @@ def test_code_of_other_arguments_is_not_taken_for_it(estate: Estate, tmp_path: P
 
 
 @pytest.mark.parametrize("kind", ["nbi", "nbc"])
-@pytest.mark.parametrize("damage", [lambda text: b"", lambda text: text[: len(text) // 2], lambda text: b"\0" * len(text)])
-def test_damaged_files_are_made_anew(estate: Estate, tmp_path: Path, kind: str, damage: Callable[[bytes], bytes]) -> None:
+@pytest.mark.parametrize(
+    "damage",
+    [lambda text: b"", lambda text: text[: len(text) // 2], lambda text: b"\0" * len(text)],
+)
+def test_damaged_files_are_made_anew(
+    estate: Estate, tmp_path: Path, kind: str, damage: Callable[[bytes], bytes]
+) -> None:
     estate.load().answer(1.0)
     (file,) = (tmp_path / "cache").rglob(f"caller.answer-*.{kind}")
     file.write_bytes(damage(file.read_bytes()))
@@ -248,7 +278,15 @@ def test_what_a_function_closes_over_goes_into_it() -> None:
         return compiled()(lambda number: number + value)
 
     assert stamp_of(made(1)) == stamp_of(made(1))
-    assert len({stamp_of(made(value)) for value in (1, 1.0, True, -0.0, 0.0, np.float32(1), np.ones(1), np.ones(2), (1,))}) == 9
+    assert (
+        len(
+            {
+                stamp_of(made(value))
+                for value in (1, 1.0, True, -0.0, 0.0, np.float32(1), np.ones(1), np.ones(2), (1,))
+            }
+        )
+        == 9
+    )
 
 
 def test_what_has_no_stamp_is_told() -> None:
@@ -288,7 +326,11 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
 @pytest.mark.parametrize(
     ("inlined", "by", "not_by"),
     [
-        ("rtradar.kernels.phasor.phasor", "rtradar.signal.spreading._spread", "rtradar.signal.noise._add"),
+        (
+            "rtradar.kernels.phasor.phasor",
+            "rtradar.signal.spreading._spread",
+            "rtradar.signal.noise._add",
+        ),
         (
             "rtradar.kernels.small_vectors.dot",
             "rtradar.scatter.fresnel_zones.visible_fraction._zone_shares",
@@ -306,7 +348,9 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
     ],
 )
-def test_stamps_of_the_package_have_what_is_taken_in(monkeypatch: pytest.MonkeyPatch, inlined: str, by: str, not_by: str) -> None:
+def test_stamps_of_the_package_have_what_is_taken_in(
+    monkeypatch: pytest.MonkeyPatch, inlined: str, by: str, not_by: str
+) -> None:
     def named(name: str) -> Any:
         module, _, attribute = name.rpartition(".")
         return getattr(importlib.import_module(module), attribute)

@@ -17,7 +17,14 @@ from numba.core.caching import NullCache
 from numba.core.errors import TypingError
 
 import rtradar.kernels.jit as compiling
-from rtradar.kernels.jit import CacheWarning, compiled, inlined, is_on_disk, on_cache_lines, try_cache
+from rtradar.kernels.jit import (
+    CacheWarning,
+    compiled,
+    inlined,
+    is_on_disk,
+    on_cache_lines,
+    try_cache,
+)
 
 
 @inlined()
@@ -69,20 +76,29 @@ def test_what_is_on_disk_is_known(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     assert is_on_disk(double)  # as NUMBA_DISABLE_JIT leaves it: nothing to compile
 
 
-def test_trouble_with_the_disk_is_told_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_trouble_with_the_disk_is_told_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def full(*_: object) -> None:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a name of the moment"))
+        raise OSError(
+            errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a name of the moment")
+        )
 
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
     monkeypatch.setattr(compiling, "_told", False)
     monkeypatch.setattr(compiling.IndexDataCacheFile, "save", full)
-    with pytest.warns(CacheWarning, match=r"compiled code is not kept \(No space left on device\).* NUMBA_CACHE_DIR") as told:
+    with pytest.warns(
+        CacheWarning,
+        match=r"compiled code is not kept \(No space left on device\).* NUMBA_CACHE_DIR",
+    ) as told:
         assert [compiled()(double)(2.0), compiled()(half)(2.0)] == [4.0, 1.0]
     assert len(told) == 1
 
 
 @pytest.mark.parametrize("part", ["CompileResultCacheImpl", "IndexDataCacheFile", "stamp_of"])
-def test_another_numba_may_keep_code_otherwise(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str) -> None:
+def test_another_numba_may_keep_code_otherwise(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, part: str
+) -> None:
     def changed(*_: object, **__: object) -> None:
         raise TypeError("an argument is missing")
 

@@ -92,6 +92,8 @@ def same() -> Callable[[Motion, Motion], None]:
         assert ours.joints == theirs.joints
         # Rounding of arrays of other lengths, of which the processor takes several numbers at once.
         for name in ("offsets", "root_positions", "rotations", "positions"):
-            np.testing.assert_allclose(getattr(ours, name), getattr(theirs, name), atol=1e-14, err_msg=name)
+            np.testing.assert_allclose(
+                getattr(ours, name), getattr(theirs, name), atol=1e-14, err_msg=name
+            )
 
     return same

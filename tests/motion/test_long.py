@@ -19,7 +19,10 @@ from rtradar.motion.skeleton_names import NODES
 
 @pytest.mark.parametrize("frames", [1, 3, 4, 5, 8, 11])
 def test_amc_in_pieces(
-    asf_files: tuple[Path, Path], in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None], frames: int
+    asf_files: tuple[Path, Path],
+    in_pieces: Callable[[], None],
+    same: Callable[[Motion, Motion], None],
+    frames: int,
 ) -> None:
     path, skeleton = asf_files
     head = path.read_bytes().decode("latin-1").split("\n1", maxsplit=1)[0]
@@ -38,7 +41,9 @@ def test_amc_in_pieces(
 
 
 @pytest.mark.parametrize("activity", ACTIVITIES)
-def test_actors_in_pieces(activity: str, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]) -> None:
+def test_actors_in_pieces(
+    activity: str, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]
+) -> None:
     whole = synthetic_motion(activity, seed=3, duration_s=6.0)
     placed = place(whole, start_s=0.5, heading_deg=20.0)
     times = np.linspace(0.0, placed.duration_s, 40)
@@ -56,7 +61,9 @@ def test_actors_in_pieces(activity: str, in_pieces: Callable[[], None], same: Ca
 
 def test_signs_go_on_over_blocks(in_pieces: Callable[[], None]) -> None:
     rng = np.random.default_rng(1)
-    smooth = np.stack([np.cos(np.arange(20) / 9), np.sin(np.arange(20) / 9)] + [np.zeros(20)] * 2, axis=1)
+    smooth = np.stack(
+        [np.cos(np.arange(20) / 9), np.sin(np.arange(20) / 9)] + [np.zeros(20)] * 2, axis=1
+    )
     signs = rng.choice([-1.0, 1.0], (20, 2, 1))
     given = {
         "name": "signs",
@@ -77,11 +84,15 @@ def test_a_line_without_end_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(InputError, match=r"long.bvh: a line of more than 1000000 characters"):
         load_motion(path)
     monkeypatch.setattr(textfile, "_MOST_BYTES", 1_000_000)
-    with pytest.raises(InputError, match=r"long.bvh: 2 MB; a BVH motion file may have 1 MB: cut it"):
+    with pytest.raises(
+        InputError, match=r"long.bvh: 2 MB; a BVH motion file may have 1 MB: cut it"
+    ):
         load_motion(path)
 
 
-def test_other_units_of_angles_after_the_first_frame_are_refused(asf_files: tuple[Path, Path]) -> None:
+def test_other_units_of_angles_after_the_first_frame_are_refused(
+    asf_files: tuple[Path, Path],
+) -> None:
     path, skeleton = asf_files
     whole = load_motion(path, skeleton)
     text = path.read_text("latin-1")
@@ -104,7 +115,11 @@ motion = place(synthetic_motion("kick", duration_s=600.0))
 motion.at([0.0, 300.0, 600.0])
 print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 """
-    grown_mib = float(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout)
+    grown_mib = float(
+        subprocess.run(
+            [sys.executable, "-c", code], check=True, capture_output=True, text=True
+        ).stdout
+    )
     assert grown_mib < 25
 
 
@@ -112,14 +127,19 @@ print((resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) / 1024)
 def test_a_file_is_closed_when_an_error_is_told(asf_files: tuple[Path, Path], name: str) -> None:
     path, skeleton = asf_files
     bad = path.with_name(name)
-    bad.write_text((bad.read_text("latin-1") if bad.exists() else "HIERARCHY\nROOT a\n{\n") + "\noops x\n" * 9, "latin-1")
+    bad.write_text(
+        (bad.read_text("latin-1") if bad.exists() else "HIERARCHY\nROOT a\n{\n") + "\noops x\n" * 9,
+        "latin-1",
+    )
     if name == "two.asf":
         bad.write_text(bad.read_text("latin-1").replace("length 0.45", "length oops"), "latin-1")
     try:
         load_motion(path if "two" in name else bad, skeleton if "two" in name else None)
     except InputError:
         if sys.platform == "linux":  # the traceback is still there, and all that its frames hold
-            assert str(bad) not in [os.path.realpath(f"/proc/self/fd/{one}") for one in os.listdir("/proc/self/fd")]
+            assert str(bad) not in [
+                os.path.realpath(f"/proc/self/fd/{one}") for one in os.listdir("/proc/self/fd")
+            ]
     else:
         pytest.fail("no error")
 
@@ -127,5 +147,9 @@ def test_a_file_is_closed_when_an_error_is_told(asf_files: tuple[Path, Path], na
 @pytest.mark.parametrize("activity", ["kick", "punch", "jumping_jack"])
 def test_a_short_take_is_the_beginning_of_a_long_one(activity: str) -> None:
     short, long = (synthetic_motion(activity, seed=5, duration_s=seconds) for seconds in (0.6, 3.0))
-    arms = [NODES.index(f"{side}_{node}") for side in "lr" for node in ("elbow", "wrist")]  # legs reach as far as all need it
-    np.testing.assert_allclose(short.rotations[:, arms], long.rotations[: len(short.rotations), arms], atol=1e-12)
+    arms = [
+        NODES.index(f"{side}_{node}") for side in "lr" for node in ("elbow", "wrist")
+    ]  # legs reach as far as all need it
+    np.testing.assert_allclose(
+        short.rotations[:, arms], long.rotations[: len(short.rotations), arms], atol=1e-12
+    )

@@ -21,7 +21,9 @@ def random_motion(seed: int, frames: int = 12, joints: int = 5, wild: float = 0.
     rotations, now = [], start
     for step in steps:
         now = Rotation.from_rotvec(step) * now
-        rotations.append(now.as_quat() * rng.choice([-1.0, 1.0], (joints, 1)))  # either sign is the same rotation
+        rotations.append(
+            now.as_quat() * rng.choice([-1.0, 1.0], (joints, 1))
+        )  # either sign is the same rotation
     return Motion(
         name="random",
         joints=tuple(f"j{k}" for k in range(joints)),
@@ -44,8 +46,12 @@ def test_bones_are_rigid_at_any_time(seed: int, share: float, wild: float) -> No
     parents = np.array(motion.parents[1:])
     bones = positions[0, 1:] - positions[0, parents]
     # Rounding alone: positions are of the order of metres.
-    np.testing.assert_allclose(bones, Rotation.from_quat(quaternions[0, 1:]).apply(motion.offsets[1:]), atol=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(bones, axis=1), np.linalg.norm(motion.offsets[1:], axis=1), rtol=1e-11)
+    np.testing.assert_allclose(
+        bones, Rotation.from_quat(quaternions[0, 1:]).apply(motion.offsets[1:]), atol=1e-12
+    )
+    np.testing.assert_allclose(
+        np.linalg.norm(bones, axis=1), np.linalg.norm(motion.offsets[1:], axis=1), rtol=1e-11
+    )
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=-1), 1, rtol=1e-12)
 
 
@@ -56,7 +62,9 @@ def test_frame_times_return_frames(seed: int, frames: int) -> None:
     positions, quaternions = motion.at(motion.frame_times)
     np.testing.assert_allclose(positions, motion.positions, atol=1e-11)
     # The sign of a quaternion means nothing.
-    np.testing.assert_allclose(np.abs(np.sum(quaternions * motion.rotations, axis=-1)), 1, atol=1e-12)
+    np.testing.assert_allclose(
+        np.abs(np.sum(quaternions * motion.rotations, axis=-1)), 1, atol=1e-12
+    )
 
 
 @settings(max_examples=30, deadline=None)
@@ -68,9 +76,13 @@ def test_turning_and_resampling_commute(seed: int, yaw: float, share: float) -> 
     # Turning first turns what the spline goes through: the same curve. PCHIP on the root does it axis by axis and is not
     # linear, so the root is left at the origin.
     still = dataclasses.replace(motion, root_positions=np.zeros_like(motion.root_positions))
-    np.testing.assert_allclose(still.turned(yaw).at(time)[0][0], turn.apply(still.at(time)[0][0]), atol=1e-11)
     np.testing.assert_allclose(
-        motion.turned(yaw).positions.reshape(-1, 3), turn.apply(motion.positions.reshape(-1, 3)), atol=1e-11
+        still.turned(yaw).at(time)[0][0], turn.apply(still.at(time)[0][0]), atol=1e-11
+    )
+    np.testing.assert_allclose(
+        motion.turned(yaw).positions.reshape(-1, 3),
+        turn.apply(motion.positions.reshape(-1, 3)),
+        atol=1e-11,
     )
 
 
@@ -88,7 +100,9 @@ def test_constant_turn_is_met_between_frames() -> None:
     times = np.linspace(0.05, 0.15, 501)
     tip = motion.at(times)[0][:, 1]
     # h^4 / 384 of the fourth derivative of the half-angle sine: (6 / 120)^4 / 384 = 1.6e-8 rad, doubled.
-    np.testing.assert_allclose(tip, np.stack([np.cos(12 * times), np.sin(12 * times), 0 * times], axis=1), atol=1e-7)
+    np.testing.assert_allclose(
+        tip, np.stack([np.cos(12 * times), np.sin(12 * times), 0 * times], axis=1), atol=1e-7
+    )
 
 
 def test_velocity_does_not_step_at_frames() -> None:
@@ -173,7 +187,9 @@ def test_a_long_recording_is_one_spline() -> None:
     positions, quaternions = motion.at(at)
     whole = CubicSpline(times, sign_continuous(rotations))(at)
     whole /= np.linalg.norm(whole, axis=-1, keepdims=True)
-    np.testing.assert_allclose(quaternions, whole, atol=1e-13)  # rounding of two ways to solve for one spline
+    np.testing.assert_allclose(
+        quaternions, whole, atol=1e-13
+    )  # rounding of two ways to solve for one spline
     np.testing.assert_allclose(positions[:, 0], PchipInterpolator(times, roots)(at), atol=1e-13)
     # What is asked for together does not matter, nor in which order.
     np.testing.assert_array_equal(motion.at(at[::-7])[1], quaternions[::-7])

@@ -35,7 +35,9 @@ def test_placement_undoes_any_yaw_and_shift(yaw: float, x: float, y: float) -> N
     for activity in ("walk", "kick"):
         motion = synthetic_motion(activity)
         expected = place(motion).positions
-        np.testing.assert_allclose(place(motion.turned(yaw).shifted([x, y, 0])).positions, expected, atol=1e-9)
+        np.testing.assert_allclose(
+            place(motion.turned(yaw).shifted([x, y, 0])).positions, expected, atol=1e-9
+        )
 
 
 def test_a_part_of_a_recording_is_placed_like_the_whole(walk: Motion) -> None:
@@ -63,7 +65,9 @@ def test_walk_there_and_back_goes_toward_the_radar_first() -> None:
 def test_others_face_the_radar(kick: Motion) -> None:
     placed = place(kick.turned(-2.0))
     heading = median_heading(hip_headings(placed))
-    assert math.atan2(heading[1], heading[0]) == pytest.approx(math.pi, abs=0.02) or heading[0] < -0.99
+    assert (
+        math.atan2(heading[1], heading[0]) == pytest.approx(math.pi, abs=0.02) or heading[0] < -0.99
+    )
     assert walk_direction(placed.root_positions, hip_headings(placed)) is None
     # The kicking left foot is on the left, -y for someone who faces -x, and comes forward, to -x.
     feet = placed.positions[:, [NODES.index("l_toe"), NODES.index("r_toe")]]
@@ -80,7 +84,9 @@ def test_heading_is_added_anticlockwise(kick: Motion) -> None:
 def test_interval_and_margin(walk: Motion) -> None:
     cut = place(walk, 1.003, 0.5)
     assert cut.duration_s == 0.5
-    assert cut.first_frame_s == pytest.approx(math.floor(1.003 * 120) / 120 - MARGIN_FRAMES / 120 - 1.003)
+    assert cut.first_frame_s == pytest.approx(
+        math.floor(1.003 * 120) / 120 - MARGIN_FRAMES / 120 - 1.003
+    )
     # The same poses as in the whole, up to the place: the ends see the frames beyond.
     times = np.array([0.0, 0.1, 0.5])
     whole, part = walk.at(times + 1.003)[0], cut.at(times)[0]
@@ -102,7 +108,10 @@ def test_straight_cut_of_a_walk_faces_the_same_way(walk: Motion) -> None:
         ({"start_s": 3.5}, "start 3.5 s is not inside the recording: synthetic:walk has 3 s"),
         ({"start_s": -0.1}, "start -0.1 s is not inside"),
         ({"start_s": math.nan}, "start nan s is not inside"),
-        ({"start_s": 1.0, "duration_s": 2.5}, "end past the recording: synthetic:walk has 3 s, at most 2 s"),
+        (
+            {"start_s": 1.0, "duration_s": 2.5},
+            "end past the recording: synthetic:walk has 3 s, at most 2 s",
+        ),
         ({"duration_s": 0.0}, "must be positive"),
         ({"duration_s": math.inf}, "must be positive"),
         ({"heading_deg": math.nan}, "must be finite"),

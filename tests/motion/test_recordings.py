@@ -53,18 +53,36 @@ def test_sizes_and_floor(mocap: Path, key: str) -> None:
     assert 1.3 < np.median(head) < 1.9
 
 
-@pytest.mark.parametrize(("key", "mm"), [("hdm05 kick", 25), ("cmu walk", 25), ("cmu jack", 25), ("bvh kick", 25)])
+@pytest.mark.parametrize(
+    ("key", "mm"), [("hdm05 kick", 25), ("cmu walk", 25), ("cmu jack", 25), ("bvh kick", 25)]
+)
 def test_nodes_stand_where_the_joints_are(mocap: Path, key: str, mm: float) -> None:
     motion = load(mocap, key)
     nodes = to_nodes(motion)
     bvh = key.startswith("bvh")
     pairs = (
-        {"l_knee": "LowerLeg_L", "r_ankle": "Foot_R", "thorax": "Neck", "l_elbow": "LowerArm_L", "r_wrist": "Hand_R"}
+        {
+            "l_knee": "LowerLeg_L",
+            "r_ankle": "Foot_R",
+            "thorax": "Neck",
+            "l_elbow": "LowerArm_L",
+            "r_wrist": "Hand_R",
+        }
         if bvh
-        else {"l_knee": "lfemur", "l_toe": "ltoes", "thorax": "thorax", "head": "head", "r_wrist": "rwrist", "l_hand": "lfingers"}
+        else {
+            "l_knee": "lfemur",
+            "l_toe": "ltoes",
+            "thorax": "thorax",
+            "head": "head",
+            "r_wrist": "rwrist",
+            "l_hand": "lfingers",
+        }
     )
     for node, joint in pairs.items():
-        gap = np.linalg.norm(nodes.positions[:, NODES.index(node)] - motion.positions[:, motion.joints.index(joint)], axis=1)
+        gap = np.linalg.norm(
+            nodes.positions[:, NODES.index(node)] - motion.positions[:, motion.joints.index(joint)],
+            axis=1,
+        )
         assert gap.max() * 1e3 < mm, (node, gap.max())
 
 
@@ -73,7 +91,10 @@ def test_kick_is_a_left_kick_toward_the_radar(mocap: Path) -> None:
     toe = nodes.positions[:, NODES.index("l_toe")]
     assert 1.3 < toe[:, 2].max() < 1.5
     assert toe[np.argmax(toe[:, 2]), 0] < -0.5
-    assert nodes.positions[:, NODES.index("l_hip"), 1].mean() < nodes.positions[:, NODES.index("r_hip"), 1].mean()
+    assert (
+        nodes.positions[:, NODES.index("l_hip"), 1].mean()
+        < nodes.positions[:, NODES.index("r_hip"), 1].mean()
+    )
     speed = np.linalg.norm(np.gradient(toe, 1 / 120, axis=0), axis=1).max()
     assert 7 < speed < 10
 
@@ -95,7 +116,9 @@ def test_spikes_of_135_02_stay_rigid(mocap: Path) -> None:
     times = np.arange(0, 43.0, 1 / 997)
     positions, _ = nodes.at(times)
     lengths = np.linalg.norm(positions[:, 1:] - positions[:, list(nodes.parents[1:])], axis=2)
-    np.testing.assert_allclose(lengths, np.linalg.norm(nodes.offsets[1:], axis=1)[None].repeat(len(times), 0), rtol=1e-10)
+    np.testing.assert_allclose(
+        lengths, np.linalg.norm(nodes.offsets[1:], axis=1)[None].repeat(len(times), 0), rtol=1e-10
+    )
     # Hand spikes included, nothing leaves the room between the frames: the splines do not run away.
     frames = nodes.positions
     assert (positions.max(axis=(0, 1)) < frames.max(axis=(0, 1)) + 0.05).all()

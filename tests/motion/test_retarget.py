@@ -23,14 +23,20 @@ def test_31_to_24_to_22() -> None:
     assert len(NODE_PARENT) == 21
 
 
-def bvh_like(spine: tuple[str, ...], *, toe_end: bool = True, hand_end: bool = True, seed: int = 0) -> Motion:
+def bvh_like(
+    spine: tuple[str, ...], *, toe_end: bool = True, hand_end: bool = True, seed: int = 0
+) -> Motion:
     """A person with Mixamo names in random poses; the spine has these joints between hips and neck."""
     tree: list[tuple[str, str, tuple[float, float, float]]] = [("Hips", "", (0, 0, 0))]
     below = "Hips"
     for name in spine:
         tree.append((name, below, (0, 0, 0.4 / (len(spine) + 1))))
         below = name
-    tree += [("Neck", below, (0, 0, 0.4 / (len(spine) + 1))), ("Head", "Neck", (0, 0, 0.1)), ("HeadTop_End", "Head", (0, 0, 0.2))]
+    tree += [
+        ("Neck", below, (0, 0, 0.4 / (len(spine) + 1))),
+        ("Head", "Neck", (0, 0, 0.1)),
+        ("HeadTop_End", "Head", (0, 0, 0.2)),
+    ]
     for side, sign in (("Left", 1), ("Right", -1)):
         tree += [
             (f"{side}UpLeg", "Hips", (0, sign * 0.1, -0.05)),
@@ -50,7 +56,11 @@ def bvh_like(spine: tuple[str, ...], *, toe_end: bool = True, hand_end: bool = T
     frames = 6
     world: dict[str, Rotation] = {}
     rotations = []
-    for name, parent, _ in tree:  # the rotation of the bone that ends in a joint is the global one of its parent
+    for (
+        name,
+        parent,
+        _,
+    ) in tree:  # the rotation of the bone that ends in a joint is the global one of its parent
         local = Rotation.from_rotvec(rng.normal(0, 0.2, (frames, 3)))
         rotations.append((world[parent] if parent else local).as_quat())
         world[name] = world[parent] * local if parent else local
@@ -65,7 +75,9 @@ def bvh_like(spine: tuple[str, ...], *, toe_end: bool = True, hand_end: bool = T
     )
 
 
-@pytest.mark.parametrize("spine", [(), ("Spine",), ("Spine", "Spine1"), ("Spine", "Spine1", "Spine2"), tuple("abcde")])
+@pytest.mark.parametrize(
+    "spine", [(), ("Spine",), ("Spine", "Spine1"), ("Spine", "Spine1", "Spine2"), tuple("abcde")]
+)
 def test_any_spine_becomes_three_parts(spine: tuple[str, ...]) -> None:
     motion = bvh_like(spine)
     nodes = to_nodes(motion)
@@ -75,14 +87,22 @@ def test_any_spine_becomes_three_parts(spine: tuple[str, ...]) -> None:
     three = sum(lengths[NODES.index(node) - 1] for node in ("lowerback", "upperback", "thorax"))
     # Of a chain with more joints than nodes a part is the chord: shorter than the chain, by its bends of 0.2 rad.
     assert three == pytest.approx(0.4, rel=0.03 if len(spine) > 2 else 1e-12)
-    ends = nodes.positions[:, NODES.index("thorax")] - motion.positions[:, motion.joints.index("mixamorig:Neck")]
+    ends = (
+        nodes.positions[:, NODES.index("thorax")]
+        - motion.positions[:, motion.joints.index("mixamorig:Neck")]
+    )
     assert np.abs(ends).max() < (0.02 if len(spine) > 2 else 1e-12)
 
 
 def test_parts_that_are_bones_keep_their_places_exactly() -> None:
     motion = bvh_like(("Spine", "Spine1"))
     nodes = to_nodes(motion)
-    for node, joint in (("l_ankle", "LeftFoot"), ("r_knee", "RightLeg"), ("neck", "Head"), ("head", "HeadTop_End")):
+    for node, joint in (
+        ("l_ankle", "LeftFoot"),
+        ("r_knee", "RightLeg"),
+        ("neck", "Head"),
+        ("head", "HeadTop_End"),
+    ):
         theirs = motion.positions[:, motion.joints.index(f"mixamorig:{joint}")]
         np.testing.assert_allclose(nodes.positions[:, NODES.index(node)], theirs, atol=1e-12)
 
@@ -90,7 +110,10 @@ def test_parts_that_are_bones_keep_their_places_exactly() -> None:
 def test_chained_part_points_along_its_chain() -> None:
     motion = bvh_like(("Spine", "Spine1"))
     nodes = to_nodes(motion)
-    ankle, toe = (motion.positions[:, motion.joints.index(f"mixamorig:Left{name}")] for name in ("Foot", "ToeBase_end"))
+    ankle, toe = (
+        motion.positions[:, motion.joints.index(f"mixamorig:Left{name}")]
+        for name in ("Foot", "ToeBase_end")
+    )
     chord = toe - ankle
     lengths = np.linalg.norm(chord, axis=1)
     part = nodes.positions[:, NODES.index("l_toe")] - nodes.positions[:, NODES.index("l_ankle")]
@@ -108,8 +131,13 @@ def test_open_ends_are_extended_straight_on() -> None:
 
 def test_missing_joint_is_named() -> None:
     motion = bvh_like(("Spine",))
-    renamed = dataclasses.replace(motion, joints=tuple(name.replace("LeftFoot", "LeftThing") for name in motion.joints))
-    with pytest.raises(InputError, match=r"someone: joint 'leftfoot' \(node 'l_ankle'\) is missing from this .*Mixamo"):
+    renamed = dataclasses.replace(
+        motion, joints=tuple(name.replace("LeftFoot", "LeftThing") for name in motion.joints)
+    )
+    with pytest.raises(
+        InputError,
+        match=r"someone: joint 'leftfoot' \(node 'l_ankle'\) is missing from this .*Mixamo",
+    ):
         to_nodes(renamed)
 
 
@@ -123,7 +151,10 @@ def test_a_skeleton_of_no_known_kind_is_told_the_kinds() -> None:
         rotations=np.tile([0.0, 0, 0, 1], (2, 2, 1)),
         rate_hz=100.0,
     )
-    with pytest.raises(InputError, match=r"robot: its joints \(base, arm, ...\) are named as in no kind .*ASF \(HDM05, CMU\); "):
+    with pytest.raises(
+        InputError,
+        match=r"robot: its joints \(base, arm, ...\) are named as in no kind .*ASF \(HDM05, CMU\); ",
+    ):
         to_nodes(motion)
 
 
@@ -131,7 +162,9 @@ def test_part_without_length_is_refused() -> None:
     motion = bvh_like(("Spine",))
     offsets = motion.offsets.copy()
     offsets[motion.joints.index("mixamorig:LeftLeg")] = 0
-    with pytest.raises(InputError, match=r"'l_knee' is 0 mm long \(mixamorig:LeftUpLeg to mixamorig:LeftLeg\)"):
+    with pytest.raises(
+        InputError, match=r"'l_knee' is 0 mm long \(mixamorig:LeftUpLeg to mixamorig:LeftLeg\)"
+    ):
         to_nodes(dataclasses.replace(motion, offsets=offsets))
 
 
@@ -141,19 +174,28 @@ def test_nodes_stay_as_they_are() -> None:
 
 
 def test_names() -> None:
-    assert plain("mixamorig:LeftUpLeg") == plain("Left_UpLeg") == plain("mixamorig1LeftUpLeg") == "leftupleg"
+    assert (
+        plain("mixamorig:LeftUpLeg")
+        == plain("Left_UpLeg")
+        == plain("mixamorig1LeftUpLeg")
+        == "leftupleg"
+    )
     assert plain("Hand_L_end") == "handlend"
 
 
 def test_multiply_is_composition() -> None:
     a, b = Rotation.random(5, random_state=1), Rotation.random(5, random_state=2)
     np.testing.assert_allclose(
-        Rotation.from_quat(multiply(a.as_quat(), b.as_quat())).as_matrix(), (a * b).as_matrix(), atol=1e-12
+        Rotation.from_quat(multiply(a.as_quat(), b.as_quat())).as_matrix(),
+        (a * b).as_matrix(),
+        atol=1e-12,
     )
 
 
 @pytest.mark.parametrize("spine", [("Spine",), tuple("abcde")])
-def test_nodes_in_pieces(spine: tuple[str, ...], in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]) -> None:
+def test_nodes_in_pieces(
+    spine: tuple[str, ...], in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None]
+) -> None:
     motion = bvh_like(spine)  # feet, hands and, of five joints, a spine that point along chains
     whole = to_nodes(motion)
     in_pieces()

@@ -21,7 +21,11 @@ def test_levels_by_hand() -> None:
     assert found.rms_db == pytest.approx(2.0)
     # Deviations from the means 15 and 16: sums of products 610, of squares 500 and 760.
     deviations = np.array([-15, -5, 5, 15]), np.array([-16, -6, 4, 18])
-    expected = deviations[0] @ deviations[1] / math.sqrt((deviations[0] @ deviations[0]) * (deviations[1] @ deviations[1]))
+    expected = (
+        deviations[0]
+        @ deviations[1]
+        / math.sqrt((deviations[0] @ deviations[0]) * (deviations[1] @ deviations[1]))
+    )
     assert found.correlation == pytest.approx(expected)
 
 
@@ -59,7 +63,9 @@ def test_chamfer_by_hand() -> None:
     first, second = np.array([[0.0, 0], [2, 0]]), np.array([[0.0, 3]])
     # There: 3 and sqrt(13); back: 3.
     expected = ((3 + math.sqrt(13)) / 2 + 3) / 2
-    assert chamfer(first, second, (1, 1)) == chamfer(second, first, (1, 1)) == pytest.approx(expected)
+    assert (
+        chamfer(first, second, (1, 1)) == chamfer(second, first, (1, 1)) == pytest.approx(expected)
+    )
     assert chamfer(first, first, (1, 1)) == 0
     assert chamfer(first * [2, 5], second * [2, 5], (2, 5)) == pytest.approx(expected)
 

@@ -19,14 +19,26 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline import clouds_of
 
 RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=128,
+    frame_duration_s=0.05,
 )
 MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 
 
 def run(out: Path, **options: Any) -> tuple[rt.Result, np.ndarray[Any, Any]]:
     """A run of 0.3 s and its IF samples."""
-    result = rt.run(MOTION, RADAR, out=out, **({"fidelity": "analytic", "duration_s": 0.3, "save_if": True} | options))
+    result = rt.run(
+        MOTION,
+        RADAR,
+        out=out,
+        **({"fidelity": "analytic", "duration_s": 0.3, "save_if": True} | options),
+    )
     return result, np.asarray(zarr.open_array(out / "if.zarr", mode="r")[:])
 
 
@@ -39,7 +51,9 @@ def test_noise_has_the_power_that_is_asked_for(tmp_path: Path) -> None:
     noise = samples - echo
     # |n|^2 of a complex Gaussian has the standard deviation of its mean: five of them, and float32's rounding.
     found = float(np.mean(np.abs(noise) ** 2))
-    assert found == pytest.approx(noisy.summary["noise_power_m2"], rel=5 / math.sqrt(noise.size) + 1e-5)
+    assert found == pytest.approx(
+        noisy.summary["noise_power_m2"], rel=5 / math.sqrt(noise.size) + 1e-5
+    )
     # The IF's power is the sum of the echoes' but for interference between 21 parts, twice here.
     assert 1 / 4 < np.mean(np.abs(echo) ** 2) / quiet.summary["echo_power_m2"] < 4
 
@@ -52,7 +66,10 @@ def test_only_the_noise_depends_on_the_seed(tmp_path: Path) -> None:
     assert not np.isclose(first, other).any(axis=None)
 
 
-@pytest.mark.parametrize("options", [{}, {"fidelity": "specular", "heading_deg": 20.0, "clutter_removal": "mean", "seed": 3}])
+@pytest.mark.parametrize(
+    "options",
+    [{}, {"fidelity": "specular", "heading_deg": 20.0, "clutter_removal": "mean", "seed": 3}],
+)
 def test_clouds_alone_are_those_of_a_run(tmp_path: Path, options: dict[str, Any]) -> None:
     taken = {"fidelity": "analytic", "start_s": 0.1, "duration_s": 0.2, **options}
     result = rt.run(MOTION, RADAR, out=tmp_path, variant="cpu", **taken)
@@ -75,7 +92,14 @@ def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:
     )
     maps = []
     for duration in (0.2, 0.3):
-        rt.run(still, RADAR, out=tmp_path / "out", fidelity="specular", duration_s=duration, snr_db=math.inf)
+        rt.run(
+            still,
+            RADAR,
+            out=tmp_path / "out",
+            fidelity="specular",
+            duration_s=duration,
+            snr_db=math.inf,
+        )
         with h5py.File(tmp_path / "out" / "maps.h5") as file:
             maps.append(file["range_doppler"][:])
     assert len(maps[1]) > len(maps[0]) > 3
@@ -86,13 +110,17 @@ def test_without_spreading_the_echo_is_the_cross_section(tmp_path: Path) -> None
     with_loss, _ = run(tmp_path / "a")
     without, _ = run(tmp_path / "b", spreading=False)
     ratio = without.summary["echo_power_m2"] / with_loss.summary["echo_power_m2"]
-    assert 4.0**4 < ratio < 4.3**4  # the radar is 4.1 m from the upright person, whose near side counts most
+    assert (
+        4.0**4 < ratio < 4.3**4
+    )  # the radar is 4.1 m from the upright person, whose near side counts most
 
 
 def test_a_person_who_turns_is_another_echo(tmp_path: Path) -> None:
     facing, _ = run(tmp_path / "a")
     aside, _ = run(tmp_path / "b", heading_deg=90.0)
-    assert facing.summary["part_power_m2"]["left foot"] != pytest.approx(aside.summary["part_power_m2"]["left foot"], rel=0.1)
+    assert facing.summary["part_power_m2"]["left foot"] != pytest.approx(
+        aside.summary["part_power_m2"]["left foot"], rel=0.1
+    )
 
 
 def test_noise_alone_leaves_an_empty_cloud_and_says_so(tmp_path: Path) -> None:
@@ -111,10 +139,21 @@ def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
 
 
 def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
-    result, _ = run(tmp_path / "out", seed=np.int64(3), snr_db=np.int32(15), duration_s=np.float32(0.25), keep_all=np.True_)
+    result, _ = run(
+        tmp_path / "out",
+        seed=np.int64(3),
+        snr_db=np.int32(15),
+        duration_s=np.float32(0.25),
+        keep_all=np.True_,
+    )
     assert result.summary["seed"] == 3
-    assert {name: result.summary["parameters"][name] for name in ("snr_db", "keep_all")} == {"snr_db": 15, "keep_all": True}
-    assert "np." not in (tmp_path / "out" / "report.html").read_text().partition('id="report-data"')[0]
+    assert {name: result.summary["parameters"][name] for name in ("snr_db", "keep_all")} == {
+        "snr_db": 15,
+        "keep_all": True,
+    }
+    assert (
+        "np." not in (tmp_path / "out" / "report.html").read_text().partition('id="report-data"')[0]
+    )
 
 
 @pytest.mark.parametrize(
@@ -132,31 +171,58 @@ def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
         ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, cpu, llvm, scalar, cuda"),
     ],
 )
-def test_bad_values_are_refused_and_leave_nothing(tmp_path: Path, options: dict[str, Any], says: str) -> None:
+def test_bad_values_are_refused_and_leave_nothing(
+    tmp_path: Path, options: dict[str, Any], says: str
+) -> None:
     with pytest.raises(InputError, match=says):
         run(tmp_path / "out", **options)
     assert not (tmp_path / "out").exists()
 
 
 def test_physical_noise_that_float32_cannot_hold_beside_the_echo_is_refused(tmp_path: Path) -> None:
-    faint = dataclasses.replace(RADAR, transmit_power_dbm=-200.0, noise_figure_db=100.0, tx_antenna=Antenna(gain_dbi=-100))
-    with pytest.raises(InputError, match="more than 200 dB above the echo; look at transmit_power_dbm"):
-        rt.run(MOTION, faint, out=tmp_path / "out", fidelity="analytic", duration_s=0.1, snr_db="physical")
+    faint = dataclasses.replace(
+        RADAR, transmit_power_dbm=-200.0, noise_figure_db=100.0, tx_antenna=Antenna(gain_dbi=-100)
+    )
+    with pytest.raises(
+        InputError, match="more than 200 dB above the echo; look at transmit_power_dbm"
+    ):
+        rt.run(
+            MOTION,
+            faint,
+            out=tmp_path / "out",
+            fidelity="analytic",
+            duration_s=0.1,
+            snr_db="physical",
+        )
     assert not (tmp_path / "out").exists()
 
 
 def test_windows_far_apart_are_streamed_in_blocks_of_no_more_than_one(tmp_path: Path) -> None:
     rare = dataclasses.replace(RADAR, frame_hop_s=1e6)
-    result = rt.run(MOTION, rare, out=tmp_path / "out", fidelity="analytic", duration_s=0.13, save_if=True)
+    result = rt.run(
+        MOTION, rare, out=tmp_path / "out", fidelity="analytic", duration_s=0.13, save_if=True
+    )
     assert result.summary["windows"] == 1
     array = zarr.open_array(tmp_path / "out" / "if.zarr", mode="r")
     assert array.chunks == (200, 4, 128)
     assert (np.abs(array[:]) > 0).all()
 
 
-@pytest.mark.parametrize(("lines", "there"), [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})])
-def test_a_radar_without_a_line_has_no_angles_along_it(lines: dict[str, int], there: set[str], tmp_path: Path) -> None:
-    radar = rt.Radar(tx_z=0, rx_z=0, chirp_duration_s=500e-6, samples_per_chirp=128, frame_duration_s=0.05, **lines)
+@pytest.mark.parametrize(
+    ("lines", "there"),
+    [({"tx_y": 1, "rx_y": 1}, set()), ({"tx_y": 2, "rx_y": 4}, {"range_azimuth"})],
+)
+def test_a_radar_without_a_line_has_no_angles_along_it(
+    lines: dict[str, int], there: set[str], tmp_path: Path
+) -> None:
+    radar = rt.Radar(
+        tx_z=0,
+        rx_z=0,
+        chirp_duration_s=500e-6,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+        **lines,
+    )
     rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
     with h5py.File(tmp_path / "maps.h5") as maps:
         assert {"range_azimuth", "range_elevation"} & set(maps) == there
@@ -166,7 +232,15 @@ def test_a_radar_without_a_line_has_no_angles_along_it(lines: dict[str, int], th
 
 
 def test_a_capture_shorter_than_the_spectrograms_window_has_none(tmp_path: Path) -> None:
-    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=1e-3, samples_per_chirp=128, frame_duration_s=0.05)
+    radar = rt.Radar(
+        tx_y=2,
+        tx_z=0,
+        rx_y=4,
+        rx_z=0,
+        chirp_duration_s=1e-3,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+    )
     rt.run(MOTION, radar, out=tmp_path, fidelity="analytic", duration_s=0.2)  # 100 cycles of 128
     with h5py.File(tmp_path / "maps.h5") as maps:
         assert maps["spectrogram"].shape == (0, 128)

@@ -11,7 +11,15 @@ from rtradar.pipeline import cloud_maker
 from rtradar.pipeline.cloud_maker import window_angles
 from rtradar.radar import Radar
 
-RADAR = Radar(tx_y=2, tx_z=2, rx_y=4, rx_z=4, chirp_duration_s=250e-6, samples_per_chirp=64, frame_duration_s=0.016)
+RADAR = Radar(
+    tx_y=2,
+    tx_z=2,
+    rx_y=4,
+    rx_z=4,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=64,
+    frame_duration_s=0.016,
+)
 
 
 @pytest.mark.parametrize("radar", [RADAR, dataclasses.replace(RADAR, tx_z=0, rx_z=0)])
@@ -33,4 +41,6 @@ def test_cells_a_few_at_a_time(monkeypatch: pytest.MonkeyPatch, radar: Radar, n_
             assert radar.rx_z == 0
             assert field.name == "z"
         else:
-            np.testing.assert_allclose(ours, theirs, rtol=1e-4, atol=1e-9, err_msg=field.name)  # FFTs in float32
+            np.testing.assert_allclose(
+                ours, theirs, rtol=1e-4, atol=1e-9, err_msg=field.name
+            )  # FFTs in float32

@@ -15,7 +15,14 @@ from rtradar.cli import main
 from rtradar.errors import InputError
 
 RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=128,
+    frame_duration_s=0.05,
 )
 MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
 MODELS = ("analytic-paper", "analytic", "specular")
@@ -24,14 +31,25 @@ MODELS = ("analytic-paper", "analytic", "specular")
 @pytest.fixture(scope="module")
 def compared(tmp_path_factory: pytest.TempPathFactory) -> rt.Comparison:
     return rt.compare(
-        MOTION, RADAR, out=tmp_path_factory.mktemp("compare") / "out", fidelities=MODELS, duration_s=0.3, start_s=0.4
+        MOTION,
+        RADAR,
+        out=tmp_path_factory.mktemp("compare") / "out",
+        fidelities=MODELS,
+        duration_s=0.3,
+        start_s=0.4,
     )
 
 
 def test_the_reference_differs_in_nothing_from_itself(compared: rt.Comparison) -> None:
     found = compared.summary["fidelities"]["specular"]
     assert compared.summary["reference"] == "specular"
-    differences = ("power_mean_db", "power_rms_db", "range_doppler_mean_db", "range_doppler_rms_db", "spectrogram_rms_db")
+    differences = (
+        "power_mean_db",
+        "power_rms_db",
+        "range_doppler_mean_db",
+        "range_doppler_rms_db",
+        "spectrogram_rms_db",
+    )
     assert [found[key] for key in (*differences, "rdt_chamfer_bins")] == [0] * 6
     alike = ("range_doppler_correlation", "detection_overlap", "spectrogram_correlation")
     assert [found[key] for key in alike] == pytest.approx([1] * 3, abs=1e-12)
@@ -51,12 +69,19 @@ def test_only_what_traces_hides(compared: rt.Comparison) -> None:
 
 def test_the_papers_ranges_are_farther_apart_than_the_occlusion_is(compared: rt.Comparison) -> None:
     found = compared.summary["fidelities"]
-    assert found["analytic-paper"]["range_doppler_correlation"] < found["analytic"]["range_doppler_correlation"] < 1
+    assert (
+        found["analytic-paper"]["range_doppler_correlation"]
+        < found["analytic"]["range_doppler_correlation"]
+        < 1
+    )
     assert found["analytic-paper"]["detection_overlap"] < found["analytic"]["detection_overlap"] < 1
 
 
 def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
-    power = [json.loads((compared.out / name / "summary.json").read_text())["noise_power_m2"] for name in MODELS]
+    power = [
+        json.loads((compared.out / name / "summary.json").read_text())["noise_power_m2"]
+        for name in MODELS
+    ]
     assert power == [compared.summary["noise_power_m2"]] * 3
     # Where no echo is the maps are the same but for side lobes of the echoes, some 60 dB below them.
     maps = []
@@ -69,8 +94,16 @@ def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
 
 
 def test_files_and_table(compared: rt.Comparison) -> None:
-    pictures = {f"compare_{name}.png" for name in ("power", "parts", "range_doppler", "spectrogram", "cloud")}
-    assert {file.name for file in compared.out.iterdir()} == {*MODELS, "compare.json", "compare.html", *pictures}
+    pictures = {
+        f"compare_{name}.png"
+        for name in ("power", "parts", "range_doppler", "spectrogram", "cloud")
+    }
+    assert {file.name for file in compared.out.iterdir()} == {
+        *MODELS,
+        "compare.json",
+        "compare.html",
+        *pictures,
+    }
     assert json.loads((compared.out / "compare.json").read_text()) == compared.summary
     page = (compared.out / "compare.html").read_text()
     assert page.count("data:image/png;base64,") == 5
@@ -89,14 +122,23 @@ def test_files_and_table(compared: rt.Comparison) -> None:
         (("analytic", "best"), "best"),
     ],
 )
-def test_models_that_cannot_be_compared(fidelities: tuple[str, ...], says: str, tmp_path: Path) -> None:
+def test_models_that_cannot_be_compared(
+    fidelities: tuple[str, ...], says: str, tmp_path: Path
+) -> None:
     with pytest.raises(InputError, match=says):
         rt.compare(MOTION, RADAR, out=tmp_path / "out", fidelities=fidelities)
     assert not (tmp_path / "out").exists()
 
 
 def test_the_command_prints_the_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["compare", "synthetic:punch", "--duration", "0.2", "--fidelities", "analytic-paper, analytic"]
+    words = [
+        "compare",
+        "synthetic:punch",
+        "--duration",
+        "0.2",
+        "--fidelities",
+        "analytic-paper, analytic",
+    ]
     assert main([*words, "--out", str(tmp_path / "out"), "--json", str(tmp_path / "c.json")]) == 0
     assert "Overlap of detections" in capsys.readouterr().out
     assert json.loads((tmp_path / "c.json").read_text())["reference"] == "analytic"

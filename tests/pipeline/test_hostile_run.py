@@ -16,7 +16,15 @@ from rtradar.pipeline.pictures.run_view import load_linked, view
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Moments, save_moments
 
-RADAR = Radar(tx_y=1, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=4, chirp_duration_s=1e-3, frame_duration_s=4e-3)
+RADAR = Radar(
+    tx_y=1,
+    tx_z=0,
+    rx_y=2,
+    rx_z=0,
+    samples_per_chirp=4,
+    chirp_duration_s=1e-3,
+    frame_duration_s=4e-3,
+)
 MAPS: dict[str, Any] = {
     "time": np.array([0.002, 0.004]),
     "range": RADAR.range_m,
@@ -59,7 +67,9 @@ def folder(tmp_path: Path) -> Path:
     out = tmp_path / "run"
     out.mkdir()
     parameters = {"radar": dataclasses.asdict(RADAR), "scene": "free-space", "motion": "walk"}
-    (out / "summary.json").write_text(json.dumps({"parameters": parameters, "fidelity": "analytic"}))
+    (out / "summary.json").write_text(
+        json.dumps({"parameters": parameters, "fidelity": "analytic"})
+    )
     save_moments(out / "view.npz", moments())
     with h5py.File(out / "maps.h5", "w") as file:
         for name, values in MAPS.items():
@@ -72,14 +82,18 @@ def folder(tmp_path: Path) -> Path:
 def test_the_folder_is_good(folder: Path) -> None:
     linked = load_linked(folder)
     # Each point of the cloud has the power of the cell that it is nearest to, looked for here one by one.
-    for (time, distance, velocity), power_db in zip(CLOUD["points"], linked.rdt_power_db, strict=True):
+    for (time, distance, velocity), power_db in zip(
+        CLOUD["points"], linked.rdt_power_db, strict=True
+    ):
         cell = tuple(
             int(np.abs(MAPS[axis] - value).argmin())
             for axis, value in (("time", time), ("range", distance), ("velocity", velocity))
         )
         # With R^4 for the loss over distance; the radar's first bin, at 0 m, ends at half a bin.
         place = max(MAPS["range"][cell[1]], RADAR.range_bin_m / 2)
-        assert power_db == pytest.approx(10 * np.log10(MAPS["range_doppler"][cell] / RADAR.n_channels * place**4))
+        assert power_db == pytest.approx(
+            10 * np.log10(MAPS["range_doppler"][cell] / RADAR.n_channels * place**4)
+        )
 
 
 def refused(folder: Path, says: str) -> None:
@@ -126,7 +140,10 @@ def test_maps_of_no_range_and_a_single_velocity(folder: Path) -> None:
         for name, values in (("range", RADAR.range_m), ("range_doppler", np.ones((2, 4, 4)))):
             del file[name]
             file[name] = values
-        for name, values in (("spectrogram_velocity", np.ones(1)), ("spectrogram", np.ones((2, 1)))):
+        for name, values in (
+            ("spectrogram_velocity", np.ones(1)),
+            ("spectrogram", np.ones((2, 1))),
+        ):
             del file[name]
             file[name] = values
     refused(folder, "maps.h5.* is damaged, or of another kind")
@@ -135,7 +152,13 @@ def test_maps_of_no_range_and_a_single_velocity(folder: Path) -> None:
 @pytest.mark.parametrize("file", ["cloud_rdt.npz", "cloud_xyz.npz"])
 @pytest.mark.parametrize(
     "points",
-    [np.array([["a", "b", "c"]]), np.full((1, 3), np.nan), np.full((1, 3), 1e300), np.ones((1, 3), dtype=complex), np.ones(2)],
+    [
+        np.array([["a", "b", "c"]]),
+        np.full((1, 3), np.nan),
+        np.full((1, 3), 1e300),
+        np.ones((1, 3), dtype=complex),
+        np.ones(2),
+    ],
     ids=["text", "NaN", "huge", "complex", "shape"],
 )
 def test_clouds_that_are_none(folder: Path, file: str, points: np.ndarray) -> None:
@@ -146,8 +169,13 @@ def test_clouds_that_are_none(folder: Path, file: str, points: np.ndarray) -> No
 def test_a_cloud_that_claims_more_than_it_holds(folder: Path) -> None:
     import zipfile
 
-    with zipfile.ZipFile(folder / "cloud_rdt.npz", "w") as archive, archive.open("points.npy", "w") as member:
-        np.lib.format.write_array_header_1_0(member, {"descr": "<f8", "fortran_order": False, "shape": (10**12, 3)})
+    with (
+        zipfile.ZipFile(folder / "cloud_rdt.npz", "w") as archive,
+        archive.open("points.npy", "w") as member,
+    ):
+        np.lib.format.write_array_header_1_0(
+            member, {"descr": "<f8", "fortran_order": False, "shape": (10**12, 3)}
+        )
     refused(folder, "cloud_rdt.npz.* is damaged")
 
 
@@ -169,7 +197,10 @@ def test_moments_that_no_page_can_draw(changes: dict[str, Any], says: str) -> No
 def test_numbers_that_are_no_letters(folder: Path, letter: int) -> None:
     with np.load(folder / "view.npz") as arrays:
         content = dict(arrays)
-    np.savez(folder / "view.npz", **content | {"part_names": np.array([letter], dtype=np.uint32).view("<U1")})
+    np.savez(
+        folder / "view.npz",
+        **content | {"part_names": np.array([letter], dtype=np.uint32).view("<U1")},
+    )
     refused(folder, "holds what is no character")
 
 

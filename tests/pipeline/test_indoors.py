@@ -16,7 +16,14 @@ from rtradar.pipeline.rooms.indoors import ghosts
 from rtradar.scatter.multipath.multipath import Multipath
 
 RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=256, frame_duration_s=0.05
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=256,
+    frame_duration_s=0.05,
 )
 ROOM = """
 [radar]
@@ -45,9 +52,19 @@ def room(tmp_path: Path) -> rt.Scene:
     return rt.Scene.load(tmp_path / "room.toml")
 
 
-def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tmp_path: Path, room: rt.Scene) -> None:
+def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
+    tmp_path: Path, room: rt.Scene
+) -> None:
     motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
-    rt.run(motion, RADAR, room, out=tmp_path / "out", fidelity="analytic", clutter_removal="mean", pfa=1e-4)
+    rt.run(
+        motion,
+        RADAR,
+        room,
+        out=tmp_path / "out",
+        fidelity="analytic",
+        clutter_removal="mean",
+        pfa=1e-4,
+    )
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["parameters"]["scene"] == "room"
     paths = {row["path"]: row for row in summary["room"]["paths"]}
@@ -63,13 +80,17 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(tm
     for picture in pictures:
         assert (tmp_path / "out" / picture).stat().st_size > 1000
     with h5py.File(tmp_path / "out" / "maps.h5") as maps:
-        window = int(np.abs(maps["time"][:] - maps["range_doppler_received"].attrs["time_s"]).argmin())
+        window = int(
+            np.abs(maps["time"][:] - maps["range_doppler_received"].attrs["time_s"]).argmin()
+        )
         before, after = maps["range_doppler_received"][:], maps["range_doppler"][window]
         still = before.shape[1] // 2
         wall = int(np.argmin(np.abs(RADAR.range_m - 1.5)))
         assert before[wall, still] > 1e4 * after[wall, still]
         # What moves stays: beyond the bins beside zero both maps are the same.
-        np.testing.assert_allclose(before[:, : still - 2], after[:, : still - 2], rtol=1e-2, atol=1e-6 * before.max())
+        np.testing.assert_allclose(
+            before[:, : still - 2], after[:, : still - 2], rtol=1e-2, atol=1e-6 * before.max()
+        )
     # Without a room they would be of another run than all else.
     rt.run(motion, RADAR, out=tmp_path / "out", fidelity="analytic", pfa=1e-4)
     assert {path.name for path in (tmp_path / "out").glob("*.png")}.isdisjoint(pictures)
@@ -84,7 +105,9 @@ def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
     # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few centimetres.
     place_of_radar, person = np.array([-4, 1, 1.0]), body.at([0.1]).centres[0].mean(axis=0)
     image = person * [1, -1, 1] + [0, 5, 0]
-    expected = (np.linalg.norm(person - place_of_radar) + np.linalg.norm(image - place_of_radar)) / 2
+    expected = (
+        np.linalg.norm(person - place_of_radar) + np.linalg.norm(image - place_of_radar)
+    ) / 2
     for ghost in found.values():
         assert ghost.range_m == pytest.approx(expected, abs=0.15)
     # What comes back over the wall comes from the image, what goes out over it from the person.
@@ -94,7 +117,9 @@ def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
         assert angle == pytest.approx(np.arcsin(way[1] / np.linalg.norm(way)), abs=np.radians(4))
 
 
-def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(tmp_path: Path, room: rt.Scene) -> None:
+def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(
+    tmp_path: Path, room: rt.Scene
+) -> None:
     motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
     for given, word in (
         ({"fidelity": "fresnel"}, "knows no walls"),
@@ -115,4 +140,6 @@ def test_a_received_window_is_put_together_from_pieces() -> None:
     found = [window.push(stream[first : first + 62], first) for first in range(0, 400, 62)]
     cubes = [cube for cube in found if cube is not None]
     assert len(cubes) == 1
-    np.testing.assert_array_equal(cubes[0].reshape(-1, RADAR.n_rx, 8), stream[40 : 40 + RADAR.chirps_per_frame])
+    np.testing.assert_array_equal(
+        cubes[0].reshape(-1, RADAR.n_rx, 8), stream[40 : 40 + RADAR.chirps_per_frame]
+    )

@@ -19,7 +19,14 @@ from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.scene.scene import scenes_folder
 
 RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=256, frame_duration_s=0.05
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=256,
+    frame_duration_s=0.05,
 )
 MOTION = rt.synthetic_motion("punch", seed=0, duration_s=1.0)
 BODY = Body.from_motion(place(MOTION))
@@ -30,7 +37,9 @@ def wall(x: float, thickness: float, name: str = "across") -> Wall:
     """Across the way from the radar to the person, its front toward the radar at this x [m]."""
     brick = material("brick")
     corner, u, v = (x, 3.0, 0.0), (0.0, -6.0, 0.0), (0.0, 0.0, 3.0)
-    made = Wall(name=name, corner_m=corner, edge_u_m=u, edge_v_m=v, material=brick, thickness_m=thickness)
+    made = Wall(
+        name=name, corner_m=corner, edge_u_m=u, edge_v_m=v, material=brick, thickness_m=thickness
+    )
     assert made.normal[0] == -1
     return made
 
@@ -45,12 +54,12 @@ def inside(*walls: Wall, furniture: tuple[Furniture, ...] = ()) -> list[tuple[st
     return solid.found(power.sum(axis=0))
 
 
-@pytest.mark.parametrize(("x", "thickness"), [(-0.25, 0.5), (-0.3, 0.36), (-0.01, 0.02), (0.0, 0.002)])
+@pytest.mark.parametrize(
+    ("x", "thickness"), [(-0.25, 0.5), (-0.3, 0.36), (-0.01, 0.02), (0.0, 0.002)]
+)
 def test_who_stands_in_a_wall_is_refused(tmp_path: Path, x: float, thickness: float) -> None:
     scene = Scene(name="cell", walls=(wall(x, thickness),))
-    said = (
-        r"scene 'cell': at 0.\d\d s the (left hip|right hip|lower torso) of the person is inside wall 'across'; move the person"
-    )
+    said = r"scene 'cell': at 0.\d\d s the (left hip|right hip|lower torso) of the person is inside wall 'across'; move the person"
     with pytest.raises(InputError, match=said) as caught:
         rt.run(MOTION, RADAR, scene, out=tmp_path / "out", fidelity="analytic", duration_s=0.2)
     assert "\n" not in str(caught.value)
@@ -74,7 +83,9 @@ def test_at_any_time_of_the_interval() -> None:
 
 def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
     hand = BODY.part_names.index(
-        "left hand" if BODY.at(TIMES).centres[:, BODY.part_names.index("left hand"), 0].min() < -0.5 else "right hand"
+        "left hand"
+        if BODY.at(TIMES).centres[:, BODY.part_names.index("left hand"), 0].min() < -0.5
+        else "right hand"
     )
     reach = BODY.at(TIMES).centres[..., 0]
     # Thick enough that the fist comes in from behind, by the back face, and stays there; nothing else reaches so far.
@@ -93,18 +104,36 @@ def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
     power_of_hand = np.zeros((len(TIMES), len(BODY.part_names)))
     power_of_hand[:, hand] = 1.0
     solid.look(TIMES, BODY.at(TIMES), power_of_hand)
-    with pytest.raises(InputError, match=rf"at {first:.2f} s the {BODY.part_names[hand]} of the person is inside wall 'across'"):
+    with pytest.raises(
+        InputError,
+        match=rf"at {first:.2f} s the {BODY.part_names[hand]} of the person is inside wall 'across'",
+    ):
         solid.found(power_of_hand.sum(axis=0))
 
 
 def test_the_summary_tells(tmp_path: Path) -> None:
-    box = Furniture(name="crate", mesh=tmp_path / "crate.ply", material=material("wood"), position_m=(0, 0, 0), metres_per_unit=1)
+    box = Furniture(
+        name="crate",
+        mesh=tmp_path / "crate.ply",
+        material=material("wood"),
+        position_m=(0, 0, 0),
+        metres_per_unit=1,
+    )
     trimesh = pytest.importorskip("trimesh")
     trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / "crate.ply")
     motion = rt.synthetic_motion("punch", seed=0, duration_s=0.2)
     with pytest.warns(rt.ValidityWarning, match="parts inside furniture"):
-        rt.run(motion, RADAR, Scene(name="store", furniture=(box,)), out=tmp_path / "out", fidelity="analytic")
-    limits = {limit["name"]: limit for limit in json.loads((tmp_path / "out" / "summary.json").read_text())["limits"]}
+        rt.run(
+            motion,
+            RADAR,
+            Scene(name="store", furniture=(box,)),
+            out=tmp_path / "out",
+            fidelity="analytic",
+        )
+    limits = {
+        limit["name"]: limit
+        for limit in json.loads((tmp_path / "out" / "summary.json").read_text())["limits"]
+    }
     told = limits["inside_furniture"]
     assert 0.05 < told["share"] <= 1
     # The crate reaches up to 0.5 m: shanks and feet.
@@ -116,7 +145,9 @@ def test_the_summary_tells(tmp_path: Path) -> None:
 @pytest.mark.parametrize("activity", ["walk", "kick", "punch", "jumping_jack"])
 def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, activity: str) -> None:
     scene = Scene.load(name)
-    placed = place(rt.synthetic_motion(activity, seed=0, duration_s=2.0), heading_deg=scene.heading_deg)
+    placed = place(
+        rt.synthetic_motion(activity, seed=0, duration_s=2.0), heading_deg=scene.heading_deg
+    )
     body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
     times = np.arange(0, body.duration_s, 0.02)
     solid = Inside(scene, body.part_names)

@@ -18,7 +18,15 @@ from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Scene, Wall, material
 
 # One antenna at one place, so that lengths are those of a radar in the middle of its array.
-RADAR = rt.Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=500e-6, samples_per_chirp=128, frame_duration_s=0.05)
+RADAR = rt.Radar(
+    tx_y=1,
+    tx_z=0,
+    rx_y=1,
+    rx_z=0,
+    chirp_duration_s=500e-6,
+    samples_per_chirp=128,
+    frame_duration_s=0.05,
+)
 RADIUS_M = 0.06
 N_CHIRPS = 800
 WALL = Wall(
@@ -37,7 +45,9 @@ def spheres() -> Body:
     return Body(walk.motion, np.full((21, 3), RADIUS_M))
 
 
-def look(body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None) -> Any:
+def look(
+    body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None
+) -> Any:
     chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
     return moments(model, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
 
@@ -50,14 +60,19 @@ def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres:
     antenna = np.array(RADAR.position_m)
     away = np.linalg.norm(centres - antenna, axis=-1, keepdims=True)
     # float32 of some metres
-    np.testing.assert_allclose(found.corners[:, :, 0], centres + RADIUS_M * (antenna - centres) / away, atol=1e-6)
+    np.testing.assert_allclose(
+        found.corners[:, :, 0], centres + RADIUS_M * (antenna - centres) / away, atol=1e-6
+    )
 
 
 def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
     found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True))
 
     def distance(times: NDArray[np.float64]) -> NDArray[np.float64]:
-        return np.linalg.norm(spheres.at(times).centres - np.array(RADAR.position_m), axis=-1) - RADIUS_M
+        return (
+            np.linalg.norm(spheres.at(times).centres - np.array(RADAR.position_m), axis=-1)
+            - RADIUS_M
+        )
 
     # The mean of two chirps 2 ms apart is off by half the acceleration times the square of 1 ms: 1e-4 m at 100 m/s^2. Their
     # middle is half a chirp after the window's, 0.25 ms.
@@ -77,14 +92,20 @@ def test_a_ghost_is_mirrored_by_wall_and_sphere(spheres: Body) -> None:
     antenna = np.array(RADAR.position_m)
     behind = antenna * [1, -1, 1] + [0, 2 * 2.5, 0]  # its image in the plane y = 2.5
     step, out = 3, found.path_names[found.echo_path] == "left > body"
-    on_wall, on_sphere = found.corners[step, out, 0].astype(float), found.corners[step, out, 1].astype(float)
+    on_wall, on_sphere = (
+        found.corners[step, out, 0].astype(float),
+        found.corners[step, out, 1].astype(float),
+    )
     np.testing.assert_allclose(on_wall[:, 1], 2.5, atol=1e-6)
     # Antenna, wall and sphere lie on one line once the antenna is mirrored.
     np.testing.assert_allclose(np.cross(on_wall - behind, on_sphere - behind), 0, atol=1e-5)
     normal = on_sphere - spheres.at(found.times).centres[step, found.echo_part[out]]
     np.testing.assert_allclose(np.linalg.norm(normal, axis=1), RADIUS_M, atol=1e-6)
     # The normal halves the angle between both legs; float32 of the point over the radius is 1e-5.
-    legs = [(place - on_sphere) / np.linalg.norm(place - on_sphere, axis=1, keepdims=True) for place in (behind, antenna)]
+    legs = [
+        (place - on_sphere) / np.linalg.norm(place - on_sphere, axis=1, keepdims=True)
+        for place in (behind, antenna)
+    ]
     halves = (legs[0] + legs[1]) / np.linalg.norm(legs[0] + legs[1], axis=1, keepdims=True)
     np.testing.assert_allclose(halves, normal / RADIUS_M, atol=5e-5)
     direct = found.echo_bounces == 1
@@ -107,7 +128,12 @@ class Told:
         amplitude = np.array([self._amplitude(time) for time in times], dtype=complex)[None]
         ones = np.ones(len(self._part), dtype=np.int64)
         return rt.Echoes(
-            length=length, amplitude=amplitude, frequency=np.array([1e10]), tx=0 * chirps, part=self._part, bounces=ones
+            length=length,
+            amplitude=amplitude,
+            frequency=np.array([1e10]),
+            tx=0 * chirps,
+            part=self._part,
+            bounces=ones,
         )
 
 
@@ -126,14 +152,24 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
     middle = float(RADAR.window_times(window)[0]) + RADAR.chirp_duration_s / 2
     there = [[8.0], [8.1]]
     # Two receivers; the second sees the echo before the moment only, and its length then means nothing.
-    model = Told(lambda t: there if t < middle else [[8.0], [100.0]], lambda t: [[1.0], [float(t < middle)]], [0])
+    model = Told(
+        lambda t: there if t < middle else [[8.0], [100.0]],
+        lambda t: [[1.0], [float(t < middle)]],
+        [0],
+    )
     found = look(spheres, model, windows=window)
-    np.testing.assert_allclose([found.range_m, found.velocity_mps, found.power_m2], [[[4.0]], [[0.0]], [[0.5]]], atol=1e-12)
-    gone = look(spheres, Told(lambda t: there, lambda t: [[float(t < middle)]] * 2, [0]), windows=window)
+    np.testing.assert_allclose(
+        [found.range_m, found.velocity_mps, found.power_m2], [[[4.0]], [[0.0]], [[0.5]]], atol=1e-12
+    )
+    gone = look(
+        spheres, Told(lambda t: there, lambda t: [[float(t < middle)]] * 2, [0]), windows=window
+    )
     assert gone.power_m2.tolist() == [[0.0]]
 
 
-def test_long_captures_and_rich_rooms_keep_no_more(spheres: Body, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_captures_and_rich_rooms_keep_no_more(
+    spheres: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(module, "MOST_STEPS", 4)
     monkeypatch.setattr(module, "MOST_ECHOES", 25)
     scene = Scene(name="one wall", walls=(WALL,))
@@ -146,14 +182,26 @@ def test_long_captures_and_rich_rooms_keep_no_more(spheres: Body, monkeypatch: p
 
 
 def test_moments_come_at_most_40_times_a_second(spheres: Body) -> None:
-    found = look(spheres, build_model("analytic", RADAR, spheres, spreading=True), windows=np.arange(0, 600))
+    found = look(
+        spheres, build_model("analytic", RADAR, spheres, spreading=True), windows=np.arange(0, 600)
+    )
     # Cycles of 0.5 ms
     assert np.diff(found.window).tolist() == [50] * (len(found.window) - 1)
 
 
-def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(spheres: Body, monkeypatch: pytest.MonkeyPatch) -> None:
-    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, 1.0, 0.0), yaw_deg=30)
-    lamp = Furniture(name="lamp", mesh="lamp", material=material("metal"), position_m=(1.0, -1.0, 0.0))
+def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(
+    spheres: Body, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chair = Furniture(
+        name="chair",
+        mesh="chair",
+        material=material("wood"),
+        position_m=(1.0, 1.0, 0.0),
+        yaw_deg=30,
+    )
+    lamp = Furniture(
+        name="lamp", mesh="lamp", material=material("metal"), position_m=(1.0, -1.0, 0.0)
+    )
     scene = Scene(name="furnished", furniture=(chair, lamp))
     model = build_model("analytic", RADAR, spheres, spreading=True)
     limit = len(chair.triangles().faces)
@@ -168,10 +216,12 @@ def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(spheres: Body, monk
     assert (found.furniture_piece[box] == 1).all()
     low, high = lamp.triangles().vertices.min(axis=0), lamp.triangles().vertices.max(axis=0)
     sides = vertices[box]
-    area = np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    area = (
+        np.linalg.norm(np.cross(sides[:, 1] - sides[:, 0], sides[:, 2] - sides[:, 0]), axis=1) / 2
+    )
     a, b, c = high - low
     assert area.sum() == pytest.approx(2 * (a * b + b * c + c * a), rel=1e-5)
     # Closed, all faces outward: the volume by the divergence theorem.
-    assert abs(np.einsum("ij,ij->i", sides[:, 0], np.cross(sides[:, 1], sides[:, 2])).sum() / 6) == pytest.approx(
-        a * b * c, rel=1e-4
-    )
+    assert abs(
+        np.einsum("ij,ij->i", sides[:, 0], np.cross(sides[:, 1], sides[:, 2])).sum() / 6
+    ) == pytest.approx(a * b * c, rel=1e-4)

@@ -17,23 +17,37 @@ import rtradar as rt
 from rtradar.exchange import read_cloud
 from rtradar.pipeline.pictures.run_view import load_linked, view
 
-LINES = {"y": {"tx_y": 2, "tx_z": 0, "rx_y": 4, "rx_z": 0}, "z": {"tx_y": 0, "tx_z": 2, "rx_y": 0, "rx_z": 4}}
+LINES = {
+    "y": {"tx_y": 2, "tx_z": 0, "rx_y": 4, "rx_z": 0},
+    "z": {"tx_y": 0, "tx_z": 2, "rx_y": 0, "rx_z": 4},
+}
 
 
 @pytest.fixture(scope="module", params=LINES)
-def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path, dict[str, Figure]]:
+def made(
+    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Path, dict[str, Figure]]:
     """The line, the folder of a run, and the figures that were drawn for it, by the name of their file."""
     figures: dict[str, Figure] = {}
 
     def save(figure: Figure, file: Path, **_: object) -> None:
-        figures[file.name] = pickle.loads(pickle.dumps(figure))  # as it is now, for afterwards it is emptied
+        figures[file.name] = pickle.loads(
+            pickle.dumps(figure)
+        )  # as it is now, for afterwards it is emptied
         original(figure, file, **_)
 
     out, original = tmp_path_factory.mktemp("made"), Figure.savefig
-    radar = rt.Radar(chirp_duration_s=250e-6, samples_per_chirp=128, frame_duration_s=0.05, **LINES[request.param])
+    radar = rt.Radar(
+        chirp_duration_s=250e-6,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+        **LINES[request.param],
+    )
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(Figure, "savefig", save)
-        rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.2), radar, out=out, fidelity="analytic")
+        rt.run(
+            rt.synthetic_motion("walk", seed=0, duration_s=0.2), radar, out=out, fidelity="analytic"
+        )
     return request.param, out, figures
 
 
@@ -50,13 +64,21 @@ def test_the_coordinate_across_the_line_is_nan(made: tuple[str, Path, dict[str, 
     np.testing.assert_array_equal(read_cloud(out / "cloud_xyz.npz").values[:, :3], points)
 
 
-def test_the_cloud_is_drawn_in_two_coordinates_and_says_what_is_missing(made: tuple[str, Path, dict[str, Figure]]) -> None:
+def test_the_cloud_is_drawn_in_two_coordinates_and_says_what_is_missing(
+    made: tuple[str, Path, dict[str, Figure]],
+) -> None:
     line, _, figures = made
     view_, *others = figures["cloud_xyz.png"].axes
     assert [axes.get_label() for axes in others] == ["<colorbar>"]
-    said = {"y": "From above; elevation is not measured", "z": "From the side; azimuth is not measured"}[line]
+    said = {
+        "y": "From above; elevation is not measured",
+        "z": "From the side; azimuth is not measured",
+    }[line]
     assert view_.get_title() == said
-    assert (view_.get_xlabel(), view_.get_ylabel()) == ("x [m], by the distance from the line of the array", f"{line} [m]")
+    assert (view_.get_xlabel(), view_.get_ylabel()) == (
+        "x [m], by the distance from the line of the array",
+        f"{line} [m]",
+    )
     assert np.isfinite(view_.collections[0].get_offsets()).all()
 
 
@@ -70,7 +92,9 @@ def test_azimuth_of_a_line_is_a_cone_angle(made: tuple[str, Path, dict[str, Figu
             assert "cone angle" in maps["azimuth"].attrs["long_name"]
 
 
-def test_pages_show_what_is_measured(made: tuple[str, Path, dict[str, Figure]], tmp_path: Path) -> None:
+def test_pages_show_what_is_measured(
+    made: tuple[str, Path, dict[str, Figure]], tmp_path: Path
+) -> None:
     line, out, _ = made
     view(out, page=tmp_path / "view.html", still=tmp_path / "still.png")
     assert load_linked(out).spatial.measured.tolist() == [True, line == "y", line == "z"]
@@ -81,6 +105,8 @@ def test_pages_show_what_is_measured(made: tuple[str, Path, dict[str, Figure]], 
         spatial = json.loads(found[1])["spatial"]
         assert spatial["measured"] == [True, line == "y", line == "z"]
         shown = np.frombuffer(base64.b64decode(spatial["points"]), "<f4").reshape(-1, 3)
-        np.testing.assert_array_equal(np.isnan(shown).all(axis=0), [False, line == "z", line == "y"])
+        np.testing.assert_array_equal(
+            np.isnan(shown).all(axis=0), [False, line == "z", line == "y"]
+        )
     angle = {"y": "elevation", "z": "azimuth"}[line]
     assert f"does not measure {angle}" in (out / "report.html").read_text(encoding="utf-8")

@@ -14,16 +14,29 @@ from rtradar.pipeline.timing import Stages
 from rtradar.process import build_detector, clutter_removal
 
 RADAR = rt.Radar(
-    name="small", tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=250e-6, samples_per_chirp=64, frame_duration_s=0.05
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=64,
+    frame_duration_s=0.05,
 )
 
 
 @pytest.mark.parametrize("method", ["none", "mean"])
-def test_pieces_give_what_the_whole_gives(method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_pieces_give_what_the_whole_gives(
+    method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(cloud_maker, "_PIECE_BYTES", 1)
     random = np.random.default_rng(0)
     chirps = np.arange(800)
-    tone = np.exp(2j * np.pi * 0.1 * chirps)[:, None, None] * np.ones((1, 4, 1)) * (np.arange(64) == 20)
+    tone = (
+        np.exp(2j * np.pi * 0.1 * chirps)[:, None, None]
+        * np.ones((1, 4, 1))
+        * (np.arange(64) == 20)
+    )
     spectra = (tone + 0.01 * random.standard_normal((800, 4, 64))).astype(np.complex64)
     found = []
     for name, cut in (("whole", False), ("pieces", True)):
@@ -41,10 +54,18 @@ def test_pieces_give_what_the_whole_gives(method: str, tmp_path: Path, monkeypat
         assert made.piece == 10 * RADAR.n_tx
         for block in range(0, 800, 100):
             for first in range(block, block + 100, made.piece if cut else 100):
-                made.take(spectra[first : min(first + made.piece, block + 100)] if cut else spectra[block : block + 100], first)
+                made.take(
+                    spectra[first : min(first + made.piece, block + 100)]
+                    if cut
+                    else spectra[block : block + 100],
+                    first,
+                )
         clouds = made.finish()
         with h5py.File(tmp_path / f"{name}.h5") as maps:
-            found.append({key: maps[key][:] for key in maps} | {"rdt": clouds.rdt.points, "xyz": clouds.spatial.points})
+            found.append(
+                {key: maps[key][:] for key in maps}
+                | {"rdt": clouds.rdt.points, "xyz": clouds.spatial.points}
+            )
     assert len(found[0]["rdt"]) == cloud_maker.CLOUD_POINTS
     assert found[0].keys() == found[1].keys()
     for key, values in found[0].items():
@@ -52,9 +73,14 @@ def test_pieces_give_what_the_whole_gives(method: str, tmp_path: Path, monkeypat
 
 
 SAID = {
-    "none": dict.fromkeys(("range_doppler", "detections", "range_time", "spectrogram", "range_azimuth"), "none"),
+    "none": dict.fromkeys(
+        ("range_doppler", "detections", "range_time", "spectrogram", "range_azimuth"), "none"
+    ),
     # 100 cycles of 0.5 ms are a window; 128 one of the spectrogram.
-    "mean": dict.fromkeys(("range_doppler", "detections", "range_time", "range_azimuth"), "mean over 100 cycles (0.05 s)")
+    "mean": dict.fromkeys(
+        ("range_doppler", "detections", "range_time", "range_azimuth"),
+        "mean over 100 cycles (0.05 s)",
+    )
     | {"spectrogram": "mean over 128 cycles (0.064 s)"},
     "exponential": {"spectrogram": "exponential background, time constant 1 s"},
     "mti": {"range_time": "MTI canceller of 2 pulses"},
@@ -69,8 +95,19 @@ def test_clutter_is_removed_from_every_map_and_each_says_how(method: str, tmp_pa
     own = 1000.0 * (np.arange(64) == 10) + walker[:, None] * (np.arange(64) == 20)
     noise = 1e-3 * np.random.default_rng(0).standard_normal((1600, 4, 64))
     spectra = (own[:, None] + noise).astype(np.complex64)
-    detect, removal = build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels), clutter_removal(method, RADAR)
-    made = products.Products(tmp_path / "maps.h5", RADAR, detect=detect, seed=0, stages=Stages(), title="", removal=removal)
+    detect, removal = (
+        build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels),
+        clutter_removal(method, RADAR),
+    )
+    made = products.Products(
+        tmp_path / "maps.h5",
+        RADAR,
+        detect=detect,
+        seed=0,
+        stages=Stages(),
+        title="",
+        removal=removal,
+    )
     for first in range(0, 1600, 100):
         made.take(spectra[first : first + 100], first)
     made.finish()

@@ -14,10 +14,14 @@ from rtradar.signal import synthesize
 
 RADAR = Radar(tx_y=2, tx_z=2, rx_y=2, rx_z=2, samples_per_chirp=192)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
-SURFACES = dict.fromkeys(SIDES, Surface(material=material("concrete"), thickness_m=0.2, roughness_m=0.0005))
+SURFACES = dict.fromkeys(
+    SIDES, Surface(material=material("concrete"), thickness_m=0.2, roughness_m=0.0005)
+)
 ROOM = Scene(
     walls=room_walls((5.5, 4.5, 2.6), (-4.6, -2.0), SURFACES),
-    furniture=(Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0.5, -1.0, 0)),),
+    furniture=(
+        Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0.5, -1.0, 0)),
+    ),
 )
 
 
@@ -33,8 +37,14 @@ class Ball:
 
     def at(self, times: NDArray[np.float64]) -> Poses:
         times = np.asarray(times)
-        centres = np.array([-1.0, 1.0, 1.0]) + (2.5 * times[:, None] - self._start) * [0.0, 1.0, 0.0]
-        return Poses(centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes)
+        centres = np.array([-1.0, 1.0, 1.0]) + (2.5 * times[:, None] - self._start) * [
+            0.0,
+            1.0,
+            0.0,
+        ]
+        return Poses(
+            centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes
+        )
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +65,10 @@ def test_a_room_alone_is_exactly_still(clutter: Clutter) -> None:
 @pytest.mark.parametrize("blocks", [1, 3])
 def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: int) -> None:
     ball = Ball()
-    room, shadow = RoomIf(clutter, ball, variant="scalar"), ClutterShadow(clutter, ball, variant="scalar")
+    room, shadow = (
+        RoomIf(clutter, ball, variant="scalar"),
+        ClutterShadow(clutter, ball, variant="scalar"),
+    )
     chirps = np.arange(9, 900, 37)
     got = np.concatenate([room.clutter_if(part) for part in np.array_split(chirps, blocks)])
     whole = clutter.echoes()
@@ -78,7 +91,9 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
 def test_a_body_that_hides_nothing_leaves_the_room_as_it_is(clutter: Clutter) -> None:
     chirps = np.arange(400)
     still = RoomIf(clutter).clutter_if(chirps)
-    np.testing.assert_array_equal(RoomIf(clutter, Ball(start=60.0), variant="scalar").clutter_if(chirps), still)
+    np.testing.assert_array_equal(
+        RoomIf(clutter, Ball(start=60.0), variant="scalar").clutter_if(chirps), still
+    )
 
 
 def test_free_space_is_silent() -> None:

@@ -32,15 +32,39 @@ def bits(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("options", [["--fidelity", "analytic"], ["--fidelity", "specular"], ["--fidelity", "auto"]])
+@pytest.mark.parametrize(
+    "options", [["--fidelity", "analytic"], ["--fidelity", "specular"], ["--fidelity", "auto"]]
+)
 def test_one_thread_and_three_give_the_same_bits(tmp_path: Path, options: list[Any]) -> None:
     (tmp_path / "small.toml").write_text(RADAR)
     found = []
     for threads in (1, 3):
         out = tmp_path / str(threads)
-        command = [sys.executable, "-m", "rtradar", "run", "synthetic:kick", "--duration", "0.2", "--out", str(out), *options]
-        command += ["--radar", str(tmp_path / "small.toml"), "--variant", "auto" if "analytic" in options else "llvm"]
-        done = subprocess.run(command, env={**os.environ, **environment_of(threads)}, capture_output=True, text=True, check=False)
+        command = [
+            sys.executable,
+            "-m",
+            "rtradar",
+            "run",
+            "synthetic:kick",
+            "--duration",
+            "0.2",
+            "--out",
+            str(out),
+            *options,
+        ]
+        command += [
+            "--radar",
+            str(tmp_path / "small.toml"),
+            "--variant",
+            "auto" if "analytic" in options else "llvm",
+        ]
+        done = subprocess.run(
+            command,
+            env={**os.environ, **environment_of(threads)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         if "--variant llvm" in done.stderr:
             pytest.skip("no LLVM backend here")
         assert done.returncode == 0, done.stderr
@@ -67,7 +91,8 @@ def test_what_is_just_compiled_gives_the_bits_of_what_was_compiled_before(tmp_pa
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-W", "ignore", "-c", ADD_TONES]
     first, second = (
-        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout for _ in range(2)
+        subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
+        for _ in range(2)
     )
     assert list(tmp_path.rglob("*.nbc"))
     assert first == second
@@ -78,12 +103,21 @@ def compiled_functions() -> dict[tuple[Path, str], tuple[set[str], bool]]:
     found = {}
     for path in sorted(Path(rtradar.__file__).parent.rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            made = [ast.unparse(one) for one in node.decorator_list] if isinstance(node, ast.FunctionDef) else []
+            made = (
+                [ast.unparse(one) for one in node.decorator_list]
+                if isinstance(node, ast.FunctionDef)
+                else []
+            )
             if any(words.startswith(("compiled(", "inlined(", "njit(")) for words in made):
                 calls = {
-                    call.func.id for call in ast.walk(node) if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
+                    call.func.id
+                    for call in ast.walk(node)
+                    if isinstance(call, ast.Call) and isinstance(call.func, ast.Name)
                 }
-                found[path, node.name] = calls, made[0].startswith("inlined(") or "inline=" in made[0]
+                found[path, node.name] = (
+                    calls,
+                    made[0].startswith("inlined(") or "inline=" in made[0],
+                )
     return found
 
 
@@ -94,6 +128,8 @@ def test_compiled_functions_take_in_those_they_call() -> None:
         f"{path.name}: {name}"
         for (path, name), (_, inlined) in functions.items()
         for (other, _), (calls, _) in functions.items()
-        if name in calls and not inlined and (other == path or re.search(rf"import .*\b{name}\b", other.read_text("utf-8")))
+        if name in calls
+        and not inlined
+        and (other == path or re.search(rf"import .*\b{name}\b", other.read_text("utf-8")))
     ]
     assert linked == []

@@ -33,7 +33,11 @@ def test_maps_grow_step_by_step_however_many_come_at_once(tmp_path: Path) -> Non
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux can forget a peak")
 def test_a_long_file_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> None:
     store = MapStore(tmp_path / "maps.h5", FIXED, {})
-    power, mask, rows = np.ones((1, 256, 128), np.float32), np.ones((1, 256, 128), bool), np.ones((64, 256), np.float32)
+    power, mask, rows = (
+        np.ones((1, 256, 128), np.float32),
+        np.ones((1, 256, 128), bool),
+        np.ones((64, 256), np.float32),
+    )
 
     def write(windows: range) -> None:
         for window in windows:

@@ -30,7 +30,9 @@ class Balls:
 
     place: tuple[float, float, float] = (0.0, 0.0, 1.0)
     speed: float = 0.0
-    semi_axes: Array = dataclasses.field(default_factory=lambda: np.array([[0.2, 0.2, 0.2], [0.01, 0.01, 0.1]]))
+    semi_axes: Array = dataclasses.field(
+        default_factory=lambda: np.array([[0.2, 0.2, 0.2], [0.01, 0.01, 0.1]])
+    )
     duration_s: float = 0.2
     part_names: tuple[str, ...] = ("ball", "needle")
 
@@ -39,7 +41,11 @@ class Balls:
         centres[..., 0] += self.speed * np.asarray(times)[:, None]
         centres[:, 1, 1] += 0.5
         along_x = np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]])  # the needle's c points along x
-        return Poses(centres, np.broadcast_to(np.stack([np.eye(3), along_x]), (len(times), 2, 3, 3)), self.semi_axes)
+        return Poses(
+            centres,
+            np.broadcast_to(np.stack([np.eye(3), along_x]), (len(times), 2, 3, 3)),
+            self.semi_axes,
+        )
 
 
 @dataclass(frozen=True)
@@ -106,16 +112,23 @@ def test_what_is_faster_than_the_radar_can_tell_is_warned_of() -> None:
         with pytest.warns(ValidityWarning, match=r"faster than the unambiguous 2\.68 m/s"):
             (limit,) = look(dataclasses.replace(plump, speed=speed)).limits
         assert limit.name == "velocity_ambiguous"
-        assert limit.share > 0.4  # the ball straight ahead; the other one's range rate is 0.8 % less
+        assert (
+            limit.share > 0.4
+        )  # the ball straight ahead; the other one's range rate is 0.8 % less
 
 
 def test_what_shows_at_another_velocity_shows_in_another_direction_too() -> None:
     # By hand: two Tx four wavelengths of 12 GHz apart that take turns, and a wavelength of 14 GHz: a sine of 12 / 14 / 8.
     fast = dataclasses.replace(Balls(), semi_axes=np.full((2, 3), 0.1), speed=2.8)
-    with pytest.warns(ValidityWarning, match=r"at another velocity and, ahead, 6\.2 degrees beside its direction"):
+    with pytest.warns(
+        ValidityWarning, match=r"at another velocity and, ahead, 6\.2 degrees beside its direction"
+    ):
         look(fast)
     # One Tx alone turns all of its channels alike, and Tx at once are not turned at all.
-    for radar in (dataclasses.replace(RADAR, tx_y=1, chirp_duration_s=2e-3), dataclasses.replace(RADAR, multiplexing="fdm")):
+    for radar in (
+        dataclasses.replace(RADAR, tx_y=1, chirp_duration_s=2e-3),
+        dataclasses.replace(RADAR, multiplexing="fdm"),
+    ):
         quick = dataclasses.replace(fast, speed=1.05 * radar.max_velocity_mps)
         with pytest.warns(ValidityWarning, match="at another velocity$"):
             look(quick, radar)
@@ -123,7 +136,9 @@ def test_what_shows_at_another_velocity_shows_in_another_direction_too() -> None
 
 def test_what_is_out_of_range_is_counted_and_refused_where_it_is_all() -> None:
     plump = dataclasses.replace(Balls(), semi_axes=np.full((2, 3), 0.1))
-    edge = RADAR.max_range_m - 4.0  # the ball's near side reaches the range bins; the other one is farther
+    edge = (
+        RADAR.max_range_m - 4.0
+    )  # the ball's near side reaches the range bins; the other one is farther
     with pytest.warns(ValidityWarning, match=r"beyond 9\.59 m"):
         (limit,) = look(dataclasses.replace(plump, place=(edge + 0.09, 0.0, 1.0))).limits
     assert limit.name == "beyond_range"
@@ -136,7 +151,9 @@ def test_what_is_out_of_range_is_counted_and_refused_where_it_is_all() -> None:
 def test_a_part_near_an_antenna_is_refused_by_its_name(gap: float, said: str) -> None:
     # Antennas stand up to 5 cm off the line to the ball: up to 1 cm farther from it.
     body = dataclasses.replace(Balls(), place=(-4.0 + 0.2 + gap, 0.0, 1.0))
-    with pytest.raises(InputError, match=rf"at 0\.00 s the ball is {said} m from an antenna .*at least 0\.3 m"):
+    with pytest.raises(
+        InputError, match=rf"at 0\.00 s the ball is {said} m from an antenna .*at least 0\.3 m"
+    ):
         look(body)
 
 
@@ -151,7 +168,9 @@ def test_nobody_visible_is_measured_against_a_square_metre_at_the_origin(spreadi
         found = survey(Silence(), RADAR, body, N_CHIRPS, spreading=spreading)
     assert not found.visible
     assert (found.hidden_at == 1).all()
-    assert found.power == pytest.approx(17**-2 if spreading else 1.0)  # the radar stands sqrt(17) m from the origin
+    assert found.power == pytest.approx(
+        17**-2 if spreading else 1.0
+    )  # the radar stands sqrt(17) m from the origin
 
 
 def test_what_another_part_hides_is_counted() -> None:

@@ -22,7 +22,9 @@ from rtradar.report.view.page import COLOURS
 
 
 @pytest.fixture(scope="module")
-def made(beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def made(
+    beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory
+) -> Path:
     out = tmp_path_factory.mktemp("made")
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.4)
     rt.run(motion, *beside_a_wall, out=out, fidelity="analytic", clutter_removal="mean")
@@ -31,7 +33,10 @@ def made(beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.Temp
 
 def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
     linked = load_linked(made)
-    shown = linked.range_doppler.low_db + linked.range_doppler.step_db * linked.range_doppler.level.astype(float)
+    shown = (
+        linked.range_doppler.low_db
+        + linked.range_doppler.step_db * linked.range_doppler.level.astype(float)
+    )
     with h5py.File(made / "maps.h5") as maps:
         assert linked.moments.times.tolist() == pytest.approx(maps["time"][linked.moments.window])
         power, velocity = maps["range_doppler"][:][linked.moments.window], maps["velocity"][:]
@@ -49,9 +54,13 @@ def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
     near = 0
     for step in range(len(moments.times)):
         row, column = np.unravel_index(levels.level[step].argmax(), levels.level.shape[1:])
-        distance, velocity = levels.up[0] + row * levels.up[1], levels.across[0] + column * levels.across[1]
+        distance, velocity = (
+            levels.up[0] + row * levels.up[1],
+            levels.across[0] + column * levels.across[1],
+        )
         bins = np.hypot(
-            (moments.range_m[step] - distance) / levels.up[1], (linked.shown_velocity()[step] - velocity) / levels.across[1]
+            (moments.range_m[step] - distance) / levels.up[1],
+            (linked.shown_velocity()[step] - velocity) / levels.across[1],
         )
         near += bins[linked.seen[step]].min() <= 1.5
     # One of them is within its cell or next to it, but for the odd window in which parts interfere.
@@ -71,7 +80,10 @@ def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
             ]
             # With R^4 for the loss over distance; the first bin, at 0 m, ends at half a bin.
             levels = [
-                10 * np.log10(maps["range_doppler"][i, j, k] / 8 * max(distance[j], distance[1] / 2) ** 4)
+                10
+                * np.log10(
+                    maps["range_doppler"][i, j, k] / 8 * max(distance[j], distance[1] / 2) ** 4
+                )
                 for i, j, k in product(*nearest)
             ]
             assert abs(np.array(levels) - linked.rdt_power_db[point]).min() < 1e-4
@@ -89,27 +101,50 @@ def test_a_still_shows_the_moment_in_those_colours(made: Path, tmp_path: Path, c
     assert (np.ptp(first[..., :3], axis=2) > 0.25).sum() > 5000
 
 
-def test_a_still_cuts_no_body_at_the_edge_of_its_axes(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_still_cuts_no_body_at_the_edge_of_its_axes(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn: list[Figure] = []
     # As it was then, for afterwards it is emptied.
-    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: drawn.append(pickle.loads(pickle.dumps(figure))))
+    monkeypatch.setattr(
+        Figure, "savefig", lambda figure, *_, **__: drawn.append(pickle.loads(pickle.dumps(figure)))
+    )
     view(made, still=tmp_path / "a.png", time_s=0.1)
     views = [axes for axes in drawn[0].axes if axes.name == "3d"]
     parts = sum(isinstance(artist, Poly3DCollection) for artist in views[0].collections)
     assert parts >= 21
-    assert not any(artist.get_clip_on() for axes in views for artist in (*axes.collections, *axes.lines))
+    assert not any(
+        artist.get_clip_on() for axes in views for artist in (*axes.collections, *axes.lines)
+    )
 
 
-def test_the_command_writes_what_it_is_asked_for(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_writes_what_it_is_asked_for(
+    made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "run"
     shutil.copytree(made, folder)
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", lambda address: opened.append(address) or True)
     assert main(["view", str(folder), "--no-browser", "--json", str(tmp_path / "told.json")]) == 0
     told = json.loads((tmp_path / "told.json").read_text())
-    assert told["page"] == {"path": str(folder / "view.html"), "bytes": (folder / "view.html").stat().st_size}
+    assert told["page"] == {
+        "path": str(folder / "view.html"),
+        "bytes": (folder / "view.html").stat().st_size,
+    }
     assert told["page"]["bytes"] < 8e6
-    assert main(["view", str(folder), "--out", str(tmp_path / "own.html"), "--still", str(tmp_path / "own.png")]) == 0
+    assert (
+        main(
+            [
+                "view",
+                str(folder),
+                "--out",
+                str(tmp_path / "own.html"),
+                "--still",
+                str(tmp_path / "own.png"),
+            ]
+        )
+        == 0
+    )
     assert (tmp_path / "own.html").read_bytes() == (folder / "view.html").read_bytes()
     (folder / "view.html").unlink()
     assert main(["view", str(folder), "--still", str(tmp_path / "own.png"), "--time", "0.2"]) == 0
@@ -133,7 +168,12 @@ def test_the_command_writes_what_it_is_asked_for(made: Path, tmp_path: Path, mon
     ],
 )
 def test_a_folder_without_a_whole_run_is_refused_in_one_line(
-    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str, content: str | None, said: str
+    made: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    name: str,
+    content: str | None,
+    said: str,
 ) -> None:
     folder = tmp_path / "run"
     shutil.copytree(made, folder, ignore=shutil.ignore_patterns("*.png", "*.html"))
@@ -157,7 +197,12 @@ def test_a_folder_without_a_whole_run_is_refused_in_one_line(
     ],
 )
 def test_bad_options_are_refused(
-    made: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, options: list[str], said: str
+    made: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+    options: list[str],
+    said: str,
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["view", str(made), *options]) == 2
@@ -165,19 +210,40 @@ def test_bad_options_are_refused(
     assert not list(tmp_path.iterdir())
 
 
-def test_moments_of_another_run_are_refused(made: Path, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path) -> None:
+def test_moments_of_another_run_are_refused(
+    made: Path, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path: Path
+) -> None:
     radar, _ = beside_a_wall
     folder = tmp_path / "run"
     shutil.copytree(made, folder)
-    rt.run(rt.synthetic_motion("walk", seed=0, duration_s=0.1), radar, out=tmp_path / "short", fidelity="analytic")
+    rt.run(
+        rt.synthetic_motion("walk", seed=0, duration_s=0.1),
+        radar,
+        out=tmp_path / "short",
+        fidelity="analytic",
+    )
     shutil.copy(tmp_path / "short" / "maps.h5", folder / "maps.h5")
     with pytest.raises(rt.InputError, match="not of one run"):
         view(folder, page=tmp_path / "v.html")
 
 
 def test_a_capture_too_short_for_a_spectrogram_is_shown_without(tmp_path: Path) -> None:
-    radar = rt.Radar(tx_y=2, tx_z=0, rx_y=4, rx_z=0, chirp_duration_s=1e-3, samples_per_chirp=128, frame_duration_s=0.05)
-    rt.run(rt.synthetic_motion("kick", seed=1, duration_s=1.0), radar, out=tmp_path, fidelity="analytic", duration_s=0.2)
+    radar = rt.Radar(
+        tx_y=2,
+        tx_z=0,
+        rx_y=4,
+        rx_z=0,
+        chirp_duration_s=1e-3,
+        samples_per_chirp=128,
+        frame_duration_s=0.05,
+    )
+    rt.run(
+        rt.synthetic_motion("kick", seed=1, duration_s=1.0),
+        radar,
+        out=tmp_path,
+        fidelity="analytic",
+        duration_s=0.2,
+    )
     view(tmp_path, page=tmp_path / "v.html", still=tmp_path / "s.png")
     text = (tmp_path / "v.html").read_text(encoding="utf-8")
     assert "The capture is too short for one." in text

@@ -31,10 +31,21 @@ for function in add_tones, _add_power, _mirror:
 
 @pytest.mark.slow
 def test_on_first_use_another_process_compiles_the_processing(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path / "cache"), "TMPDIR": str(tmp_path), THREADS_VARIABLE: "2"}
+    environment = {
+        **os.environ,
+        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
+        "TMPDIR": str(tmp_path),
+        THREADS_VARIABLE: "2",
+    }
     command = [sys.executable, "-W", "ignore", "-c", FIRST_USE]
-    said = subprocess.run(command, env=environment, capture_output=True, text=True, check=True).stdout
-    assert said.splitlines()[-3:] == ["1 0", "1 0", "0 1"]  # found on disk, found on disk, compiled here
+    said = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    ).stdout
+    assert said.splitlines()[-3:] == [
+        "1 0",
+        "1 0",
+        "0 1",
+    ]  # found on disk, found on disk, compiled here
 
 
 @pytest.fixture
@@ -60,7 +71,9 @@ def test_an_error_leaves_no_process_behind(others: list[subprocess.Popen[bytes]]
     assert other.returncode not in (None, 0)
 
 
-def test_standard_input_is_open_as_long_as_the_first_process_is_there(others: list[subprocess.Popen[bytes]]) -> None:
+def test_standard_input_is_open_as_long_as_the_first_process_is_there(
+    others: list[subprocess.Popen[bytes]],
+) -> None:
     with processing_compiled_beside():
         (other,) = others
         assert other.stdin is not None
@@ -71,7 +84,9 @@ def test_standard_input_is_open_as_long_as_the_first_process_is_there(others: li
 def test_it_ends_with_standard_input(tmp_path: Path) -> None:
     words = "from rtradar.pipeline.warm_up import compile_for_another_process as go; go()"
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
-    ended = subprocess.run([sys.executable, "-c", words], env=environment, stdin=subprocess.DEVNULL, check=False)
+    ended = subprocess.run(
+        [sys.executable, "-c", words], env=environment, stdin=subprocess.DEVNULL, check=False
+    )
     assert ended.returncode == 1  # and 0 when all is compiled
 
 
@@ -95,14 +110,18 @@ def test_another_program_is_not_started_again(
     assert others == []
 
 
-def test_one_core_is_not_shared(others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_core_is_not_shared(
+    others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(THREADS_VARIABLE, "1")
     with processing_compiled_beside():
         pass
     assert others == []
 
 
-def test_nothing_is_compiled_twice(others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nothing_is_compiled_twice(
+    others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(warm_up, "is_on_disk", lambda _: True)
     with processing_compiled_beside():
         pass
@@ -130,5 +149,11 @@ def test_backends_are_timed_before_another_process_compiles(
     monkeypatch.setattr(preparing, "select", lambda _: found.append("timed"))
     monkeypatch.setattr(preparing, "processing_compiled_beside", compiles)
     with pytest.raises(KeyboardInterrupt):
-        rt.run(synthetic_motion("walk", duration_s=0.2), Radar(), out=tmp_path, fidelity=fidelity, variant=variant)
+        rt.run(
+            synthetic_motion("walk", duration_s=0.2),
+            Radar(),
+            out=tmp_path,
+            fidelity=fidelity,
+            variant=variant,
+        )
     assert found == order

@@ -16,7 +16,13 @@ from rtradar.process import range_spectrum
 from rtradar.process.angles.maps import angle_grid, range_azimuth, range_elevation
 from rtradar.process.angles.peaks import find_peaks
 from rtradar.process.angles.spectra import angle, angle_spectra, folded_angle_deg
-from rtradar.process.angles.steering import measures_angle, range_walk, sine_grid, taper_weights, virtual_lines
+from rtradar.process.angles.steering import (
+    measures_angle,
+    range_walk,
+    sine_grid,
+    taper_weights,
+    virtual_lines,
+)
 from rtradar.process.cells import cell_spectra
 from rtradar.radar import Radar
 
@@ -31,14 +37,20 @@ SHORT = dataclasses.replace(LOW, frame_duration_s=0.01)
 def place_of(range_m: float, azimuth_deg: float, elevation_deg: float) -> Array:
     """In the radar's frame [m]."""
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    way = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+    way = [
+        np.cos(elevation) * np.cos(azimuth),
+        np.cos(elevation) * np.sin(azimuth),
+        np.sin(elevation),
+    ]
     return range_m * np.array(way)
 
 
 def echo(radar: Radar, place: Array, velocity: float = 0.0) -> NDArray[np.complex64]:
     """IF of one window, in whose middle the point is at ``place``; a length is that at the centre of its chirp."""
     chirps = np.arange(radar.chirps_per_frame)
-    away = velocity * ((chirps + 0.5) * radar.chirp_duration_s - len(chirps) * radar.chirp_duration_s / 2)
+    away = velocity * (
+        (chirps + 0.5) * radar.chirp_duration_s - len(chirps) * radar.chirp_duration_s / 2
+    )
     at = np.asarray(radar.position_m) + place + away[:, None] * place / np.linalg.norm(place)
     tx = chirps % radar.n_tx
     there = np.linalg.norm(radar.tx[tx] - at, axis=1)
@@ -76,10 +88,18 @@ def test_a_point_at_77_ghz(direction: tuple[float, float], speed: float) -> None
     np.testing.assert_allclose(found, direction, atol=0.2)
 
 
-@given(azimuth=st.floats(-55, 55), elevation=st.floats(-55, 55), range_m=st.floats(1.0, 9.0), bins=st.integers(-5, 5))
+@given(
+    azimuth=st.floats(-55, 55),
+    elevation=st.floats(-55, 55),
+    range_m=st.floats(1.0, 9.0),
+    bins=st.integers(-5, 5),
+)
 @settings(max_examples=25, deadline=None)
 def test_any_point_in_view(azimuth: float, elevation: float, range_m: float, bins: int) -> None:
-    sines = math.sin(math.radians(azimuth)) * math.cos(math.radians(elevation)), math.sin(math.radians(elevation))
+    sines = (
+        math.sin(math.radians(azimuth)) * math.cos(math.radians(elevation)),
+        math.sin(math.radians(elevation)),
+    )
     speed = bins * SHORT.velocity_bin_mps
     found = angle(echo(SHORT, place_of(range_m, azimuth, elevation), speed), SHORT, range_m, speed)
     back = math.sin(found[0]) * math.cos(found[1]), math.sin(found[1])
@@ -101,11 +121,15 @@ def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
 
 @pytest.mark.parametrize(("radar", "beside"), [(LOW, 1.02), (HIGH, 1.16)])
 @pytest.mark.parametrize("side", [1, -1])
-def test_an_echo_that_is_folded_shows_beside_its_direction(radar: Radar, beside: float, side: int) -> None:
+def test_an_echo_that_is_folded_shows_beside_its_direction(
+    radar: Radar, beside: float, side: int
+) -> None:
     # One Tx is 1 / 12 of a turn after the other, which is a sine of lambda / (12 x 4 lambda of the start).
     assert folded_angle_deg(radar) == pytest.approx(beside, abs=0.005)
     fast, unambiguous = 1.2 * side * radar.max_velocity_mps, 2 * radar.max_velocity_mps
-    found = np.degrees(angle(echo(radar, place_of(5.0, 0, 0), fast), radar, 5.0, fast - side * unambiguous))
+    found = np.degrees(
+        angle(echo(radar, place_of(5.0, 0, 0), fast), radar, 5.0, fast - side * unambiguous)
+    )
     # A Tx sees through eight Rx, whose own beam draws it back by some hundredths.
     np.testing.assert_allclose(found, -side * beside, atol=0.05)
 
@@ -122,12 +146,19 @@ def test_what_is_not_turned_shows_where_it_is() -> None:
 
 def test_focusing_gains_and_sharpens() -> None:
     x = echo(SHORT, place_of(4.0, 0.0, 0.0))
-    sharp, flat = (spectra_of(SHORT, x, 4.0, focus=focus, taper="uniform") for focus in (True, False))
+    sharp, flat = (
+        spectra_of(SHORT, x, 4.0, focus=focus, taper="uniform") for focus in (True, False)
+    )
     # 4.1 dB by the closed form of the 48 paths.
     assert 10 * np.log10(sharp.y.max() / flat.y.max()) == pytest.approx(4.08, abs=0.1)
     sine_step = np.diff(sharp.sines)[0]
-    widths = [np.degrees(np.count_nonzero(seen.y[0] > seen.y.max() / 2) * sine_step) for seen in (sharp, flat)]
-    assert widths == pytest.approx([1.8, 5.5], abs=np.degrees(sine_step))  # counted in steps of the grid
+    widths = [
+        np.degrees(np.count_nonzero(seen.y[0] > seen.y.max() / 2) * sine_step)
+        for seen in (sharp, flat)
+    ]
+    assert widths == pytest.approx(
+        [1.8, 5.5], abs=np.degrees(sine_step)
+    )  # counted in steps of the grid
 
 
 def test_an_echo_of_amplitude_one_reads_one() -> None:
@@ -167,7 +198,9 @@ def test_taper_is_the_taylor_window_on_a_full_line() -> None:
     assert line is not None
     weights = taper_weights(line, "taylor")
     far = np.abs(np.fft.fft(weights, 4096)) ** 2
-    lobes = far[116:2048].max()  # beyond the main lobe: A = arccosh(10^(25/20)) / pi, first zero 1.35 x 4096 / 48 = 115
+    lobes = far[
+        116:2048
+    ].max()  # beyond the main lobe: A = arccosh(10^(25/20)) / pi, first zero 1.35 x 4096 / 48 = 115
     # With 4 lobes kept equal the approximation of -25 dB is good to half a decibel.
     assert 10 * np.log10(lobes) == pytest.approx(-25, abs=0.5)
     assert weights.sum() == pytest.approx(1)
@@ -201,7 +234,9 @@ def test_all_channels_give_the_angles_of_the_pairs() -> None:
     radar = dataclasses.replace(SHORT, channels="all")
     line = virtual_lines(radar)[1]
     assert line is not None
-    np.testing.assert_array_equal(line.channels[:9], [6 * 16 + 8 + i for i in range(8)] + [7 * 16 + 8])
+    np.testing.assert_array_equal(
+        line.channels[:9], [6 * 16 + 8 + i for i in range(8)] + [7 * 16 + 8]
+    )
     place = place_of(4.0, -20.0, 9.0)
     both = [angle(echo(one, place), one, 4.0, 0.0) for one in (radar, SHORT)]
     np.testing.assert_allclose(both[0], both[1], atol=1e-5)  # complex64
@@ -209,7 +244,10 @@ def test_all_channels_give_the_angles_of_the_pairs() -> None:
 
 @pytest.mark.parametrize(
     "fields",
-    [{"tx_y": 1, "rx_y": 1, "tx_z": 0, "rx_z": 0}, {"tx_y": 4, "rx_y": 0, "tx_z": 0, "rx_z": 4, "channels": "all"}],
+    [
+        {"tx_y": 1, "rx_y": 1, "tx_z": 0, "rx_z": 0},
+        {"tx_y": 4, "rx_y": 0, "tx_z": 0, "rx_z": 4, "channels": "all"},
+    ],
 )
 def test_no_line_no_angle(fields: dict) -> None:
     radar = dataclasses.replace(SHORT, **fields)
@@ -261,7 +299,10 @@ def test_peaks_of_hand_made_spectra() -> None:
     sines = np.linspace(-1, 1, 201)
     shape = np.exp(-(((sines - 0.303) / 0.05) ** 2))
     power = np.stack(
-        [shape + 0.4 * np.exp(-(((sines + 0.41) / 0.05) ** 2)), shape + 0.05 * np.exp(-(((sines + 0.4) / 0.05) ** 2))]
+        [
+            shape + 0.4 * np.exp(-(((sines + 0.41) / 0.05) ** 2)),
+            shape + 0.05 * np.exp(-(((sines + 0.4) / 0.05) ** 2)),
+        ]
     )
     peaks = find_peaks(sines, (power + 1e-6).astype(np.float32))
     # The second spectrum's weaker hill is 13 dB down: no peak. A parabola through logarithms is exact on a Gaussian.
@@ -273,9 +314,22 @@ def test_peaks_of_hand_made_spectra() -> None:
 def test_a_spectrum_of_noise_has_one_peak_mostly() -> None:
     # Exponential power, as of noise in 4-fold oversampled beams of 48 channels; an echo 14 dB above it, just detected.
     random = np.random.default_rng(1)
-    noise = np.abs(np.fft.fft(random.standard_normal((2000, 48)) + 1j * random.standard_normal((2000, 48)), 192)) ** 2 / 96
+    noise = (
+        np.abs(
+            np.fft.fft(
+                random.standard_normal((2000, 48)) + 1j * random.standard_normal((2000, 48)), 192
+            )
+        )
+        ** 2
+        / 96
+    )
     noise[:, 100] += 25
-    extra = find_peaks(np.linspace(-0.8, 0.8, 192), noise.astype(np.float32)).real[:, 1:].any(axis=1).mean()
+    extra = (
+        find_peaks(np.linspace(-0.8, 0.8, 192), noise.astype(np.float32))
+        .real[:, 1:]
+        .any(axis=1)
+        .mean()
+    )
     # Law: median 0.69 of the mean, 11 dB above it 8.7 means, exp(-8.7) in each of 48 beams: 0.8 %, about twice that between
     # the beams too.
     assert extra < 0.03
@@ -300,9 +354,14 @@ def test_maps_put_a_point_where_it_is() -> None:
 def test_maps_sum_over_cells_and_name_the_line_that_is_missing() -> None:
     seen = spectra_of(SHORT, echo(SHORT, place_of(4.0, 0.0, 0.0)), 4.0)
     twice = dataclasses.replace(
-        seen, y=np.repeat(seen.y, 2, axis=0), z=np.repeat(seen.z, 2, axis=0), range_m=seen.range_m.repeat(2)
+        seen,
+        y=np.repeat(seen.y, 2, axis=0),
+        z=np.repeat(seen.z, 2, axis=0),
+        range_m=seen.range_m.repeat(2),
     )
-    np.testing.assert_allclose(range_azimuth(twice, SHORT), 2 * range_azimuth(seen, SHORT), rtol=1e-12)
+    np.testing.assert_allclose(
+        range_azimuth(twice, SHORT), 2 * range_azimuth(seen, SHORT), rtol=1e-12
+    )
     with pytest.raises(InputError, match="no line of at least 2 channels along y"):
         range_azimuth(dataclasses.replace(seen, y=None), SHORT)
     with pytest.raises(InputError, match="no line of at least 2 channels along z"):
@@ -313,13 +372,17 @@ def test_maps_sum_over_cells_and_name_the_line_that_is_missing() -> None:
 
 def test_a_line_too_long_for_its_beams_to_be_kept_is_refused() -> None:
     wide = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=1e9)
-    with pytest.raises(InputError, match=r"a line 1.17e\+09 wavelengths long.* lessen tx_spacing_wavelengths"):
+    with pytest.raises(
+        InputError, match=r"a line 1.17e\+09 wavelengths long.* lessen tx_spacing_wavelengths"
+    ):
         sine_grid(wide)
 
 
 def test_the_grid_of_sines_ends_at_the_unambiguous_angle() -> None:
     grid = sine_grid(LOW)
-    assert grid[-1] == pytest.approx(0.857, abs=1e-3)  # 12 / 14: half a wavelength of the start is 0.583 of the centre's
+    assert grid[-1] == pytest.approx(
+        0.857, abs=1e-3
+    )  # 12 / 14: half a wavelength of the start is 0.583 of the centre's
     np.testing.assert_allclose(grid, -grid[::-1], atol=1e-15)
     # A quarter of a resolution cell: the wavelength over 47 virtual spacings of 0.583 wavelengths.
     assert np.diff(grid).max() <= 1 / (47 * 7 / 12) / 4

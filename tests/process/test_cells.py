@@ -46,10 +46,15 @@ def test_cells_are_those_of_the_whole_map(data: st.DataObject, n_cycles: int) ->
 def test_every_cell_of_a_real_window() -> None:
     # Cells in all of the range, so that blocks of bins with gaps and the ends of the axis are met.
     x = noise(LOW.chirps_per_frame, LOW).astype(np.complex64)
-    rows, columns = np.array([255, 0, 107, 107, 108, 3, 250, 180]), np.array([0, 132, 66, 66, 5, 70, 131, 64])
+    rows, columns = (
+        np.array([255, 0, 107, 107, 108, 3, 250, 180]),
+        np.array([0, 132, 66, 66, 5, 70, 131, 64]),
+    )
     values = cell_spectra(cube_of(x, LOW), LOW, rows, columns)
     assert values.dtype == np.complex64
-    np.testing.assert_allclose(values[:, 4], range_doppler(x, LOW).values[rows, columns], atol=1e-6)  # complex64
+    np.testing.assert_allclose(
+        values[:, 4], range_doppler(x, LOW).values[rows, columns], atol=1e-6
+    )  # complex64
 
 
 def test_channels_of_a_long_window_in_batches_that_do_not_come_out_even() -> None:
@@ -69,10 +74,16 @@ def test_double_stays_double() -> None:
 
 def test_no_cells() -> None:
     cube = cube_of(noise(2 * SMALL.n_tx, SMALL), SMALL)
-    assert cell_spectra(cube, SMALL, [], []).shape == (0, 2 * range_walk(SMALL) + 1, SMALL.n_channels)
+    assert cell_spectra(cube, SMALL, [], []).shape == (
+        0,
+        2 * range_walk(SMALL) + 1,
+        SMALL.n_channels,
+    )
 
 
-@pytest.mark.parametrize(("radar", "walk"), [(LOW, 4), (Radar.preset("paper-77ghz"), 1)], ids=["12 GHz", "77 GHz"])
+@pytest.mark.parametrize(
+    ("radar", "walk"), [(LOW, 4), (Radar.preset("paper-77ghz"), 1)], ids=["12 GHz", "77 GHz"]
+)
 def test_range_walk_by_hand(radar: Radar, walk: int) -> None:
     # End elements: 10 + 1.75 wavelengths of the start off the middle, half of it one way, 12 GHz: 0.1468 m x sin(59 deg) =
     # 0.126 m = 3.4 bins; 77 GHz: 0.0229 m x sin(77 deg) = 0.6 bins.

@@ -54,7 +54,11 @@ def test_against_sorting(shape, guard, train, quantile, looks, single, seed) -> 
     np.testing.assert_array_equal(ca_cfar(power, guard, train, pfa, looks), averaged)
 
 
-@given(shape=st.tuples(st.integers(1, 20), st.integers(4, 20)), scale=st.floats(0.5, 6.0), seed=st.integers(0, 2**32 - 1))
+@given(
+    shape=st.tuples(st.integers(1, 20), st.integers(4, 20)),
+    scale=st.floats(0.5, 6.0),
+    seed=st.integers(0, 2**32 - 1),
+)
 @settings(max_examples=30, deadline=None)
 def test_given_multiplier(shape, scale, seed) -> None:
     power = np.random.default_rng(seed).exponential(size=shape)

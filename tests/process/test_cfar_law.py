@@ -22,7 +22,9 @@ def integral(f, highest: float) -> float:
     """Integral from 0 of a function with one peak, split there."""
     x = np.linspace(highest * 1e-6, highest, 200_001)
     alive = x[f(x) > f(x).max() * 1e-18]
-    return quad(f, alive[0], alive[-1], points=[x[f(x).argmax()]], epsabs=0, epsrel=1e-11, limit=500)[0]
+    return quad(
+        f, alive[0], alive[-1], points=[x[f(x).argmax()]], epsabs=0, epsrel=1e-11, limit=500
+    )[0]
 
 
 def gamma_density(x, shape: int):
@@ -37,7 +39,10 @@ def os_pfa(alpha: float, n: int, k: int, looks: int) -> float:
 
 def ca_pfa(alpha: float, n: int, looks: int) -> float:
     """The sum of the n training cells follows the Gamma law too; average over it."""
-    return integral(lambda t: gamma_density(t, n * looks) * gammaincc(looks, alpha * t / n), 3.0 * n * looks + 60)
+    return integral(
+        lambda t: gamma_density(t, n * looks) * gammaincc(looks, alpha * t / n),
+        3.0 * n * looks + 60,
+    )
 
 
 @given(
@@ -67,9 +72,13 @@ def test_one_look_is_rohlings_product(n: int, quantile: float, log_pfa: float) -
         (144, 1, 0.5, 8),
     ],
 )
-def test_many_looks_against_the_other_integral(n: int, quantile: float, pfa: float, looks: int) -> None:
+def test_many_looks_against_the_other_integral(
+    n: int, quantile: float, pfa: float, looks: int
+) -> None:
     alpha = os_scale(n, quantile, pfa, looks)
-    assert os_pfa(alpha, n, order_rank(n, quantile), looks) == pytest.approx(pfa, rel=1e-8)  # the two quadratures
+    assert os_pfa(alpha, n, order_rank(n, quantile), looks) == pytest.approx(
+        pfa, rel=1e-8
+    )  # the two quadratures
 
 
 @given(
@@ -93,9 +102,13 @@ def test_cell_averaging_of_one_look(n: int, log_pfa: float) -> None:
     assert ca_scale(n, math.exp(log_pfa)) == pytest.approx(n * math.expm1(-log_pfa / n), rel=1e-9)
 
 
-@pytest.mark.parametrize(("n", "pfa", "looks"), [(144, 1e-6, 96), (8, 1e-12, 192), (144, 0.9, 3), (40, 1e-3, 2)])
+@pytest.mark.parametrize(
+    ("n", "pfa", "looks"), [(144, 1e-6, 96), (8, 1e-12, 192), (144, 0.9, 3), (40, 1e-3, 2)]
+)
 def test_cell_averaging_of_many_looks(n: int, pfa: float, looks: int) -> None:
-    assert ca_pfa(ca_scale(n, pfa, looks), n, looks) == pytest.approx(pfa, rel=1e-8)  # the quadrature
+    assert ca_pfa(ca_scale(n, pfa, looks), n, looks) == pytest.approx(
+        pfa, rel=1e-8
+    )  # the quadrature
 
 
 def test_known_multipliers() -> None:
@@ -106,7 +119,10 @@ def test_known_multipliers() -> None:
     assert os_scale(1, 0.75, 0.01, looks=5) == pytest.approx(ca_scale(1, 0.01, looks=5), rel=1e-9)
 
 
-@pytest.mark.parametrize(("n", "quantile", "rank"), [(144, 0.75, 108), (30, 0.1, 3), (7, 0.75, 6), (5, 1.0, 5), (3, 0.01, 1)])
+@pytest.mark.parametrize(
+    ("n", "quantile", "rank"),
+    [(144, 0.75, 108), (30, 0.1, 3), (7, 0.75, 6), (5, 1.0, 5), (3, 0.01, 1)],
+)
 def test_rank(n: int, quantile: float, rank: int) -> None:
     assert order_rank(n, quantile) == rank
 

@@ -9,10 +9,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rtradar.errors import InputError
-from rtradar.process import CLUTTER_REMOVALS, ClutterRemoval, SlidingWindows, clutter_removal, power_map
+from rtradar.process import (
+    CLUTTER_REMOVALS,
+    ClutterRemoval,
+    SlidingWindows,
+    clutter_removal,
+    power_map,
+)
 from rtradar.radar import Radar
 
-RADAR = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=4, chirp_duration_s=1e-4, frame_duration_s=19.2e-3)
+RADAR = Radar(
+    tx_y=2,
+    tx_z=1,
+    rx_y=2,
+    rx_z=2,
+    samples_per_chirp=4,
+    chirp_duration_s=1e-4,
+    frame_duration_s=19.2e-3,
+)
 CYCLES = 64
 SETTINGS: list[tuple[str, dict[str, Any]]] = [
     ("none", {}),
@@ -36,7 +50,9 @@ def tone(n_cycles: int, turns_per_cycle: float, seed: int = 0, radar: Radar = RA
     return (phase[:, None, None, None] * amplitude).reshape(-1, *amplitude.shape[1:])
 
 
-def removed(method: str, spectra: np.ndarray, *, radar: Radar = RADAR, **options: Any) -> np.ndarray:
+def removed(
+    method: str, spectra: np.ndarray, *, radar: Radar = RADAR, **options: Any
+) -> np.ndarray:
     """Both steps on a stream that is one window, (cycle, tx, rx, range)."""
     removal = clutter_removal(method, radar, **options)
     cube = removal.block(spectra, 0).reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
@@ -54,7 +70,9 @@ def test_of_a_still_room_nothing_is_left(method: str, options: dict[str, Any], k
     left = removed(method, still, **options)
     assert left.dtype == kind
     if kind == np.complex64 or method != "mean":
-        assert (left == 0).all()  # differences of equal numbers; the sum of 64 equal float32 is exact in float64
+        assert (
+            left == 0
+        ).all()  # differences of equal numbers; the sum of 64 equal float32 is exact in float64
     else:
         # 64 roundings of the sum at worst, each half a unit of float64 of at most 64 values.
         assert abs(left).max() <= 64 * 2**-53 * abs(still).max() * math.sqrt(2)
@@ -64,11 +82,15 @@ def test_of_a_still_room_nothing_is_left(method: str, options: dict[str, Any], k
 @pytest.mark.parametrize("kind", [np.complex64, np.complex128])
 def test_the_mean_of_few_and_of_many_cells(cells: int, kind: type) -> None:
     rng = np.random.default_rng(0)
-    cycles = (rng.standard_normal((CYCLES, cells)) + 1j * rng.standard_normal((CYCLES, cells))).astype(kind)
+    cycles = (
+        rng.standard_normal((CYCLES, cells)) + 1j * rng.standard_normal((CYCLES, cells))
+    ).astype(kind)
     left = clutter_removal("mean", RADAR).window(cycles)
     assert left.dtype == kind
     # Some roundings of values up to 5.
-    np.testing.assert_allclose(left, cycles - cycles.mean(axis=0, dtype=complex), atol=20 * np.finfo(kind).eps)
+    np.testing.assert_allclose(
+        left, cycles - cycles.mean(axis=0, dtype=complex), atol=20 * np.finfo(kind).eps
+    )
 
 
 @pytest.mark.parametrize("pulses", [2, 3])
@@ -80,7 +102,9 @@ def test_response_of_mti(pulses: int, turns: float) -> None:
     order = pulses - 1
     assert (y[:order] == 0).all()
     gain = (1 - np.exp(-2j * np.pi * turns)) ** order / math.sqrt({1: 2, 2: 6}[order])
-    assert abs(gain) == pytest.approx(abs(2 * math.sin(math.pi * turns)) ** order / math.sqrt({1: 2, 2: 6}[order]), abs=1e-14)
+    assert abs(gain) == pytest.approx(
+        abs(2 * math.sin(math.pi * turns)) ** order / math.sqrt({1: 2, 2: 6}[order]), abs=1e-14
+    )
     # Rounding of float64: of the phase, 2 pi 64 at most, and of a few sums.
     np.testing.assert_allclose(y[order:], gain * x[order:], rtol=0, atol=1e-12)
 
@@ -91,7 +115,9 @@ def test_exponential_against_its_response(turns: float, cycles_of_time: float) -
     n = 600
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=1, chirp_duration_s=1e-3)
     x = tone(n, turns, radar=radar)[:, 0, 0]
-    y = removed("exponential", x[:, None, None], radar=radar, time_constant_s=cycles_of_time * 1e-3)[:, 0, 0, 0]
+    y = removed(
+        "exponential", x[:, None, None], radar=radar, time_constant_s=cycles_of_time * 1e-3
+    )[:, 0, 0, 0]
     share = 1 - math.exp(-1 / cycles_of_time)
     turn = np.exp(-2j * np.pi * turns)
     steady = (1 - turn) / (1 - (1 - share) * turn)
@@ -123,13 +149,22 @@ def test_mean_leaves_a_moving_echo_outside_the_lobe_about_zero(turns: float) -> 
     outside = np.setdiff1d(np.arange(CYCLES), lobe)
     peak = powers[0].max()
     # A constant fills three bins of a Hann window and no other; what differs is rounding of float64.
-    np.testing.assert_allclose(powers[1][:, outside], powers[0][:, outside], rtol=0, atol=1e-13 * peak)
+    np.testing.assert_allclose(
+        powers[1][:, outside], powers[0][:, outside], rtol=0, atol=1e-13 * peak
+    )
     # At zero it leaves the mean of the tone as a ghost: sin(pi d) / (N sin(pi d / N)), halved in the bins beside it.
     mean = abs(np.exp(2j * np.pi * turns / CYCLES * np.arange(CYCLES)).mean())
-    assert mean == pytest.approx(abs(math.sin(math.pi * turns) / (CYCLES * math.sin(math.pi * turns / CYCLES))), abs=1e-12)
+    assert mean == pytest.approx(
+        abs(math.sin(math.pi * turns) / (CYCLES * math.sin(math.pi * turns / CYCLES))), abs=1e-12
+    )
     amplitude = (abs(before[0]) ** 2).sum(axis=(0, 1))
     hann = np.sin(np.pi * np.arange(CYCLES) / CYCLES) ** 2
-    hann_leak = np.array([abs(np.fft.fft(np.exp(2j * np.pi * turns / CYCLES * np.arange(CYCLES)) * hann)[0]) / (CYCLES / 2)])
+    hann_leak = np.array(
+        [
+            abs(np.fft.fft(np.exp(2j * np.pi * turns / CYCLES * np.arange(CYCLES)) * hann)[0])
+            / (CYCLES / 2)
+        ]
+    )
     assert (abs(np.sqrt(powers[1][:, zero] / amplitude) - mean) <= hann_leak + 1e-12).all()
 
 
@@ -140,14 +175,18 @@ def test_superposition(method: str, options: dict[str, Any], seed: int, factor: 
     a, b = noise(CYCLES, seed), noise(CYCLES, seed + 1) * np.exp(1j)
     together = removed(method, a + factor * b, **options)
     apart = removed(method, a, **options) + factor * removed(method, b, **options)
-    np.testing.assert_allclose(together, apart, rtol=0, atol=1e-13)  # rounding of float64 of values up to 20
+    np.testing.assert_allclose(
+        together, apart, rtol=0, atol=1e-13
+    )  # rounding of float64 of values up to 20
 
 
 @pytest.mark.parametrize("kind", [np.complex64, np.complex128])
 @pytest.mark.parametrize(("method", "options"), SETTINGS)
 @given(cuts=st.lists(st.integers(0, CYCLES), max_size=12), seed=st.integers(0, 2**32 - 1))
 @settings(max_examples=25, deadline=None)
-def test_any_cut_gives_the_same_bits(method: str, options: dict[str, Any], kind: type, cuts: list[int], seed: int) -> None:
+def test_any_cut_gives_the_same_bits(
+    method: str, options: dict[str, Any], kind: type, cuts: list[int], seed: int
+) -> None:
     x = noise(CYCLES, seed).astype(kind)
     whole = clutter_removal(method, RADAR, **options).block(x, 0)
     removal = clutter_removal(method, RADAR, **options)
@@ -170,7 +209,9 @@ def test_what_is_given_is_not_written_to(method: str, options: dict[str, Any]) -
 
 
 @pytest.mark.parametrize(("method", "options"), SETTINGS)
-def test_a_stream_may_begin_anywhere_and_through_windows(method: str, options: dict[str, Any]) -> None:
+def test_a_stream_may_begin_anywhere_and_through_windows(
+    method: str, options: dict[str, Any]
+) -> None:
     x = (tone(6 * CYCLES, 0.0) * 100 + tone(6 * CYCLES, 0.25, seed=1)).astype(np.complex64)
     removal, windows = clutter_removal(method, RADAR, **options), SlidingWindows(RADAR)
     block = 20 * RADAR.n_tx
@@ -180,7 +221,9 @@ def test_a_stream_may_begin_anywhere_and_through_windows(method: str, options: d
         maps += [power_map(removal.window(cube), RADAR) for _, _, cube in windows.push(left)]
     assert len(maps) >= 3
     zero = CYCLES // 2
-    for power in maps[2:]:  # the first windows hold the start of the stream, and its background the mover
+    for power in maps[
+        2:
+    ]:  # the first windows hold the start of the stream, and its background the mover
         still, mover = power[:, zero].sum(), power[:, zero + CYCLES // 4].sum()
         assert (still > 1e3 * mover) if method == "none" else (still < 1e-8 * mover)
 

@@ -30,20 +30,30 @@ APART = tiny_radar(16, 16)
 OVERLAPPING = tiny_radar(16, 4)
 
 
-@given(n=st.integers(1, 200), looks=st.sampled_from([1, 2, 12, 96]), log_pfa=st.floats(math.log(1e-12), math.log(0.9)))
+@given(
+    n=st.integers(1, 200),
+    looks=st.sampled_from([1, 2, 12, 96]),
+    log_pfa=st.floats(math.log(1e-12), math.log(0.9)),
+)
 @settings(max_examples=60, deadline=None)
 def test_equal_weights_are_cell_averaging(n: int, looks: int, log_pfa: float) -> None:
     pfa = math.exp(log_pfa)
     # Both are solved to about 1e-11; at 0.9 the rate hardly depends on the multiplier.
-    assert clutter_map_scale(np.full(n, 1 / n), pfa, looks) == pytest.approx(ca_scale(n, pfa, looks), rel=1e-9)
+    assert clutter_map_scale(np.full(n, 1 / n), pfa, looks) == pytest.approx(
+        ca_scale(n, pfa, looks), rel=1e-9
+    )
 
 
 @given(share=st.floats(0.01, 0.9), log_pfa=st.floats(math.log(1e-10), math.log(0.5)))
 @settings(max_examples=40, deadline=None)
-def test_one_look_of_the_exponential_filter_is_nitzbergs_product(share: float, log_pfa: float) -> None:
+def test_one_look_of_the_exponential_filter_is_nitzbergs_product(
+    share: float, log_pfa: float
+) -> None:
     weights = share * (1 - share) ** np.arange(2000)
     alpha = clutter_map_scale(weights, math.exp(log_pfa))
-    assert -np.log1p(alpha * weights).sum() == pytest.approx(log_pfa, abs=1e-8)  # the rate is 30 times as steep as alpha
+    assert -np.log1p(alpha * weights).sum() == pytest.approx(
+        log_pfa, abs=1e-8
+    )  # the rate is 30 times as steep as alpha
 
 
 @pytest.mark.parametrize(("looks", "pfa"), [(1, 1e-3), (4, 1e-2), (12, 1e-6)])
@@ -56,7 +66,15 @@ def test_two_weights_against_the_integral(looks: int, pfa: float) -> None:
         f = lambda y: density(y) * gammaincc(looks, alpha * (weights[0] * x + weights[1] * y))  # noqa: E731
         return quad(f, 0, 100, points=[0.01, 1, looks], epsabs=0, epsrel=1e-9, limit=200)[0]
 
-    rate = quad(lambda x: density(x) * inner(x), 0, 100, points=[0.01, 1, looks], epsabs=0, epsrel=1e-8, limit=200)[0]
+    rate = quad(
+        lambda x: density(x) * inner(x),
+        0,
+        100,
+        points=[0.01, 1, looks],
+        epsabs=0,
+        epsrel=1e-8,
+        limit=200,
+    )[0]
     assert rate == pytest.approx(pfa, rel=1e-6)  # the two quadratures
 
 
@@ -68,11 +86,15 @@ def test_two_weights_against_the_integral(looks: int, pfa: float) -> None:
 @settings(max_examples=30, deadline=None)
 def test_unit_of_the_weights(weights: list[float], factor: float, looks: int) -> None:
     alpha = clutter_map_scale(weights, 1e-4, looks)
-    assert clutter_map_scale(np.array([*weights, 0.0]) * factor, 1e-4, looks) * factor == pytest.approx(alpha, rel=1e-9)
+    assert clutter_map_scale(
+        np.array([*weights, 0.0]) * factor, 1e-4, looks
+    ) * factor == pytest.approx(alpha, rel=1e-9)
 
 
 def test_many_looks_do_not_overflow() -> None:
-    assert clutter_map_scale(np.full(3, 1 / 3), 1e-6, 3000) == pytest.approx(ca_scale(3, 1e-6, 3000), rel=1e-9)
+    assert clutter_map_scale(np.full(3, 1 / 3), 1e-6, 3000) == pytest.approx(
+        ca_scale(3, 1e-6, 3000), rel=1e-9
+    )
 
 
 @given(data=st.data())
@@ -82,7 +104,9 @@ def test_map_against_weights_by_hand(data: st.DataObject) -> None:
     hop = radar.frame_hop_s
     time_constant_s = data.draw(st.floats(0.5, 5.0), "time constant") * hop
     n = data.draw(st.integers(1, 25), "windows")
-    power = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1), "seed")).exponential(size=(n, 3, 5))
+    power = np.random.default_rng(data.draw(st.integers(0, 2**32 - 1), "seed")).exponential(
+        size=(n, 3, 5)
+    )
     scale = 1.7
     clutter = ClutterMap(radar, time_constant_s=time_constant_s, scale=scale)
     share = 1 - math.exp(-hop / time_constant_s)
@@ -113,7 +137,9 @@ def test_a_still_room_is_learnt_and_a_mover_is_found(radar: Radar) -> None:
     for window in range(40):
         power = rng.gamma(96, size=(30, 16))
         power[10, 8] += 1e6  # the room
-        power[window % 30, 3] *= 4  # the mover, of 5 dB of signal to noise, changes its range cell from window to window
+        power[window % 30, 3] *= (
+            4  # the mover, of 5 dB of signal to noise, changes its range cell from window to window
+        )
         found.append(clutter.push(power))
     for window in range(8, 30):
         assert found[window][window % 30, 3]
@@ -165,7 +191,9 @@ def test_overlapping_windows_by_brute_force() -> None:
         clutter.push(np.ones((1, 1)))
     rate = np.exp(-clutter._multiplier() * level)
     assert clutter._count == count
-    assert rate.mean() == pytest.approx(1e-2, rel=5 * rate.std() / rate.mean() / math.sqrt(len(rate)))  # five deviations
+    assert rate.mean() == pytest.approx(
+        1e-2, rel=5 * rate.std() / rate.mean() / math.sqrt(len(rate))
+    )  # five deviations
     assert 5 * rate.std() / rate.mean() / math.sqrt(len(rate)) < 0.05
 
 
@@ -234,7 +262,13 @@ def test_bad_maps(radar: Radar, power: np.ndarray, message: str) -> None:
 
 @pytest.mark.parametrize(
     ("weights", "message"),
-    [([], "sum to 0"), ([0.0], "sum to 0"), ([-1.0], "at least 0"), ([[1.0]], "at least 0"), ("a", "finite")],
+    [
+        ([], "sum to 0"),
+        ([0.0], "sum to 0"),
+        ([-1.0], "at least 0"),
+        ([[1.0]], "at least 0"),
+        ("a", "finite"),
+    ],
 )
 def test_bad_weights(weights: object, message: str) -> None:
     with pytest.raises(InputError, match=message):

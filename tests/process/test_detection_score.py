@@ -51,7 +51,9 @@ def test_nothing_detected_or_nothing_there_has_no_rate() -> None:
 
 def test_targets_stand_above_the_margin() -> None:
     # 2 x 10^(13/10) = 39.905
-    np.testing.assert_array_equal(target_cells([[39.90, 39.91, 2.0]], 2.0, 13.0), [[False, True, False]])
+    np.testing.assert_array_equal(
+        target_cells([[39.90, 39.91, 2.0]], 2.0, 13.0), [[False, True, False]]
+    )
 
 
 @pytest.mark.parametrize("channel", [None, 5])
@@ -62,7 +64,9 @@ def test_noise_power_of_a_cell_is_what_noise_leaves_there(channel: int | None) -
     means = []
     for _ in range(40):
         noise = (rng.standard_normal(shape) + 1j * rng.standard_normal(shape)) * math.sqrt(0.7 / 2)
-        cube = range_spectrum(noise, SMALL).reshape(-1, SMALL.n_tx, SMALL.n_rx, SMALL.samples_per_chirp)
+        cube = range_spectrum(noise, SMALL).reshape(
+            -1, SMALL.n_tx, SMALL.n_rx, SMALL.samples_per_chirp
+        )
         means.append(power_map(cube, SMALL, channel=channel).mean())
     error = np.std(means, ddof=1) / math.sqrt(len(means))
     # Four standard errors; they are 1.2 % (one channel) and 0.1 % (96), so a wrong window or a lost factor 2 shows.
@@ -71,12 +75,18 @@ def test_noise_power_of_a_cell_is_what_noise_leaves_there(channel: int | None) -
 
 def test_noise_power_of_hann_windows_in_closed_form() -> None:
     # sum(w^2) / sum(w)^2 of a periodic Hann window of n samples is (3n/8) / (n/2)^2 = 1.5 / n.
-    assert cell_noise_power(2.0, SMALL, looks=3) == pytest.approx(3 * 2.0 * 1.5 / 32 * 1.5 / SMALL.cycles_per_frame, rel=1e-12)
+    assert cell_noise_power(2.0, SMALL, looks=3) == pytest.approx(
+        3 * 2.0 * 1.5 / 32 * 1.5 / SMALL.cycles_per_frame, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize(
     ("mask", "truth"),
-    [(np.zeros(3, bool), np.zeros(4, bool)), (np.zeros(3), np.zeros(3, bool)), (np.zeros(3, bool), np.zeros(3, int))],
+    [
+        (np.zeros(3, bool), np.zeros(4, bool)),
+        (np.zeros(3), np.zeros(3, bool)),
+        (np.zeros(3, bool), np.zeros(3, int)),
+    ],
 )
 def test_masks_that_do_not_fit_are_refused(mask: np.ndarray, truth: np.ndarray) -> None:
     with pytest.raises(InputError, match="boolean") as error:

@@ -12,7 +12,15 @@ from numpy.typing import NDArray
 from rtradar.process import SlidingRangeTime, clutter_removal, range_time
 from rtradar.radar import Radar
 
-RADAR = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=8, chirp_duration_s=250e-6, frame_duration_s=0.05)
+RADAR = Radar(
+    tx_y=2,
+    tx_z=0,
+    rx_y=2,
+    rx_z=0,
+    samples_per_chirp=8,
+    chirp_duration_s=250e-6,
+    frame_duration_s=0.05,
+)
 STEP = 10  # cycles of 0.5 ms in 5 ms; a window holds ten steps
 WINDOW = 100
 
@@ -22,9 +30,14 @@ def streamed(
 ) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
     removal = clutter_removal(method, radar)
     sliding = SlidingRangeTime(radar, removal)
-    found = [sliding.push(removal.block(spectra[at : at + block], at), at) for at in range(0, len(spectra), block)]
+    found = [
+        sliding.push(removal.block(spectra[at : at + block], at), at)
+        for at in range(0, len(spectra), block)
+    ]
     found.append(sliding.finish())
-    return np.concatenate([power for power, _ in found]), np.concatenate([times for _, times in found])
+    return np.concatenate([power for power, _ in found]), np.concatenate(
+        [times for _, times in found]
+    )
 
 
 def noise(n_cycles: int, radar: Radar = RADAR) -> NDArray[np.complex64]:
@@ -35,7 +48,9 @@ def noise(n_cycles: int, radar: Radar = RADAR) -> NDArray[np.complex64]:
 
 def written_out(spectra: NDArray[np.complexfloating]) -> NDArray[np.float64]:
     """Each step less the mean over the ten steps about it, shifted into the capture at its ends."""
-    steps = spectra.astype(np.complex128).reshape(-1, STEP, RADAR.n_tx, RADAR.n_rx, RADAR.samples_per_chirp)
+    steps = spectra.astype(np.complex128).reshape(
+        -1, STEP, RADAR.n_tx, RADAR.n_rx, RADAR.samples_per_chirp
+    )
     out = []
     for number, step in enumerate(steps):
         first = min(max(number - 5, 0), max(len(steps) - 10, 0))
@@ -49,7 +64,9 @@ def test_the_mean_over_the_window_about_each_step_is_removed(block: int) -> None
     spectra = noise(40 * STEP) + 3.0
     power, times = streamed(spectra, "mean", block * RADAR.n_tx)
     np.testing.assert_allclose(power, written_out(spectra), rtol=1e-5)  # complex64
-    np.testing.assert_allclose(times, (np.arange(40) + 0.5) * STEP * RADAR.cycle_duration_s, rtol=1e-12)
+    np.testing.assert_allclose(
+        times, (np.arange(40) + 0.5) * STEP * RADAR.cycle_duration_s, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("steps", [1, 4, 10, 11])
@@ -75,7 +92,9 @@ def test_a_room_goes_and_a_walker_stays() -> None:
     # At 1 m/s the phase turns by 4 pi v T / lambda: 9 Doppler bins of the window, far from zero Doppler.
     turns = np.exp(4j * math.pi * 1.0 * cycles * RADAR.cycle_duration_s / RADAR.wavelength_m)
     both = room + turns[:, None] * walker
-    spectra = np.broadcast_to(both[:, None, None], (len(cycles), RADAR.n_tx, RADAR.n_rx, 8)).reshape(-1, RADAR.n_rx, 8)
+    spectra = np.broadcast_to(
+        both[:, None, None], (len(cycles), RADAR.n_tx, RADAR.n_rx, 8)
+    ).reshape(-1, RADAR.n_rx, 8)
     power, _ = streamed(spectra.astype(np.complex64), "mean", len(spectra))
     assert power[:, 2].max() < 1e-12 * 1000**2  # what complex64 leaves
     # A still window takes sinc(d) of an echo d = 4.67 bins fast, at most 1 / (pi d): 7 % of its amplitude.
@@ -86,8 +105,12 @@ def test_a_room_goes_and_a_walker_stays() -> None:
 def test_who_stands_still_for_a_window_goes_with_the_room() -> None:
     """Half a second at rest, then 1 m/s: the first half reads nothing but near its end, the second reads 1."""
     rest = np.zeros(1000)
-    phase = np.cumsum(np.append(rest, np.full(1000, 4 * math.pi * RADAR.cycle_duration_s / RADAR.wavelength_m)))
-    spectra = np.broadcast_to(np.exp(1j * phase)[:, None, None, None], (2000, RADAR.n_tx, RADAR.n_rx, 8))
+    phase = np.cumsum(
+        np.append(rest, np.full(1000, 4 * math.pi * RADAR.cycle_duration_s / RADAR.wavelength_m))
+    )
+    spectra = np.broadcast_to(
+        np.exp(1j * phase)[:, None, None, None], (2000, RADAR.n_tx, RADAR.n_rx, 8)
+    )
     power, times = streamed(spectra.reshape(-1, RADAR.n_rx, 8).astype(np.complex64), "mean", 400)
     half = WINDOW / 2 * RADAR.cycle_duration_s
     assert power[times < 0.5 - half, 0].max() < 1e-12
@@ -111,6 +134,9 @@ def test_uneven_steps_count_by_their_cycles() -> None:
     power, times = streamed(spectra, "mean", 25 * RADAR.n_tx, radar)
     whole = spectra.astype(np.complex128).reshape(100, -1, 8)
     left = abs(whole - whole.mean(axis=0)) ** 2
-    expected = [left[first : first + count].mean(axis=(0, 1)) for first, count in ((0, 10), (10, 10), (20, 5), (25, 10))]
+    expected = [
+        left[first : first + count].mean(axis=(0, 1))
+        for first, count in ((0, 10), (10, 10), (20, 5), (25, 10))
+    ]
     np.testing.assert_allclose(power[:4], expected, rtol=1e-5)
     assert len(times) == 12

@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 
 PRODUCTS = [
-    (n, [(a, n // a) for a in range(2, 41) if n % a == 0 and 2 <= n // a <= 40 and gcd(a, n // a) == 1]) for n in range(1, 700)
+    (
+        n,
+        [
+            (a, n // a)
+            for a in range(2, 41)
+            if n % a == 0 and 2 <= n // a <= 40 and gcd(a, n // a) == 1
+        ],
+    )
+    for n in range(1, 700)
 ]
 
 
@@ -36,7 +44,11 @@ def test_it_serves_numbers_of_cycles_with_two_small_coprime_factors_and_no_other
 )
 def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, seed: int) -> None:
     rng = np.random.default_rng(seed)
-    spectra = rng.standard_normal((n_cycles, channels, n_range, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    spectra = (
+        rng.standard_normal((n_cycles, channels, n_range, 2))
+        .astype(np.float32)
+        .view(np.complex64)[..., 0]
+    )
     weights = rng.uniform(0, 1, n_cycles).astype(np.float32)
     before = rng.uniform(0, 1, (n_cycles, n_range)).astype(np.float32)
     power, dft = before.copy(), slow_time_dft(n_cycles)
@@ -73,7 +85,9 @@ for n_cycles in (2 * 37, 38 * 37, 39 * 37, 40 * 37):
 def test_the_longest_tables_have_room(tmp_path: Path) -> None:
     # What is read beyond an array is times 0 here, and most often a number: only checked code is sure to tell.
     environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
-    done = subprocess.run([sys.executable, "-c", BOUNDS], env=environment, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", BOUNDS], env=environment, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -84,7 +98,9 @@ def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
     n = np.arange(n_cycles)
     tones = np.exp(2j * np.pi * np.outer(n, n) / n_cycles).astype(np.complex64)[:, None]
     power = np.zeros((n_cycles, n_cycles), dtype=np.float32)
-    add_doppler_power(tones, range(1), np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power)
+    add_doppler_power(
+        tones, range(1), np.full(n_cycles, 1 / n_cycles, dtype=np.float32), dft, power
+    )
     np.testing.assert_allclose(power, np.eye(n_cycles), atol=1e-6)
 
 

@@ -11,7 +11,15 @@ from rtradar.process import power_map, range_doppler, range_spectrum, range_time
 from rtradar.radar import Radar
 
 # Small in every axis; 1.2 ms of 20 cycles, bins of 3.75 cm and 0.6 m/s.
-SMALL = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=32, frame_duration_s=3.75e-3, chirp_duration_s=62.5e-6)
+SMALL = Radar(
+    tx_y=2,
+    tx_z=1,
+    rx_y=2,
+    rx_z=2,
+    samples_per_chirp=32,
+    frame_duration_s=3.75e-3,
+    chirp_duration_s=62.5e-6,
+)
 
 
 def noise(radar: Radar, n_chirps: int, seed: int = 0) -> np.ndarray:
@@ -23,7 +31,11 @@ def noise(radar: Radar, n_chirps: int, seed: int = 0) -> np.ndarray:
 def point_echo(radar: Radar, n_chirps: int, range_m: float, velocity_mps: float) -> np.ndarray:
     """IF of a point without delay differences over the array; ``range_m`` is where it is in the middle of the capture."""
     times = radar.chirp_times(n_chirps)
-    tau = 2 * (range_m + velocity_mps * (times - n_chirps * radar.chirp_duration_s / 2)) / SPEED_OF_LIGHT_MPS
+    tau = (
+        2
+        * (range_m + velocity_mps * (times - n_chirps * radar.chirp_duration_s / 2))
+        / SPEED_OF_LIGHT_MPS
+    )
     fast = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
     slope = radar.slope_hz_per_s
     delay = tau[:, None]
@@ -43,7 +55,12 @@ def test_point_reads_back(preset: str, velocity: float) -> None:
     # One Tx and one Rx with the cycle of the presets: the same axes at a twelfth of the work.
     whole = Radar.preset(preset)
     radar = Radar(
-        start_frequency_hz=whole.start_frequency_hz, chirp_duration_s=whole.cycle_duration_s, tx_y=1, tx_z=0, rx_y=1, rx_z=0
+        start_frequency_hz=whole.start_frequency_hz,
+        chirp_duration_s=whole.cycle_duration_s,
+        tx_y=1,
+        tx_z=0,
+        rx_y=1,
+        rx_z=0,
     )
     n = radar.cycles_per_frame
     truth_m = 4.321
@@ -53,7 +70,9 @@ def test_point_reads_back(preset: str, velocity: float) -> None:
     # reads as 0.02 bins of range (12 GHz).
     assert abs(centroid(power.sum(axis=1)) - truth_m / radar.range_bin_m) < 0.03
     doppler = power.sum(axis=0)
-    assert abs(centroid(doppler) - n // 2 - velocity / radar.velocity_bin_mps) < 0.01  # measured 0.001
+    assert (
+        abs(centroid(doppler) - n // 2 - velocity / radar.velocity_bin_mps) < 0.01
+    )  # measured 0.001
     assert abs(spectra.velocity[doppler.argmax()] - velocity) <= radar.velocity_bin_mps
     assert spectra.velocity[n // 2] == 0
 
@@ -62,8 +81,16 @@ def test_point_reads_back(preset: str, velocity: float) -> None:
 def test_unit_tone_on_a_bin_reads_one(doppler_bin: int) -> None:
     n, range_bin = 20, 7
     cycle, sample = np.arange(n), np.arange(SMALL.samples_per_chirp)
-    tone = np.exp(2j * np.pi * (doppler_bin * cycle[:, None] / n + range_bin * sample / SMALL.samples_per_chirp))
-    x = np.repeat(np.repeat(tone[:, None], SMALL.n_tx, axis=1).reshape(-1, 1, SMALL.samples_per_chirp), SMALL.n_rx, axis=1)
+    tone = np.exp(
+        2j
+        * np.pi
+        * (doppler_bin * cycle[:, None] / n + range_bin * sample / SMALL.samples_per_chirp)
+    )
+    x = np.repeat(
+        np.repeat(tone[:, None], SMALL.n_tx, axis=1).reshape(-1, 1, SMALL.samples_per_chirp),
+        SMALL.n_rx,
+        axis=1,
+    )
     spectra = range_doppler(x, SMALL)
     expected = np.zeros(spectra.values.shape[:2])
     expected[range_bin, n // 2 + doppler_bin] = 1
@@ -72,7 +99,9 @@ def test_unit_tone_on_a_bin_reads_one(doppler_bin: int) -> None:
     for k in (-1, 1):
         expected[:, (n // 2 + doppler_bin + k) % n] += 0.5 * expected[:, n // 2 + doppler_bin]
     for channel in range(SMALL.n_channels):
-        np.testing.assert_allclose(np.abs(spectra.values[..., channel]), expected, atol=1e-12)  # rounding of float64
+        np.testing.assert_allclose(
+            np.abs(spectra.values[..., channel]), expected, atol=1e-12
+        )  # rounding of float64
 
 
 def test_channels_are_tx_times_rx() -> None:
@@ -84,7 +113,9 @@ def test_channels_are_tx_times_rx() -> None:
     assert lit.tolist() == [2 * SMALL.n_rx + 1]
 
 
-@pytest.mark.parametrize(("given", "kind"), [("f4", "c8"), ("c8", "c8"), ("f8", "c16"), ("c16", "c16")])
+@pytest.mark.parametrize(
+    ("given", "kind"), [("f4", "c8"), ("c8", "c8"), ("f8", "c16"), ("c16", "c16")]
+)
 def test_single_stays_single_and_double_double(given: str, kind: str) -> None:
     ones = np.ones((3, SMALL.n_rx, SMALL.samples_per_chirp), given)
     assert range_doppler(ones, SMALL).values.dtype == np.dtype(kind)
@@ -111,10 +142,14 @@ def test_parseval() -> None:
 def test_turning_the_samples_moves_the_map(shift_range: int, shift_doppler: int) -> None:
     n, x = 10, noise(SMALL, 30)
     cycle = np.repeat(np.arange(n), SMALL.n_tx)
-    turn = np.exp(2j * np.pi * (shift_range * np.arange(32) / 32 + shift_doppler * cycle[:, None, None] / n))
+    turn = np.exp(
+        2j * np.pi * (shift_range * np.arange(32) / 32 + shift_doppler * cycle[:, None, None] / n)
+    )
     moved = np.abs(range_doppler(x * turn, SMALL).values)
     still = np.abs(range_doppler(x, SMALL).values)
-    np.testing.assert_allclose(moved, np.roll(still, (shift_range, shift_doppler), axis=(0, 1)), atol=1e-12)  # float64
+    np.testing.assert_allclose(
+        moved, np.roll(still, (shift_range, shift_doppler), axis=(0, 1)), atol=1e-12
+    )  # float64
 
 
 def test_power_map_is_the_sum_of_the_channels() -> None:
@@ -127,7 +162,9 @@ def test_power_map_is_the_sum_of_the_channels() -> None:
     # The least of 5 x 256 sums of 96 cells is not small beside the mean: the rounding of complex64 is all there is.
     np.testing.assert_allclose(power, exact.sum(axis=2), rtol=1e-5)
     alone = power_map(spectra, radar, channel=3 * 8 + 5)
-    np.testing.assert_allclose(alone, exact[..., 3 * 8 + 5], rtol=1e-3, atol=1e-6 * exact.max())  # nulls are rounding
+    np.testing.assert_allclose(
+        alone, exact[..., 3 * 8 + 5], rtol=1e-3, atol=1e-6 * exact.max()
+    )  # nulls are rounding
     double = power_map(spectra.astype(complex), radar)
     assert double.dtype == np.float64
     np.testing.assert_allclose(double, power, rtol=1e-5)
@@ -146,14 +183,20 @@ def test_other_windows() -> None:
     slow, fast = np.hamming(10), np.hamming(32)
     spectra = range_spectrum(x, SMALL, window=fast).reshape(10, SMALL.n_tx, SMALL.n_rx, 32)
     power = power_map(spectra, SMALL, doppler_window=slow)
-    exact = np.sum(np.abs(range_doppler(x, SMALL, range_window=fast, doppler_window=slow).values) ** 2, axis=2)
+    exact = np.sum(
+        np.abs(range_doppler(x, SMALL, range_window=fast, doppler_window=slow).values) ** 2, axis=2
+    )
     np.testing.assert_allclose(power, exact, rtol=1e-4)  # rounding of complex64 at weak cells
-    assert not np.allclose(exact, np.sum(np.abs(range_doppler(x, SMALL).values) ** 2, axis=2), rtol=0.01)
+    assert not np.allclose(
+        exact, np.sum(np.abs(range_doppler(x, SMALL).values) ** 2, axis=2), rtol=0.01
+    )
 
 
 def test_chirps_after_the_last_cycle_are_left_out() -> None:
     x = noise(SMALL, 32)
-    np.testing.assert_array_equal(range_doppler(x, SMALL).values, range_doppler(x[:30], SMALL).values)
+    np.testing.assert_array_equal(
+        range_doppler(x, SMALL).values, range_doppler(x[:30], SMALL).values
+    )
 
 
 def test_one_cycle_is_enough() -> None:
@@ -184,14 +227,30 @@ def test_bad_input_is_refused(call, message: str) -> None:
 
 
 def test_range_time_is_the_mean_power_of_its_cycles() -> None:
-    radar = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=8, frame_duration_s=3.75e-3, chirp_duration_s=1e-3)
+    radar = Radar(
+        tx_y=2,
+        tx_z=1,
+        rx_y=2,
+        rx_z=2,
+        samples_per_chirp=8,
+        frame_duration_s=3.75e-3,
+        chirp_duration_s=1e-3,
+    )
     random = np.random.default_rng(0)
     spectra = random.standard_normal((15, 2, 8)) + 1j * random.standard_normal((15, 2, 8))
-    power, times = range_time(spectra, radar, first_chirp=30, step_s=6e-3)  # two cycles of three chirps
-    expected = [(np.abs(spectra[first : first + 6]) ** 2).sum(axis=(0, 1)) / (2 * n) for first, n in ((0, 6), (6, 6), (12, 3))]
+    power, times = range_time(
+        spectra, radar, first_chirp=30, step_s=6e-3
+    )  # two cycles of three chirps
+    expected = [
+        (np.abs(spectra[first : first + 6]) ** 2).sum(axis=(0, 1)) / (2 * n)
+        for first, n in ((0, 6), (6, 6), (12, 3))
+    ]
     np.testing.assert_allclose(power, expected, rtol=1e-12)
     np.testing.assert_allclose(times, [33e-3, 39e-3, 43.5e-3], rtol=1e-12)
-    whole, one_by_one = range_time(spectra, radar, step_s=1e-9)[0], range_time(spectra[:3], radar)[0]
+    whole, one_by_one = (
+        range_time(spectra, radar, step_s=1e-9)[0],
+        range_time(spectra[:3], radar)[0],
+    )
     assert whole.shape == (5, 8)  # one cycle at least
     np.testing.assert_allclose(whole[0], one_by_one[0], rtol=1e-12)
     assert range_time(spectra[:0], radar)[0].shape == (0, 8)
@@ -208,9 +267,13 @@ def test_into_an_array_that_is_there(kind: type) -> None:
 
 
 @pytest.mark.parametrize(
-    ("shape", "kind", "every"), [((6, 2, 31), np.complex64, 1), ((6, 2, 32), float, 1), ((6, 2, 64), np.complex64, 2)]
+    ("shape", "kind", "every"),
+    [((6, 2, 31), np.complex64, 1), ((6, 2, 32), float, 1), ((6, 2, 64), np.complex64, 2)],
 )
 def test_an_array_that_cannot_be_filled(shape: tuple[int, ...], kind: type, every: int) -> None:
     out = np.empty(shape, kind)[..., ::every]
-    with pytest.raises(ValueError, match=r"range_spectrum: out has shape .* must have \(6, 2, 32\), complex64, C-contiguous"):
+    with pytest.raises(
+        ValueError,
+        match=r"range_spectrum: out has shape .* must have \(6, 2, 32\), complex64, C-contiguous",
+    ):
         range_spectrum(noise(SMALL, 6), SMALL, out=out)

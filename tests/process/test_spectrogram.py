@@ -32,20 +32,35 @@ def noise(shape: tuple[int, ...], seed: int = 0) -> NDArray[np.complex128]:
 def turning(radar: Radar, velocity: float, n_cycles: int) -> NDArray[np.complex128]:
     """A channel's echo of amplitude 1 that recedes at this velocity, (cycle, 1); written with the paper's figures."""
     times = np.arange(n_cycles) * 12 * radar.chirp_duration_s
-    return np.exp(2j * np.pi * 2 * velocity / 299_792_458.0 * (radar.start_frequency_hz + 2e9) * times)[:, None]
+    return np.exp(
+        2j * np.pi * 2 * velocity / 299_792_458.0 * (radar.start_frequency_hz + 2e9) * times
+    )[:, None]
 
 
-@pytest.mark.parametrize(("window", "overlap", "hop"), [(128, 0.95, 6), (100, 0.9, 10), (7, 0.5, 3), (16, 0.0, 16), (4, 0.99, 1)])
+@pytest.mark.parametrize(
+    ("window", "overlap", "hop"),
+    [(128, 0.95, 6), (100, 0.9, 10), (7, 0.5, 3), (16, 0.0, 16), (4, 0.99, 1)],
+)
 def test_columns_are_those_of_scipy(window: int, overlap: float, hop: int) -> None:
     signals = noise((300, 3))
     found = spectrogram(signals, TINY, window=window, overlap=overlap)
     # SciPy's windows have their middles, sample window // 2, at multiples of the hop: zeros before the signal put ours there.
     ahead = -(window // 2) % hop
     first = (ahead + window // 2) // hop
-    transform = ShortTimeFFT(hann(window, sym=False), hop, 1 / TINY.cycle_duration_s, fft_mode="centered", scale_to="magnitude")
+    transform = ShortTimeFFT(
+        hann(window, sym=False),
+        hop,
+        1 / TINY.cycle_duration_s,
+        fft_mode="centered",
+        scale_to="magnitude",
+    )
     padded = np.concatenate([np.zeros((ahead, 3)), signals])
-    columns = transform.stft(padded, first, first + 1 + (300 - window) // hop, axis=0)  # (velocity, range, time)
-    np.testing.assert_allclose(found.power, (np.abs(columns) ** 2).sum(axis=1).T, rtol=1e-10, atol=1e-14)
+    columns = transform.stft(
+        padded, first, first + 1 + (300 - window) // hop, axis=0
+    )  # (velocity, range, time)
+    np.testing.assert_allclose(
+        found.power, (np.abs(columns) ** 2).sum(axis=1).T, rtol=1e-10, atol=1e-14
+    )
     # The periodic window of odd length is even about half a sample more; a sample is at the middle of its chirp.
     middles = np.arange(len(found.time)) * hop + window / 2
     np.testing.assert_allclose(found.time, middles * 3 * 62.5e-6 + 62.5e-6 / 2, rtol=1e-12)
@@ -56,13 +71,17 @@ def test_columns_are_those_of_scipy(window: int, overlap: float, hop: int) -> No
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
 @pytest.mark.parametrize("bins", [0, 1, -1, 20, -64, 63])
 def test_an_echo_reads_its_velocity_and_its_power(radar: Radar, bins: int) -> None:
-    width = {"paper-12ghz": 0.111530, "paper-77ghz": 0.098824}[radar.name]  # c / (2 f_c 128 cycles) [m/s], by hand
+    width = {"paper-12ghz": 0.111530, "paper-77ghz": 0.098824}[
+        radar.name
+    ]  # c / (2 f_c 128 cycles) [m/s], by hand
     found = spectrogram(turning(radar, bins * radar.velocity_mps(128)[65], 300), radar)
     assert found.velocity[65] == pytest.approx(width, rel=1e-5)
     assert found.power.shape == (29, 128)
     assert (found.power.argmax(axis=1) == 64 + bins).all()
     np.testing.assert_allclose(found.power.max(axis=1), 1, rtol=1e-12)
-    np.testing.assert_allclose(found.power.sum(axis=1), 1.5, rtol=1e-12)  # a Hann window: 1/4, 1, 1/4
+    np.testing.assert_allclose(
+        found.power.sum(axis=1), 1.5, rtol=1e-12
+    )  # a Hann window: 1/4, 1, 1/4
 
 
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
@@ -71,7 +90,9 @@ def test_too_fast_aliases_to_its_known_place(radar: Radar, speed: float) -> None
     # 8 - 2 x 7.138 and 8 - 2 x 6.325 m/s, as in the range-Doppler map; half a bin by the raster.
     seen = np.sign(speed) * {"paper-12ghz": -6.276, "paper-77ghz": -4.649}[radar.name]
     found = spectrogram(turning(radar, speed, 128), radar)
-    assert found.velocity[found.power[0].argmax()] == pytest.approx(seen, abs=0.51 * found.velocity[65])
+    assert found.velocity[found.power[0].argmax()] == pytest.approx(
+        seen, abs=0.51 * found.velocity[65]
+    )
 
 
 @pytest.mark.parametrize("tx", [0, 5, 11])
@@ -82,7 +103,9 @@ def test_time_is_that_of_the_channels_own_chirps(tx: int) -> None:
     signals[cycle] = 1
     found = spectrogram(signals, LOW, tx=tx)
     flat = found.power.sum(axis=1)
-    assert found.time[flat.argmax()] == pytest.approx(LOW.chirp_times(1, first=cycle * 12 + tx)[0], rel=1e-12)
+    assert found.time[flat.argmax()] == pytest.approx(
+        LOW.chirp_times(1, first=cycle * 12 + tx)[0], rel=1e-12
+    )
     assert np.diff(found.time) == pytest.approx(6 * 750e-6)
 
 
@@ -110,7 +133,9 @@ def test_signals_of_all_range_bins_cancel() -> None:
 
 
 def stream_data(n_chirps: int, radar: Radar) -> NDArray[np.complex64]:
-    return noise((n_chirps, radar.n_rx, radar.samples_per_chirp), seed=n_chirps).astype(np.complex64)
+    return noise((n_chirps, radar.n_rx, radar.samples_per_chirp), seed=n_chirps).astype(
+        np.complex64
+    )
 
 
 @given(data=st.data())
@@ -126,7 +151,9 @@ def test_any_cut_gives_the_same_to_the_last_bit(data: st.DataObject) -> None:
     parts = [stream.push(block) for block in np.split(chirps, sorted(cuts))]
     tx, rx = divmod(channel, TINY.n_rx)
     signals = chirps[tx :: TINY.n_tx, rx]
-    power, time = (np.concatenate([getattr(part, name) for part in parts]) for name in ("power", "time"))
+    power, time = (
+        np.concatenate([getattr(part, name) for part in parts]) for name in ("power", "time")
+    )
     if len(signals) < window:
         assert power.shape == (0, window)
         assert time.shape == (0,)
@@ -138,7 +165,9 @@ def test_any_cut_gives_the_same_to_the_last_bit(data: st.DataObject) -> None:
 
 
 def test_a_column_comes_as_soon_as_its_last_chirp_is_there() -> None:
-    stream = SlidingSpectrogram(TINY, channel=2, window=4, overlap=0.5)  # Tx 1: the second chirp of each cycle of three
+    stream = SlidingSpectrogram(
+        TINY, channel=2, window=4, overlap=0.5
+    )  # Tx 1: the second chirp of each cycle of three
     counts = [len(stream.push(chirp[None]).time) for chirp in stream_data(30, TINY)]
     assert np.flatnonzero(counts).tolist() == [10, 16, 22, 28]  # cycles 3, 5, 7 and 9
 
@@ -193,7 +222,9 @@ def test_noise_reads_its_mean_power() -> None:
         ({"signals": np.full((140, 2), np.nan + 0j)}, "finite"),
     ],
 )
-def test_what_has_no_meaning_is_refused_in_one_line(change: dict[str, object], message: str) -> None:
+def test_what_has_no_meaning_is_refused_in_one_line(
+    change: dict[str, object], message: str
+) -> None:
     arguments: dict[str, object] = {"signals": noise((140, 2)), "radar": LOW} | change
     with pytest.raises(InputError, match=message) as refused:
         spectrogram(**arguments)  # type: ignore[arg-type]
@@ -213,7 +244,9 @@ def test_a_block_of_another_radar_is_refused() -> None:
 
 def test_the_picture_shows_the_echo_where_it_is(tmp_path: Path) -> None:
     found = spectrogram(turning(LOW, 4.0, 600), LOW)
-    draw_spectrogram(tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s")
+    draw_spectrogram(
+        tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s"
+    )
     shown = imread(tmp_path / "s.png")[:, :, :3]
     # The brightest yellow of the colours, left of the colour bar, stands in the upper half: velocity rises upward.
     rows, columns = np.nonzero(np.abs(shown - [0.993, 0.906, 0.144]).max(axis=2) < 0.02)

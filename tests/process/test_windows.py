@@ -37,7 +37,9 @@ def test_any_cut_gives_the_windows_of_the_schedule(data: st.DataObject) -> None:
         data.draw(st.integers(1, 4), "n_tx"),
         data.draw(st.floats(1.0, 9.0), "frame"),
         # Halves make ties of the rounding; hops under a cycle repeat starts; hops over the frame leave chirps unused.
-        data.draw(st.one_of(st.floats(0.1, 25.0), st.sampled_from([0.25, 0.5, 1.5, 2.5, 12.5])), "hop"),
+        data.draw(
+            st.one_of(st.floats(0.1, 25.0), st.sampled_from([0.25, 0.5, 1.5, 2.5, 12.5])), "hop"
+        ),
     )
     n_chirps = data.draw(st.integers(0, 150), "chirps")
     cuts = data.draw(st.lists(st.integers(0, n_chirps), max_size=12), "cuts")
@@ -46,9 +48,16 @@ def test_any_cut_gives_the_windows_of_the_schedule(data: st.DataObject) -> None:
     for block in np.split(numbered(n_chirps, radar), sorted(cuts)):
         for index, start, cube in stream.push(block):
             assert index == len(starts)
-            assert cube.shape == (radar.cycles_per_frame, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+            assert cube.shape == (
+                radar.cycles_per_frame,
+                radar.n_tx,
+                radar.n_rx,
+                radar.samples_per_chirp,
+            )
             first = start * radar.n_tx
-            np.testing.assert_array_equal(cube[..., 0].real.ravel(), np.arange(first, first + radar.chirps_per_frame))
+            np.testing.assert_array_equal(
+                cube[..., 0].real.ravel(), np.arange(first, first + radar.chirps_per_frame)
+            )
             starts.append(start)
     assert starts == radar.window_starts(n_chirps).tolist()
     assert stream.n_chirps == n_chirps
@@ -57,7 +66,11 @@ def test_any_cut_gives_the_windows_of_the_schedule(data: st.DataObject) -> None:
 def test_a_hop_far_below_a_cycle_costs_no_more_than_one_of_a_cycle() -> None:
     radar = tiny_radar(2, 3, 1e-5)
     stream = SlidingWindows(radar)
-    assert [start for _, start, _ in stream.push(numbered(40, radar))] == list(range(18)) == radar.window_starts(40).tolist()
+    assert (
+        [start for _, start, _ in stream.push(numbered(40, radar))]
+        == list(range(18))
+        == radar.window_starts(40).tolist()
+    )
     assert stream._candidate <= 18
 
 
@@ -74,7 +87,11 @@ def test_presets(preset: str) -> None:
     )
     n = round(0.7 / radar.chirp_duration_s)
     stream = SlidingWindows(thin)
-    starts = [start for block in np.array_split(numbered(n, thin), 13) for _, start, _ in stream.push(block)]
+    starts = [
+        start
+        for block in np.array_split(numbered(n, thin), 13)
+        for _, start, _ in stream.push(block)
+    ]
     assert starts == radar.window_starts(n).tolist()
     assert len(starts) == 25
 
@@ -85,7 +102,9 @@ def test_memory_stays_at_one_and_a_half_windows() -> None:
     size = stream._buffer.nbytes
     for _ in stream.push(numbered(5000, radar)):
         pass
-    assert stream._buffer.nbytes == size == 1.5 * radar.chirps_per_frame * radar.samples_per_chirp * 8
+    assert (
+        stream._buffer.nbytes == size == 1.5 * radar.chirps_per_frame * radar.samples_per_chirp * 8
+    )
 
 
 def test_windows_cannot_be_written() -> None:

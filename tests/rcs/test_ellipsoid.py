@@ -19,7 +19,9 @@ def test_a_sphere_is_its_disc(a: float, theta: float, phi: float) -> None:
 
 
 @given(st.tuples(*[st.floats(0.03, 1.0)] * 3), theta, phi)
-def test_it_is_pi_times_both_radii_of_curvature(axes: tuple[float, float, float], theta: float, phi: float) -> None:
+def test_it_is_pi_times_both_radii_of_curvature(
+    axes: tuple[float, float, float], theta: float, phi: float
+) -> None:
     normal = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
     squares = np.square(axes)
     point = squares * normal / np.sqrt(normal @ (squares * normal))
@@ -41,29 +43,40 @@ def test_seen_along_an_axis_the_radii_are_those_of_two_ellipses() -> None:
     }.items():
         # cos(pi/2) is 6e-17 and not 0.
         np.testing.assert_allclose(ellipsoid_radii(a, b, c, t, p), radii, rtol=1e-12)
-        np.testing.assert_allclose(ellipsoid(a, b, c, t, p), np.pi * radii[0] * radii[1], rtol=1e-12)
+        np.testing.assert_allclose(
+            ellipsoid(a, b, c, t, p), np.pi * radii[0] * radii[1], rtol=1e-12
+        )
 
 
 def test_the_fault_of_the_published_code_is_not_repeated() -> None:
     # c cos^2 instead of c^2 cos^2 would give pi a^4 here, 14 dB less.
-    np.testing.assert_allclose(ellipsoid(0.1, 0.1, 0.2, 0.0, 0.0), np.pi * 0.1**4 / 0.2**2, rtol=1e-13)
+    np.testing.assert_allclose(
+        ellipsoid(0.1, 0.1, 0.2, 0.0, 0.0), np.pi * 0.1**4 / 0.2**2, rtol=1e-13
+    )
 
 
 @given(st.tuples(axis, axis, axis), st.integers(0, 2**32 - 1))
-def test_naming_the_axes_otherwise_changes_nothing(axes: tuple[float, float, float], seed: int) -> None:
+def test_naming_the_axes_otherwise_changes_nothing(
+    axes: tuple[float, float, float], seed: int
+) -> None:
     direction = Rotation.random(random_state=seed).as_matrix()[0]
     swap = np.random.default_rng(seed).permutation(3)
 
     def section(axes: np.ndarray, n: np.ndarray) -> np.ndarray:
         return ellipsoid(*axes, np.arccos(n[2]), np.arctan2(n[1], n[0]))
 
-    there, named_anew = section(np.array(axes), direction), section(np.array(axes)[swap], direction[swap])
+    there, named_anew = (
+        section(np.array(axes), direction),
+        section(np.array(axes)[swap], direction[swap]),
+    )
     # arccos loses digits near the poles: 1e-8 of an angle, times the square of up to 1e4 between the axes.
     np.testing.assert_allclose(named_anew, there, rtol=1e-3)
 
 
 @given(axis, axis, axis, theta, phi, st.floats(1e-100, 1e100))
-def test_it_grows_with_the_square_of_the_size(a: float, b: float, c: float, theta: float, phi: float, size: float) -> None:
+def test_it_grows_with_the_square_of_the_size(
+    a: float, b: float, c: float, theta: float, phi: float, size: float
+) -> None:
     # 1e-100 m squared four times would leave the range of float64: the code must scale before.
     grown = ellipsoid(a * size, b * size, c * size, theta, phi)
     np.testing.assert_allclose(grown, ellipsoid(a, b, c, theta, phi) * size * size, rtol=1e-11)
@@ -72,7 +85,9 @@ def test_it_grows_with_the_square_of_the_size(a: float, b: float, c: float, thet
 def test_everything_broadcasts() -> None:
     shape = ellipsoid(np.ones((4, 1)), 2.0, 3.0, np.zeros(5), 0.0).shape
     assert shape == (4, 5)
-    assert [radius.shape for radius in ellipsoid_radii(np.ones((4, 1)), 2.0, 3.0, np.zeros(5), 0.0)] == [(4, 5), (4, 5)]
+    assert [
+        radius.shape for radius in ellipsoid_radii(np.ones((4, 1)), 2.0, 3.0, np.zeros(5), 0.0)
+    ] == [(4, 5), (4, 5)]
 
 
 @pytest.mark.parametrize("axes", [(0.0, 1.0, 1.0), (1.0, -1.0, 1.0), (1.0, 1.0, np.nan)])

@@ -27,14 +27,18 @@ def test_mie_agrees_with_miepython(ka: float) -> None:
 def test_a_small_sphere_scatters_as_rayleigh_has_it() -> None:
     ka = 1e-3
     # sigma = 9 pi a^2 (ka)^4 for a conductor: electric and magnetic dipole add up in the backward direction.
-    np.testing.assert_allclose(abs(sphere(0.1, frequency_of(ka))) ** 2, 9 * np.pi * 0.1**2 * ka**4, rtol=1e-5)
+    np.testing.assert_allclose(
+        abs(sphere(0.1, frequency_of(ka))) ** 2, 9 * np.pi * 0.1**2 * ka**4, rtol=1e-5
+    )
 
 
 @pytest.mark.parametrize("method", ["go", "po"])
 def test_optics_tend_to_mie(method: str) -> None:
     for ka, error in ((30.0, 0.05), (300.0, 0.005)):
         # 1/(2ka) with a margin for the creeping wave.
-        assert abs(sphere(0.1, frequency_of(ka), method) / sphere(0.1, frequency_of(ka)) - 1) < error  # type: ignore[call-overload]
+        assert (
+            abs(sphere(0.1, frequency_of(ka), method) / sphere(0.1, frequency_of(ka)) - 1) < error
+        )  # type: ignore[call-overload]
 
 
 @given(st.floats(0.5, 200.0))
@@ -42,13 +46,19 @@ def test_physical_optics_is_its_integral(ka: float) -> None:
     # Over slices of equal depth z the lit half gives j k / sqrt(pi) * 2 pi a * Int_0^a (z/a) exp(2jkz) dz.
     radius, k = 0.1, ka / 0.1
     z = radius * (NODES + 1) / 2
-    integral = 1j * k / np.sqrt(np.pi) * 2 * np.pi * np.sum(WEIGHTS * radius / 2 * z * np.exp(2j * k * z))
+    integral = (
+        1j * k / np.sqrt(np.pi) * 2 * np.pi * np.sum(WEIGHTS * radius / 2 * z * np.exp(2j * k * z))
+    )
     np.testing.assert_allclose(sphere(radius, frequency_of(ka), "po"), integral, rtol=1e-9)
 
 
 @given(st.floats(1e-4, 10.0), st.floats(1e6, 1e12))
-def test_geometric_optics_has_the_phase_of_the_nearest_point(radius: float, frequency: float) -> None:
-    turned = sphere(radius, frequency, "go") * np.exp(-4j * np.pi * frequency / SPEED_OF_LIGHT_MPS * radius)
+def test_geometric_optics_has_the_phase_of_the_nearest_point(
+    radius: float, frequency: float
+) -> None:
+    turned = sphere(radius, frequency, "go") * np.exp(
+        -4j * np.pi * frequency / SPEED_OF_LIGHT_MPS * radius
+    )
     # exp(2jka) with ka up to 1e5 keeps 1e-11.
     np.testing.assert_allclose(turned, np.sqrt(np.pi) * radius, rtol=1e-10)
 
@@ -69,7 +79,8 @@ def test_huge_spheres_stay_finite() -> None:
 
 
 @pytest.mark.parametrize(
-    ("radius", "frequency", "method"), [(0.0, 1e9, "mie"), (-1.0, 1e9, "go"), (1.0, 0.0, "po"), (1.0, 1e9, "x")]
+    ("radius", "frequency", "method"),
+    [(0.0, 1e9, "mie"), (-1.0, 1e9, "go"), (1.0, 0.0, "po"), (1.0, 1e9, "x")],
 )
 def test_what_means_nothing_is_refused(radius: float, frequency: float, method: str) -> None:
     with pytest.raises(ValueError, match=r"positive|unknown"):

@@ -22,7 +22,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+CHROMIUM = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 TIMEOUT_S = 120.0
 SIZE = (1000, 760)
 
@@ -41,7 +43,15 @@ class Browser:
             "--enable-unsafe-swiftshader", "--remote-debugging-pipe", f"--user-data-dir={profile}",
         ]  # fmt: skip
         self._process = subprocess.Popen(
-            [sys.executable, "-c", move, str(read_commands), str(write_answers), str(CHROMIUM), *flags],
+            [
+                sys.executable,
+                "-c",
+                move,
+                str(read_commands),
+                str(write_answers),
+                str(CHROMIUM),
+                *flags,
+            ],
             pass_fds=(read_commands, write_answers),
             start_new_session=True,
             stdin=subprocess.DEVNULL,
@@ -54,10 +64,18 @@ class Browser:
         self._buffer, self._last, self._session = b"", 0, ""
         self.events: list[dict[str, Any]] = []
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        self._session = self.call("Target.attachToTarget", targetId=target, flatten=True)[
+            "sessionId"
+        ]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
-        self.call("Emulation.setDeviceMetricsOverride", width=SIZE[0], height=SIZE[1], deviceScaleFactor=1, mobile=False)
+        self.call(
+            "Emulation.setDeviceMetricsOverride",
+            width=SIZE[0],
+            height=SIZE[1],
+            deviceScaleFactor=1,
+            mobile=False,
+        )
 
     def close(self) -> None:
         os.close(self._commands)
@@ -68,7 +86,9 @@ class Browser:
 
     def call(self, method: str, **params: object) -> dict[str, Any]:
         self._last += 1
-        message = {"id": self._last, "method": method, "params": params} | ({"sessionId": self._session} if self._session else {})
+        message = {"id": self._last, "method": method, "params": params} | (
+            {"sessionId": self._session} if self._session else {}
+        )
         os.write(self._commands, json.dumps(message).encode() + b"\0")
         while True:
             answer = self._next()
@@ -89,7 +109,9 @@ class Browser:
         return dict(json.loads(message))
 
     def evaluate(self, script: str) -> Any:
-        answer = self.call("Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True)
+        answer = self.call(
+            "Runtime.evaluate", expression=script, awaitPromise=True, returnByValue=True
+        )
         assert "exceptionDetails" not in answer, answer
         return answer["result"].get("value")
 
@@ -100,8 +122,13 @@ class Browser:
 
     def open(self, address: str, scheme: str = "light") -> None:
         self._deadline = time.monotonic() + TIMEOUT_S
-        self.call("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
-        self.call("Page.navigate", url="about:blank")  # for the same file with another #t is no new page
+        self.call(
+            "Emulation.setEmulatedMedia",
+            features=[{"name": "prefers-color-scheme", "value": scheme}],
+        )
+        self.call(
+            "Page.navigate", url="about:blank"
+        )  # for the same file with another #t is no new page
         self.events.clear()
         self.call("Page.navigate", url=address)
         self.wait("document.documentElement?.dataset.ready === 'true'")
@@ -118,11 +145,15 @@ class Browser:
         """Pixels of an element (row, column, rgb), 0 to 1."""
         self.place(element)
         # Two frames of the browser, so that what was scrolled to is painted.
-        self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+        self.evaluate(
+            "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+        )
         x, y, width, height = self.place(element)
         data = self.call("Page.captureScreenshot", format="png")["data"]
         image = matplotlib.image.imread(io.BytesIO(base64.b64decode(data)))
-        return np.asarray(image[int(y) : int(y + height), int(x) : int(x + width), :3], dtype=np.float64)
+        return np.asarray(
+            image[int(y) : int(y + height), int(x) : int(x + width), :3], dtype=np.float64
+        )
 
     def drag(self, element: str, by: int) -> None:
         """With the mouse, from the middle of an element to the right."""
@@ -130,7 +161,11 @@ class Browser:
         x, y = x + width / 2, y + height / 2
 
         def mouse(kind: str, at: float, buttons: int) -> None:
-            press = {"button": "left", "clickCount": 1} if kind != "mouseMoved" else {"button": "left" if buttons else "none"}
+            press = (
+                {"button": "left", "clickCount": 1}
+                if kind != "mouseMoved"
+                else {"button": "left" if buttons else "none"}
+            )
             self.call("Input.dispatchMouseEvent", type=kind, x=at, y=y, buttons=buttons, **press)
 
         mouse("mouseMoved", x, 0)
@@ -151,13 +186,22 @@ class Browser:
             event
             for event in self.events
             if event["method"] == "Runtime.exceptionThrown"
-            or (event["method"] == "Runtime.consoleAPICalled" and event["params"]["type"] in ("error", "assert"))
-            or (event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] == "error")
+            or (
+                event["method"] == "Runtime.consoleAPICalled"
+                and event["params"]["type"] in ("error", "assert")
+            )
+            or (
+                event["method"] == "Log.entryAdded" and event["params"]["entry"]["level"] == "error"
+            )
         ]
 
     def requests(self) -> list[str]:
         """Addresses that the page asked for."""
-        return [event["params"]["request"]["url"] for event in self.events if event["method"] == "Network.requestWillBeSent"]
+        return [
+            event["params"]["request"]["url"]
+            for event in self.events
+            if event["method"] == "Network.requestWillBeSent"
+        ]
 
 
 @pytest.fixture(scope="session")

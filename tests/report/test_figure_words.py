@@ -29,7 +29,12 @@ from rtradar.report import (
 )
 from rtradar.report.figures.field_units import FieldUnit
 from rtradar.report.figures.maps import new_figure, save_figure
-from rtradar.report.figures.side_by_side import draw_maps, draw_part_power, draw_power_over_time, draw_rdt_clouds
+from rtradar.report.figures.side_by_side import (
+    draw_maps,
+    draw_part_power,
+    draw_power_over_time,
+    draw_rdt_clouds,
+)
 from rtradar.signal import synthesize
 
 RADAR = rt.Radar(samples_per_chirp=16, tx_y=1, tx_z=0, rx_y=2, rx_z=0)
@@ -43,7 +48,11 @@ def drawn(monkeypatch: pytest.MonkeyPatch) -> list[Figure]:
     """Every figure that is saved, instead of its file."""
     figures: list[Figure] = []
     # As it was then, for afterwards it is emptied.
-    monkeypatch.setattr(Figure, "savefig", lambda figure, *_, **__: figures.append(pickle.loads(pickle.dumps(figure))))
+    monkeypatch.setattr(
+        Figure,
+        "savefig",
+        lambda figure, *_, **__: figures.append(pickle.loads(pickle.dumps(figure))),
+    )
     return figures
 
 
@@ -51,14 +60,22 @@ WATTS = dataclasses.replace(RADAR, transmit_power_dbm=12.0)
 UNIT = FieldUnit("dB re maximum", 1.0)
 MAPS = {"azimuth": (np.ones((16, 8)), np.linspace(-1, 1, 8))}
 DRAWN: dict[str, Callable[[rt.Radar, bool], None]] = {
-    "range_time": lambda radar, loss: draw_range_time(FILE, POWER.T, np.arange(8.0), radar, "run", spreading=loss),
-    "range_doppler": lambda radar, loss: draw_range_doppler(FILE, POWER, MASK, radar, "run", spreading=loss),
+    "range_time": lambda radar, loss: draw_range_time(
+        FILE, POWER.T, np.arange(8.0), radar, "run", spreading=loss
+    ),
+    "range_doppler": lambda radar, loss: draw_range_doppler(
+        FILE, POWER, MASK, radar, "run", spreading=loss
+    ),
     "spectrogram": lambda radar, loss: draw_spectrogram(
         FILE, POWER, np.arange(16.0), np.arange(8.0), radar, "run", spreading=loss
     ),
     "range_angle": lambda radar, loss: draw_range_angle(FILE, MAPS, radar, "run", spreading=loss),
-    "before_after": lambda radar, _: draw_before_after(FILE, {"As received": (POWER, MASK)}, [], radar, "run"),
-    "walls": lambda radar, _: draw_range_azimuth_with_walls(FILE, *MAPS["azimuth"], rt.Scene(), radar, [], "run"),
+    "before_after": lambda radar, _: draw_before_after(
+        FILE, {"As received": (POWER, MASK)}, [], radar, "run"
+    ),
+    "walls": lambda radar, _: draw_range_azimuth_with_walls(
+        FILE, *MAPS["azimuth"], rt.Scene(), radar, [], "run"
+    ),
 }
 SAID = {
     "range_time": "mean of channels",
@@ -78,16 +95,29 @@ def bars(figure: Figure) -> list[str]:
 def test_colours_say_which_power_they_are_and_in_which_unit(drawn: list[Figure], name: str) -> None:
     for radar, loss in ((RADAR, True), (WATTS, True), (RADAR, False)):
         DRAWN[name](radar, loss)
-    by_range = "Power, one channel [dB re maximum]" if name == "spectrogram" else f"RCS, {SAID[name]} [dBsm]"
+    by_range = (
+        "Power, one channel [dB re maximum]"
+        if name == "spectrogram"
+        else f"RCS, {SAID[name]} [dBsm]"
+    )
     given = [by_range, f"Received power, {SAID[name]} [dBm]"]
-    assert [bars(figure) for figure in drawn] == [[unit] for unit in (*given, f"RCS, {SAID[name]} [dBsm]")]
+    assert [bars(figure) for figure in drawn] == [
+        [unit] for unit in (*given, f"RCS, {SAID[name]} [dBsm]")
+    ]
 
 
 def test_comparisons_say_their_unit(drawn: list[Figure]) -> None:
     times, one = np.arange(8.0), {"a": np.ones(8), "b": np.ones(8)}
     draw_power_over_time(FILE, times, one, UNIT, "b", "run")
     draw_part_power(FILE, [f"part {number}" for number in range(8)], one, one, UNIT, "run")
-    draw_maps(FILE, {"a": POWER, "b": POWER}, UNIT.label("one channel"), ("", np.arange(8.0)), ("", np.arange(16.0)), "run")
+    draw_maps(
+        FILE,
+        {"a": POWER, "b": POWER},
+        UNIT.label("one channel"),
+        ("", np.arange(8.0)),
+        ("", np.arange(16.0)),
+        "run",
+    )
     assert drawn[0].axes[0].get_ylabel() == "Power, all parts [dB re maximum]"
     assert drawn[1].axes[0].get_xlabel() == "Power, mean over time [dB re maximum]"
     assert bars(drawn[2]) == ["Power, one channel [dB re maximum]"]
@@ -101,13 +131,21 @@ def test_every_velocity_axis_says_its_sign(drawn: list[Figure]) -> None:
     draw_rdt_clouds(FILE, {"a": points, "b": points}, "run")
     draw_spatial_cloud(FILE, points, points[:, 0], RADAR, "run")
     for figure in drawn:
-        axes = [getattr(one, f"get_{side}label")() for one in figure.axes for side in "xyz" if hasattr(one, f"get_{side}label")]
+        axes = [
+            getattr(one, f"get_{side}label")()
+            for one in figure.axes
+            for side in "xyz"
+            if hasattr(one, f"get_{side}label")
+        ]
         velocity = [label.replace("\n", " ") for label in axes if "elocity" in label]
         assert velocity
         assert set(velocity) == {"Velocity [m/s] (positive: receding)"}
 
 
-@pytest.mark.parametrize(("watts", "loss", "expected"), [(False, True, "dBsm"), (True, True, "dBm"), (False, False, "dBsm")])
+@pytest.mark.parametrize(
+    ("watts", "loss", "expected"),
+    [(False, True, "dBsm"), (True, True, "dBm"), (False, False, "dBsm")],
+)
 def test_levels_by_hand(drawn: list[Figure], watts: bool, loss: bool, expected: str) -> None:
     """One cell of 1e-4 m2 in each of two channels at 2 m."""
     radar = WATTS if watts else RADAR
@@ -128,7 +166,9 @@ def test_levels_by_hand(drawn: list[Figure], watts: bool, loss: bool, expected: 
 
 @pytest.mark.parametrize("offset", [0.0, 0.5])
 @pytest.mark.parametrize("preset", ["paper-12ghz", "paper-77ghz"])
-def test_a_sphere_reads_its_own_cross_section(drawn: list[Figure], preset: str, offset: float) -> None:
+def test_a_sphere_reads_its_own_cross_section(
+    drawn: list[Figure], preset: str, offset: float
+) -> None:
     """A conducting sphere of radius a, large against the wavelength, has pi a^2: 0.2 m are -9.01 dBsm, in every picture."""
     radar, radius = rt.Radar.preset(preset), 0.2
     row = round(4.0 / radar.range_bin_m)
@@ -149,7 +189,9 @@ def test_a_sphere_reads_its_own_cross_section(drawn: list[Figure], preset: str, 
         part=zero,
         bounces=zero + 1,
     )
-    spectra = range_spectrum(synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64), radar)
+    spectra = range_spectrum(
+        synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64), radar
+    )
     cube = spectra.reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
     power = power_map(cube, radar)
     mask = power > power.max() * 1e-4
@@ -167,24 +209,33 @@ def test_a_sphere_reads_its_own_cross_section(drawn: list[Figure], preset: str, 
     assert peaks == pytest.approx([closed_form - lost] * 3, abs=tolerance)
 
 
-def test_the_panel_of_detections_names_no_detector_for_it_is_not_told_which(drawn: list[Figure]) -> None:
+def test_the_panel_of_detections_names_no_detector_for_it_is_not_told_which(
+    drawn: list[Figure],
+) -> None:
     draw_range_doppler(FILE, POWER, MASK, RADAR, "run")
     assert not any("CFAR" in axes.get_title() for axes in drawn[0].axes)
 
 
 @pytest.mark.parametrize("ghosts", [1, 3])
 def test_a_legend_says_once_what_dots_and_circles_are(drawn: list[Figure], ghosts: int) -> None:
-    draw_before_after(FILE, {"As received": (POWER, MASK)}, [("left", 0.3, 0.0)] * ghosts, RADAR, "run")
+    draw_before_after(
+        FILE, {"As received": (POWER, MASK)}, [("left", 0.3, 0.0)] * ghosts, RADAR, "run"
+    )
     legend = drawn[0].axes[0].get_legend()
     assert legend is not None
-    assert [text.get_text() for text in legend.get_texts()] == ["detected", "ghost over a wall, predicted"]
+    assert [text.get_text() for text in legend.get_texts()] == [
+        "detected",
+        "ghost over a wall, predicted",
+    ]
 
 
 def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path: Path) -> None:
     """Without the collector of cycles, whose coming is chance."""
 
     def renderers() -> int:
-        return sum(type(one) is RendererAgg for one in gc.get_objects())  # proxies would answer isinstance
+        return sum(
+            type(one) is RendererAgg for one in gc.get_objects()
+        )  # proxies would answer isinstance
 
     gc.collect()
     gc.disable()

@@ -22,7 +22,13 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.report.pages.run_page import write_report
 from rtradar.report.pages.sections import limits_table, quantity
-from rtradar.report.view.three_d import MOST_FRAMES, MOST_POINTS, figure_data, rdt_data, spatial_data
+from rtradar.report.view.three_d import (
+    MOST_FRAMES,
+    MOST_POINTS,
+    figure_data,
+    rdt_data,
+    spatial_data,
+)
 
 RADAR = rt.Radar.preset("paper-12ghz")
 EVIL = "walk</script><script>alert('1')</script><img src=x>&\"amc"
@@ -62,7 +68,12 @@ def body() -> Body:
 
 def summary() -> dict[str, Any]:
     return {
-        "parameters": {"motion": EVIL, "snr_db": 20.0, "pfa": 1e-6, "radar": dataclasses.asdict(RADAR)},
+        "parameters": {
+            "motion": EVIL,
+            "snr_db": 20.0,
+            "pfa": 1e-6,
+            "radar": dataclasses.asdict(RADAR),
+        },
         "versions": {"numpy": "<2.4>"},
         "fidelity": "specular",
         "stages": {"scatter": 3.0, "cfar": 1.0},
@@ -76,7 +87,11 @@ def summary() -> dict[str, Any]:
 
 
 def write(path: Path, body: Body, **changes: Any) -> Elements:
-    given: dict[str, Any] = {"summary": summary(), "pictures": {}, "rdt_points": np.array([[0.1, 4.0, -1.0]])} | changes
+    given: dict[str, Any] = {
+        "summary": summary(),
+        "pictures": {},
+        "rdt_points": np.array([[0.1, 4.0, -1.0]]),
+    } | changes
     write_report(path, body=body, radar=RADAR, **given)
     return Elements(path.read_text(encoding="utf-8"))
 
@@ -107,26 +122,43 @@ def test_refers_to_nothing_outside(tmp_path: Path, body: Body) -> None:
         for name in ("src", "href", "srcset", "action", "data"):
             assert (attributes.get(name) or "data:").startswith("data:")
     shown = next(attributes for tag, attributes in page.elements if tag == "img")
-    assert base64.b64decode((shown["src"] or "").removeprefix("data:image/png;base64,")) == image.read_bytes()
+    assert (
+        base64.b64decode((shown["src"] or "").removeprefix("data:image/png;base64,"))
+        == image.read_bytes()
+    )
     assert (shown["width"], shown["height"]) == ("5", "3")
 
 
 def test_the_policy_allows_these_scripts_alone(tmp_path: Path, body: Body) -> None:
     page = write(tmp_path / "r.html", body)
     policy = next(
-        a["content"] or "" for t, a in page.elements if t == "meta" and a.get("http-equiv") == "Content-Security-Policy"
+        a["content"] or ""
+        for t, a in page.elements
+        if t == "meta" and a.get("http-equiv") == "Content-Security-Policy"
     )
     rules = {rule.split()[0]: rule.split()[1:] for rule in policy.split(";")}
     assert rules["default-src"] == ["'none'"]
     assert not {"connect-src", "script-src-elem", "frame-src"} & rules.keys()
-    expected = [f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'" for text in page.scripts[1:]]
+    expected = [
+        f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+        for text in page.scripts[1:]
+    ]
     assert rules["script-src"] == expected
 
 
 def test_shows_the_numbers_that_it_was_given(tmp_path: Path, body: Body) -> None:
     page = write(tmp_path / "r.html", body)
     text = re.sub(r"\s+", " ", page.text)
-    for shown in ("12.5% of the echo power from", "beyond_range", "447 MB", "7 416", "62.5 µs", "12 GHz", "75%", "3.000 s"):
+    for shown in (
+        "12.5% of the echo power from",
+        "beyond_range",
+        "447 MB",
+        "7 416",
+        "62.5 µs",
+        "12 GHz",
+        "75%",
+        "3.000 s",
+    ):
         assert shown in text, shown
 
 
@@ -198,7 +230,8 @@ def test_large_clouds_are_thinned_and_counted() -> None:
 
 
 @pytest.mark.parametrize(
-    ("points", "said"), [(np.zeros((4, 2)), "(4, 2)"), (np.zeros(3), "(3,)"), (np.full((2, 3), np.nan), "NaN")]
+    ("points", "said"),
+    [(np.zeros((4, 2)), "(4, 2)"), (np.zeros(3), "(3,)"), (np.full((2, 3), np.nan), "NaN")],
 )
 def test_refuses_what_is_no_cloud(points: NDArray[np.float64], said: str) -> None:
     with pytest.raises(rt.InputError, match=re.escape(said)) as caught:
@@ -230,7 +263,9 @@ def test_refuses_what_is_no_png(tmp_path: Path, body: Body) -> None:
         ("duration_s", None, ("duration", "-")),
     ],
 )
-def test_quantities_read_as_people_write_them(name: str, value: object, shown: tuple[str, str]) -> None:
+def test_quantities_read_as_people_write_them(
+    name: str, value: object, shown: tuple[str, str]
+) -> None:
     assert quantity(name, value) == shown
 
 

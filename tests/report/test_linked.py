@@ -23,7 +23,9 @@ RADAR = rt.Radar.preset("paper-12ghz")
 LOW_DB = -60.0
 
 
-def linked(points: list[tuple[float, float, float]], power_db: tuple[float, float] = (-40.0, -50.0)) -> Linked:
+def linked(
+    points: list[tuple[float, float, float]], power_db: tuple[float, float] = (-40.0, -50.0)
+) -> Linked:
     """Two moments; a head at 4 m, -1 m/s, and a left foot at 5 m, +8 m/s, beyond what is unambiguous."""
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.3))
     times = np.array([0.1, 0.2])
@@ -53,9 +55,21 @@ def linked(points: list[tuple[float, float, float]], power_db: tuple[float, floa
         subtitle="",
         moments=moments,
         radar=RADAR,
-        range_doppler=Levels(level=level, low_db=LOW_DB, step_db=0.2, label="RCS [dBsm]", across=(-7.0, 3.5), up=(0.0, 3.0)),
+        range_doppler=Levels(
+            level=level,
+            low_db=LOW_DB,
+            step_db=0.2,
+            label="RCS [dBsm]",
+            across=(-7.0, 3.5),
+            up=(0.0, 3.0),
+        ),
         spectrogram=Levels(
-            level=level[:1], low_db=-60.0, step_db=0.2, label="Power [dB re maximum]", across=(0.1, 0.1), up=(-7.0, 3.5)
+            level=level[:1],
+            low_db=-60.0,
+            step_db=0.2,
+            label="Power [dB re maximum]",
+            across=(0.1, 0.1),
+            up=(-7.0, 3.5),
         ),
         rdt_points=np.array(points).reshape(-1, 3),
         rdt_power_db=np.full(len(points), -60.0),
@@ -68,14 +82,34 @@ def names(found: list[int]) -> list[str]:
 
 
 def test_every_part_has_its_group() -> None:
-    parts = ["head", "neck", "upper torso", "left clavicle", "right hand", "left hip", "right foot", "left shank"]
-    groups = ["head, neck", "head, neck", "torso", "left arm", "right arm", "left leg", "right leg", "left leg"]
+    parts = [
+        "head",
+        "neck",
+        "upper torso",
+        "left clavicle",
+        "right hand",
+        "left hip",
+        "right foot",
+        "left shank",
+    ]
+    groups = [
+        "head, neck",
+        "head, neck",
+        "torso",
+        "left arm",
+        "right arm",
+        "left leg",
+        "right leg",
+        "left leg",
+    ]
     assert names(group_of_parts(parts)) == groups
 
 
 def test_levels_unpack_to_decibels() -> None:
     level = np.arange(24, dtype=np.uint8).reshape(2, 3, 4)
-    packed = Levels(level=level, low_db=-80.0, step_db=0.5, label="", across=(0.0, 1.0), up=(2.0, 3.0)).packed()
+    packed = Levels(
+        level=level, low_db=-80.0, step_db=0.5, label="", across=(0.0, 1.0), up=(2.0, 3.0)
+    ).packed()
     unpacked = np.frombuffer(zlib.decompress(base64.b64decode(packed["levels"])), dtype=np.uint8)
     np.testing.assert_array_equal(unpacked.reshape(2, *packed["shape"]), level)
     assert (packed["low_db"], packed["high_db"]) == (-80.0, -80.0 + 250 * 0.5)
@@ -94,7 +128,12 @@ def test_points_belong_to_the_nearest_echo_of_their_moment() -> None:
         (0.2, 5.0, 7.0),  # not where the echo shows
         (0.1, 4.0 + 3 * bins[0], -1.0 + 3 * bins[1]),  # 4.2 bins away
     ]
-    assert names(linked(points).rdt_group().tolist()) == ["head, neck", "left leg", "no part near", "no part near"]
+    assert names(linked(points).rdt_group().tolist()) == [
+        "head, neck",
+        "left leg",
+        "no part near",
+        "no part near",
+    ]
     # An echo below the floor of the map shows nothing, and owns no point.
     assert names(linked(points[:1], (-95.0, -50.0)).rdt_group().tolist()) == ["no part near"]
 

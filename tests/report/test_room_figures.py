@@ -12,7 +12,9 @@ from rtradar.report.figures import rooms as room_figures
 from rtradar.scene import Furniture, Scene, material
 
 
-def test_a_plan_draws_no_more_faces_than_cover_the_furniture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     drawn: list[np.ndarray] = []
     collection = room_figures.PolyCollection
 
@@ -21,11 +23,21 @@ def test_a_plan_draws_no_more_faces_than_cover_the_furniture(tmp_path: Path, mon
         return collection(corners, **words)
 
     monkeypatch.setattr(room_figures, "PolyCollection", counted)
-    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(2.0, 0.0, 0.0), yaw_deg=30.0)
-    room_figures.draw_plan(tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, "title")
+    chair = Furniture(
+        name="chair",
+        mesh="chair",
+        material=material("wood"),
+        position_m=(2.0, 0.0, 0.0),
+        yaw_deg=30.0,
+    )
+    room_figures.draw_plan(
+        tmp_path / "plan.png", Scene(furniture=(chair,)), Radar(), np.zeros((3, 2)), {}, "title"
+    )
     every = chair.triangles().corners[..., :2]
     (corners,) = drawn
-    assert len(corners) < len(every) / 3  # each face takes as long; all of them took most of a run's time in a hall of chairs
+    assert (
+        len(corners) < len(every) / 3
+    )  # each face takes as long; all of them took most of a run's time in a hall of chairs
 
     def area(triangles: np.ndarray) -> float:
         sides = triangles[:, 1:] - triangles[:, :1]

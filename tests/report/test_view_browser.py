@@ -21,10 +21,14 @@ FIGURE = "document.getElementById('scene-figure')"
 
 
 @pytest.fixture(scope="module")
-def seen(browser: Any, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Linked]:
+def seen(
+    browser: Any, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory
+) -> tuple[str, Linked]:
     """Address of the page, and what it was made of."""
     folder, (radar, room) = tmp_path_factory.mktemp("seen"), beside_a_wall
-    chair = Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(1.0, -1.0, 0.0))
+    chair = Furniture(
+        name="chair", mesh="chair", material=material("wood"), position_m=(1.0, -1.0, 0.0)
+    )
     room = dataclasses.replace(room, name="one wall & <b>", furniture=(chair,))
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
     rt.run(motion, radar, room, out=folder, fidelity="analytic", clutter_removal="mean")
@@ -64,7 +68,9 @@ def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, Link
         assert (picture.min(axis=2) < 0.8).sum() > 1000, name
 
 
-def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked], beside_a_wall: tuple[rt.Radar, rt.Scene]) -> None:
+def test_the_slider_moves_every_view(
+    browser: Any, seen: tuple[str, Linked], beside_a_wall: tuple[rt.Radar, rt.Scene]
+) -> None:
     (address, linked), (radar, _) = seen, beside_a_wall
     moments = linked.moments
     browser.open(f"{address}#t=0.1")
@@ -74,29 +80,51 @@ def test_the_slider_moves_every_view(browser: Any, seen: tuple[str, Linked], bes
         # The body where the run had it: vertices of a sphere sum up to its centre, in float32 of some metres.
         np.testing.assert_allclose(centres(browser), moments.poses[step, :, 0], atol=1e-5)
         time = moments.times[step]
-        assert browser.evaluate("document.getElementById('clock').textContent").startswith(f"{time:.2f} / ")
+        assert browser.evaluate("document.getElementById('clock').textContent").startswith(
+            f"{time:.2f} / "
+        )
         # Direct paths: antenna, specular point, gap, for each echo above the floor.
         own = np.flatnonzero(linked.seen[step] & moments.direct)
-        lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(len(own), 3, 3)
-        np.testing.assert_allclose(lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6)
+        lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(
+            len(own), 3, 3
+        )
+        np.testing.assert_allclose(
+            lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6
+        )
         np.testing.assert_allclose(lines[:, 1], moments.corners[step, own, 0], atol=1e-6)
         # Over the wall: antenna, wall and body or body and wall, antenna, gap.
         ghosts = np.flatnonzero(linked.seen[step] & ~moments.direct)
-        lines = np.stack([values(browser, "figure", 6, axis) for axis in "xyz"], axis=1).reshape(len(ghosts), 5, 3)
+        lines = np.stack([values(browser, "figure", 6, axis) for axis in "xyz"], axis=1).reshape(
+            len(ghosts), 5, 3
+        )
         np.testing.assert_allclose(lines[:, 1:3], moments.corners[step, ghosts], atol=1e-6)
         # The map of this window, and its echoes where they show.
-        shown = browser.evaluate("document.getElementById('scene-map').data[0].z.map((row) => Array.from(row))")
+        shown = browser.evaluate(
+            "document.getElementById('scene-map').data[0].z.map((row) => Array.from(row))"
+        )
         levels = linked.range_doppler
-        np.testing.assert_allclose(shown, levels.low_db + levels.step_db * levels.level[step], atol=1e-4)
-        np.testing.assert_allclose(values(browser, "map", 1, "x"), linked.shown_velocity()[step, own], atol=1e-5)
-        np.testing.assert_allclose(values(browser, "map", 1, "y"), moments.range_m[step, own], atol=1e-5)
+        np.testing.assert_allclose(
+            shown, levels.low_db + levels.step_db * levels.level[step], atol=1e-4
+        )
+        np.testing.assert_allclose(
+            values(browser, "map", 1, "x"), linked.shown_velocity()[step, own], atol=1e-5
+        )
+        np.testing.assert_allclose(
+            values(browser, "map", 1, "y"), moments.range_m[step, own], atol=1e-5
+        )
         # The cursor on the spectrogram, and the points of this window in the cloud.
-        cursor = browser.evaluate("document.getElementById('scene-spectrogram').layout.shapes[0].x0")
+        cursor = browser.evaluate(
+            "document.getElementById('scene-spectrogram').layout.shapes[0].x0"
+        )
         assert cursor == pytest.approx(time, abs=1e-4)
         near = np.abs(linked.rdt_points[:, 0] - time) <= radar.frame_duration_s / 2
-        assert len(values(browser, "rdt", 1, "x")) == pytest.approx(near.sum(), abs=2)  # float32 at the ends of the window
+        assert len(values(browser, "rdt", 1, "x")) == pytest.approx(
+            near.sum(), abs=2
+        )  # float32 at the ends of the window
         assert near.sum() > 10
-        pictures.append([browser.picture(f"scene-{name}") for name in ("figure", "map", "rdt", "spectrogram")])
+        pictures.append(
+            [browser.picture(f"scene-{name}") for name in ("figure", "map", "rdt", "spectrogram")]
+        )
     for first, second in zip(*pictures, strict=True):
         assert (np.abs(first - second).max(axis=2) > 0.2).sum() > 50
     assert not browser.faults()
@@ -113,7 +141,9 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Li
         browser.set("colour", mode, "change")
         browser.wait(f"document.documentElement.dataset.colour === '{mode}'")
         np.testing.assert_allclose(values(browser, "map", 1, "marker.color"), wanted, atol=1e-4)
-        painted = values(browser, "figure", 0, "intensity").reshape(21, -1)[moments.echo_part[own], 0]
+        painted = values(browser, "figure", 0, "intensity").reshape(21, -1)[
+            moments.echo_part[own], 0
+        ]
         np.testing.assert_allclose(painted, wanted, atol=1e-4)
         assert browser.evaluate("document.getElementById('groups').hidden")
         assert browser.evaluate(f"{FIGURE}.data[0].showscale")
@@ -123,23 +153,34 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Li
     assert not browser.evaluate("document.getElementById('groups').hidden")
     for paths, counts in {"none": (0, 0), "direct": (3 * len(own), 0)}.items():
         browser.set("paths", paths, "change")
-        browser.wait(f"{FIGURE}.data[5].x.length === {counts[0]} && {FIGURE}.data[6].x.length === {counts[1]}")
+        browser.wait(
+            f"{FIGURE}.data[5].x.length === {counts[0]} && {FIGURE}.data[6].x.length === {counts[1]}"
+        )
     assert not browser.faults()
 
 
-def test_saves_a_picture_of_what_is_seen(browser: Any, seen: tuple[str, Linked], tmp_path: Path) -> None:
+def test_saves_a_picture_of_what_is_seen(
+    browser: Any, seen: tuple[str, Linked], tmp_path: Path
+) -> None:
     address, _ = seen
     browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     browser.open(f"{address}#t=0.1")
     browser.evaluate("document.getElementById('save').click()")
     saved: list[Path] = []
     while not saved:
-        browser.evaluate("new Promise((done) => setTimeout(done, 200))")  # within the browser's own deadline
+        browser.evaluate(
+            "new Promise((done) => setTimeout(done, 200))"
+        )  # within the browser's own deadline
         saved = list(tmp_path.glob("*.png"))
     picture = matplotlib.image.imread(saved[0])
     width = browser.evaluate("document.querySelector('.linked').getBoundingClientRect().width")
     assert picture.shape[1] == pytest.approx(2 * width, abs=2)
     rows, columns = picture.shape[0] // 2, picture.shape[1] // 2
-    for quarter in (picture[:rows, :columns], picture[:rows, columns:], picture[rows:, :columns], picture[rows:, columns:]):
+    for quarter in (
+        picture[:rows, :columns],
+        picture[:rows, columns:],
+        picture[rows:, :columns],
+        picture[rows:, columns:],
+    ):
         assert (quarter[..., :3].min(axis=2) < 0.8).sum() > 3000
     assert not browser.faults()

@@ -16,14 +16,18 @@ RADAR = rt.Radar.preset("paper-12ghz")
 
 
 @pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics"])
-def test_a_second_frame_compiles_no_kernel(backend: Backend, fidelity: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_second_frame_compiles_no_kernel(
+    backend: Backend, fidelity: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     if backend.kind == "scalar":
         pytest.skip("the scalar backend has no kernels")
     # Dr.Jit remembers the kernels of those threads alone in which that was asked for.
     monkeypatch.setenv(THREADS_VARIABLE, "1")
     import drjit as dr
 
-    body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0, duration_s=0.7), heading_deg=70.0))
+    body = Body.from_motion(
+        place(rt.synthetic_motion("walk", seed=0, duration_s=0.7), heading_deg=70.0)
+    )
     model = build_model(fidelity, RADAR, body, variant=backend.kind)
     frame = 3 * RADAR.chirps_per_frame
     model.echoes(np.arange(frame))

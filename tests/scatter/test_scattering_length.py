@@ -16,16 +16,22 @@ FIDELITIES = ("specular", "analytic")
 seeds = st.integers(0, 2**32 - 1)
 
 # Laws hold for any size, also where optics is no longer true.
-pytestmark = pytest.mark.filterwarnings("ignore:.*radius of curvature:rtradar.errors.ValidityWarning")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:.*radius of curvature:rtradar.errors.ValidityWarning"
+)
 
 
-def ellipsoid(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) -> rt.Ellipsoids:
+def ellipsoid(
+    *axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None
+) -> rt.Ellipsoids:
     return rt.Ellipsoids([centre], [np.eye(3) if frame is None else frame], [axes])
 
 
 def both(first: rt.Ellipsoids, second: rt.Ellipsoids) -> rt.Ellipsoids:
     fields = ("centres", "frames", "semi_axes")
-    return rt.Ellipsoids(*(np.concatenate([getattr(first, field), getattr(second, field)]) for field in fields))
+    return rt.Ellipsoids(
+        *(np.concatenate([getattr(first, field), getattr(second, field)]) for field in fields)
+    )
 
 
 def directions(rng: np.random.Generator, n: int) -> Array:
@@ -59,7 +65,9 @@ def test_tx_and_rx_may_be_swapped(seed: int, fidelity: str) -> None:
     target = ellipsoid(0.05, 0.07, 0.2, frame=Rotation.random(random_state=seed).as_matrix())
     tx = directions(rng, 5) * rng.uniform(1, 10, (5, 1))
     rx = tx + rng.normal(0, 0.2, (5, 3))
-    there, back = (rt.scattering_length(target, *pair, 12e9, fidelity) for pair in ((tx, rx), (rx, tx)))
+    there, back = (
+        rt.scattering_length(target, *pair, 12e9, fidelity) for pair in ((tx, rx), (rx, tx))
+    )
     np.testing.assert_allclose(back, there, rtol=1e-5, atol=1e-9)
 
 
@@ -69,24 +77,34 @@ def test_twice_as_large_at_half_the_frequency_is_twice_the_field(seed: int, fide
     rng = np.random.default_rng(seed)
     frame, tx = Rotation.random(random_state=seed).as_matrix(), 4 * directions(rng, 5)
     small = rt.scattering_length(ellipsoid(0.05, 0.07, 0.2, frame=frame), tx, tx, 12e9, fidelity)
-    large = rt.scattering_length(ellipsoid(0.1, 0.14, 0.4, frame=frame), 2 * tx, 2 * tx, 6e9, fidelity)
+    large = rt.scattering_length(
+        ellipsoid(0.1, 0.14, 0.4, frame=frame), 2 * tx, 2 * tx, 6e9, fidelity
+    )
     np.testing.assert_allclose(large, 2 * small, rtol=1e-5)
 
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_parts_beside_each_other_add_up(fidelity: str) -> None:
     rng = np.random.default_rng(2)
-    first, second = ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)), ellipsoid(0.05, 0.05, 0.2, centre=(0.2, -0.5, 0.1))
+    first, second = (
+        ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)),
+        ellipsoid(0.05, 0.05, 0.2, centre=(0.2, -0.5, 0.1)),
+    )
     tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.2, (10, 3))
     rx = tx + np.array([0.0, 0.1, 0.0])
-    whole, *parts = (rt.scattering_length(t, tx, rx, 12e9, fidelity) for t in (both(first, second), first, second))
+    whole, *parts = (
+        rt.scattering_length(t, tx, rx, 12e9, fidelity)
+        for t in (both(first, second), first, second)
+    )
     np.testing.assert_allclose(whole, sum(parts), rtol=1e-12)
 
 
 def test_a_part_straight_behind_another_returns_nothing_and_comes_back_beside_it() -> None:
     tx = np.array([[-4.0, 0.0, 0.0], [-4.0, 0.1, 0.05], [0.0, -4.0, 0.0]])
     front, back = ellipsoid(0.1, 0.2, 0.2, centre=(-0.4, 0, 0)), ellipsoid(0.05, 0.05, 0.1)
-    whole, alone, behind = (rt.scattering_length(t, tx, tx, 12e9) for t in (both(front, back), front, back))
+    whole, alone, behind = (
+        rt.scattering_length(t, tx, tx, 12e9) for t in (both(front, back), front, back)
+    )
     np.testing.assert_array_equal(whole[:2], alone[:2])
     # The third antenna sees both.
     np.testing.assert_allclose(whole[2], alone[2] + behind[2], rtol=1e-12)
@@ -99,10 +117,18 @@ def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
     for pair in ((tx, rx), (rx, tx)):
         whole, alone = (rt.scattering_length(t, *pair, 12e9) for t in (both(plate, target), plate))
         np.testing.assert_array_equal(whole, alone)
-    assert abs(rt.scattering_length(both(plate, target), rx, rx, 12e9) - rt.scattering_length(plate, rx, rx, 12e9)) > 0.01
+    assert (
+        abs(
+            rt.scattering_length(both(plate, target), rx, rx, 12e9)
+            - rt.scattering_length(plate, rx, rx, 12e9)
+        )
+        > 0.01
+    )
 
 
-@pytest.mark.parametrize("fidelity", ["specular", "fresnel", "physical-optics", "reference", "rays"])
+@pytest.mark.parametrize(
+    "fidelity", ["specular", "fresnel", "physical-optics", "reference", "rays"]
+)
 @pytest.mark.parametrize("copies", [2, 5])
 def test_parts_that_fill_the_same_place_are_one(copies: int, fidelity: str) -> None:
     tx, frame = np.array([3.0, 1.0, 0.5]), Rotation.random(random_state=0).as_matrix()
@@ -121,14 +147,19 @@ def test_parts_that_fill_the_same_place_are_one(copies: int, fidelity: str) -> N
 def test_specular_and_analytic_meet_far_away() -> None:
     sight = directions(np.random.default_rng(3), 50)
     target = ellipsoid(0.05, 0.09, 0.2)
-    fields = [rt.scattering_length(target, 1e5 * sight, 1e5 * sight, 12e9, fidelity) for fidelity in FIDELITIES]
+    fields = [
+        rt.scattering_length(target, 1e5 * sight, 1e5 * sight, 12e9, fidelity)
+        for fidelity in FIDELITIES
+    ]
     # The near field adds R1 / R of amplitude, and a quarter of a^2 / R of path.
     np.testing.assert_allclose(*fields, rtol=1e-4)
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("direction", [(0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), (1e-9, 0, 1)])
-def test_a_sphere_is_alike_from_everywhere_and_polarised_either_way(direction: tuple[float, ...], polarization: str) -> None:
+def test_a_sphere_is_alike_from_everywhere_and_polarised_either_way(
+    direction: tuple[float, ...], polarization: str
+) -> None:
     # Straight above, v has no direction across the line of sight: a sphere must not notice.
     tx = 4 * np.array(direction)
     field = rt.scattering_length(ellipsoid(0.1, 0.1, 0.1), tx, tx, 12e9, polarization=polarization)  # type: ignore[arg-type]
@@ -140,7 +171,9 @@ def test_one_antenna_serves_many_and_each_pair_may_have_its_frequency() -> None:
     target, tx = ellipsoid(0.05, 0.07, 0.2), np.array([[4.0, 0, 0], [4.0, 0.1, 0], [4.0, 0.2, 0.3]])
     frequency = np.array([12e9, 14e9, 16e9])
     together = rt.scattering_length(target, tx, tx[0], frequency)
-    one_by_one = [rt.scattering_length(target, t, tx[0], f)[0] for t, f in zip(tx, frequency, strict=True)]
+    one_by_one = [
+        rt.scattering_length(target, t, tx[0], f)[0] for t, f in zip(tx, frequency, strict=True)
+    ]
     assert together.shape == (3,)
     assert together.dtype == np.complex128
     np.testing.assert_allclose(together, one_by_one, rtol=1e-12)
@@ -152,17 +185,23 @@ def test_without_pairs_there_are_no_numbers() -> None:
 
 
 def test_antennas_on_either_side_of_the_body_get_nothing() -> None:
-    field = rt.scattering_length(ellipsoid(0.1, 0.1, 0.1), [4.0, 0, 0], [[-4.0, 0, 0], [-4.0, 0.05, 0]], 12e9)
+    field = rt.scattering_length(
+        ellipsoid(0.1, 0.1, 0.1), [4.0, 0, 0], [[-4.0, 0, 0], [-4.0, 0.05, 0]], 12e9
+    )
     np.testing.assert_array_equal(field, 0)
 
 
-@pytest.mark.parametrize("axes", [(0.003, 0.003, 0.3), (0.3, 0.3, 0.003), (0.001, 0.001, 0.001), (1.0, 1.0, 1.0)])
+@pytest.mark.parametrize(
+    "axes", [(0.003, 0.003, 0.3), (0.3, 0.3, 0.003), (0.001, 0.001, 0.001), (1.0, 1.0, 1.0)]
+)
 @pytest.mark.parametrize("gap", [0.3, 4.0, 1000.0, 1e6])
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_extremes_stay_numbers(axes: tuple[float, float, float], gap: float, fidelity: str) -> None:
     sight = np.concatenate([np.eye(3), -np.eye(3), directions(np.random.default_rng(4), 20)])
     tx = sight * (gap + max(axes))
-    field = rt.scattering_length(ellipsoid(*axes), tx, tx + np.array([0.0, 0.01, 0.0]), 79e9, fidelity)
+    field = rt.scattering_length(
+        ellipsoid(*axes), tx, tx + np.array([0.0, 0.01, 0.0]), 79e9, fidelity
+    )
     assert np.isfinite(field).all()
 
 
@@ -192,7 +231,12 @@ def test_an_antenna_inside_the_target_is_refused(fidelity: str) -> None:
     ],
 )
 def test_bad_input_is_told_in_one_line(change: dict[str, object], said: str) -> None:
-    good: dict[str, object] = {"target": ellipsoid(0.1, 0.1, 0.1), "tx": [4.0, 0, 0], "rx": [4.0, 0, 0], "frequency": 12e9}
+    good: dict[str, object] = {
+        "target": ellipsoid(0.1, 0.1, 0.1),
+        "tx": [4.0, 0, 0],
+        "rx": [4.0, 0, 0],
+        "frequency": 12e9,
+    }
     with pytest.raises(InputError, match=said) as caught:
         rt.scattering_length(**(good | change))  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)

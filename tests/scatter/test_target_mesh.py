@@ -39,17 +39,35 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
     "a vertex is NaN": (lambda: mesh(moved(3, np.nan), FACES), "not finite"),
     "a vertex is infinite": (lambda: mesh(moved(3, np.inf), FACES), "not finite"),
     "a vertex is beyond all bounds": (lambda: mesh(moved(3, 1e200), FACES), "more than 1e"),
-    "a vertex that no face names is NaN": (lambda: mesh(np.vstack([CORNERS, [np.nan] * 3]), FACES), "not finite"),
-    "vertices in a plane of two axes": (lambda: mesh(CORNERS[:, :2], FACES), r"must be \(vertex, 3\)"),
+    "a vertex that no face names is NaN": (
+        lambda: mesh(np.vstack([CORNERS, [np.nan] * 3]), FACES),
+        "not finite",
+    ),
+    "vertices in a plane of two axes": (
+        lambda: mesh(CORNERS[:, :2], FACES),
+        r"must be \(vertex, 3\)",
+    ),
     "no vertices": (trimesh.Trimesh, "no triangles"),
     "no faces": (lambda: mesh(CORNERS, np.zeros((0, 3), int)), "no triangles"),
     "all corners alike": (lambda: mesh(np.zeros((3, 3)), [[0, 1, 2]]), "no triangle with an area"),
-    "corners on a line": (lambda: mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]), "no triangle with an area"),
+    "corners on a line": (
+        lambda: mesh([[0, 0, 0], [1, 0, 0], [2, 0, 0]], [[0, 1, 2]]),
+        "no triangle with an area",
+    ),
     "a corner named twice": (lambda: mesh(CORNERS, [[0, 0, 1]]), "no triangle with an area"),
     "too small for float64": (lambda: mesh(CORNERS * 1e-200, FACES), "no triangle with an area"),
-    "an index too high": (lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, 99]])), "vertex that is not there"),
-    "an index below zero": (lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, -1]])), "vertex that is not there"),
-    "a face wound the other way": (lambda: mesh(CORNERS, [FACES[0, ::-1], *FACES[1:]]), "which side is outside"),
+    "an index too high": (
+        lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, 99]])),
+        "vertex that is not there",
+    ),
+    "an index below zero": (
+        lambda: mesh(CORNERS, np.vstack([FACES, [0, 1, -1]])),
+        "vertex that is not there",
+    ),
+    "a face wound the other way": (
+        lambda: mesh(CORNERS, [FACES[0, ::-1], *FACES[1:]]),
+        "which side is outside",
+    ),
     "vertices and faces, but no trimesh": (NoTrimesh, "the target is a NoTrimesh; allowed"),
     "points": (lambda: trimesh.PointCloud(CORNERS), "the target is a PointCloud; allowed"),
     "a scene": (lambda: trimesh.Scene([BOX]), "the target is a Scene; allowed"),
@@ -74,26 +92,42 @@ def test_bad_meshes_are_refused_alike(case: str, fidelity: str, pairs: int) -> N
 
 
 @pytest.mark.parametrize("fidelity", WITHOUT)
-@pytest.mark.parametrize("make", [lambda: BOX, *(make for make, _ in BAD.values())], ids=["a good mesh", *BAD])
+@pytest.mark.parametrize(
+    "make", [lambda: BOX, *(make for make, _ in BAD.values())], ids=["a good mesh", *BAD]
+)
 def test_models_that_take_no_meshes_say_so(make: Callable[[], Any], fidelity: str) -> None:
     with pytest.raises(InputError, match=f"'{fidelity}' takes rt.Ellipsoids, not") as caught:
         rt.scattering_length(make(), AWAY, AWAY, 3e9, fidelity=fidelity)
     assert "\n" not in str(caught.value)
 
 
-SHEET = mesh([[0, -0.2, -0.2], [0, 0.2, -0.2], [0, 0.2, 0.2], [0, -0.2, 0.2]], [[0, 1, 2], [0, 2, 3]])
+SHEET = mesh(
+    [[0, -0.2, -0.2], [0, 0.2, -0.2], [0, 0.2, 0.2], [0, -0.2, 0.2]], [[0, 1, 2], [0, 2, 3]]
+)
 
 
 @pytest.mark.parametrize("fidelity", WITH_MESHES)
 @pytest.mark.parametrize("name", ["tx", "rx"])
 @pytest.mark.parametrize(
     ("target", "place"),
-    [(BOX, (0, 0, 0)), (BOX, (0.1, 0.01, 0.02)), (BOX, tuple(CORNERS[0])), (SHEET, (0, 0.01, 0.05)), (SHEET, (0, 0.2, 0.2))],
+    [
+        (BOX, (0, 0, 0)),
+        (BOX, (0.1, 0.01, 0.02)),
+        (BOX, tuple(CORNERS[0])),
+        (SHEET, (0, 0.01, 0.05)),
+        (SHEET, (0, 0.2, 0.2)),
+    ],
     ids=["inside", "on a face", "on a corner", "on a sheet", "on a sheet's corner"],
 )
-def test_antennas_stand_outside(target: Any, place: tuple[float, float, float], name: str, fidelity: str) -> None:
-    antennas = {"tx": [AWAY, AWAY], "rx": [AWAY, AWAY]} | {name: [AWAY, np.array(place, dtype=np.float64)]}
-    with pytest.raises(InputError, match=rf"{name}\[1\] is .*on.*; antennas must stand outside the target"):
+def test_antennas_stand_outside(
+    target: Any, place: tuple[float, float, float], name: str, fidelity: str
+) -> None:
+    antennas = {"tx": [AWAY, AWAY], "rx": [AWAY, AWAY]} | {
+        name: [AWAY, np.array(place, dtype=np.float64)]
+    }
+    with pytest.raises(
+        InputError, match=rf"{name}\[1\] is .*on.*; antennas must stand outside the target"
+    ):
         rt.scattering_length(target, antennas["tx"], antennas["rx"], 3e9, fidelity=fidelity)
 
 
@@ -113,7 +147,11 @@ def inside_out(target: trimesh.Trimesh) -> trimesh.Trimesh:
 def test_each_piece_of_a_mesh_is_turned_outward(fidelity: str) -> None:
     large, small = sphere(0.1), sphere(0.05, y=0.5)
     expected = rt.scattering_length(large + small, AWAY, AWAY, 3e9, fidelity=fidelity)
-    for pair in ((large, inside_out(small)), (inside_out(large), small), (inside_out(large), inside_out(small))):
+    for pair in (
+        (large, inside_out(small)),
+        (inside_out(large), small),
+        (inside_out(large), inside_out(small)),
+    ):
         found = rt.scattering_length(pair[0] + pair[1], AWAY, AWAY, 3e9, fidelity=fidelity)
         np.testing.assert_array_equal(found, expected)
 
@@ -124,7 +162,9 @@ def test_a_cavity_may_hold_antennas_and_is_seen_from_within(fidelity: str) -> No
     place = np.array([0.05, 0.02, 0.0])
     within = rt.scattering_length(shell, place, place, 3e9, fidelity=fidelity)
     for turned in (inside_out(shell), shell):
-        np.testing.assert_array_equal(rt.scattering_length(turned, place, place, 3e9, fidelity=fidelity), within)
+        np.testing.assert_array_equal(
+            rt.scattering_length(turned, place, place, 3e9, fidelity=fidelity), within
+        )
     assert abs(within[0]) > 0
     with pytest.raises(InputError, match=r"tx\[0\] is inside the mesh"):
         rt.scattering_length(shell, [0.35, 0.0, 0.0], place, 3e9, fidelity=fidelity)

@@ -15,7 +15,15 @@ from rtradar.scene.materials import material
 
 
 def piece(**changes: Any) -> Furniture:
-    return Furniture(**{"name": "it", "mesh": "table", "material": material("wood"), "position_m": (0, 0, 0), **changes})
+    return Furniture(
+        **{
+            "name": "it",
+            "mesh": "table",
+            "material": material("wood"),
+            "position_m": (0, 0, 0),
+            **changes,
+        }
+    )
 
 
 @pytest.fixture
@@ -42,7 +50,9 @@ def test_turned_then_moved() -> None:
 def test_scale_and_units(own: Path) -> None:
     mesh = piece(mesh=own, metres_per_unit=0.001, scale=2).triangles()
     np.testing.assert_allclose(np.ptp(mesh.vertices, axis=0), (2.0, 1.0, 0.4))
-    np.testing.assert_allclose(np.ptp(piece(scale=0.5).triangles().vertices, axis=0), (0.4, 0.7, 0.37))
+    np.testing.assert_allclose(
+        np.ptp(piece(scale=0.5).triangles().vertices, axis=0), (0.4, 0.7, 0.37)
+    )
 
 
 def test_units_are_asked_for(own: Path) -> None:
@@ -50,7 +60,9 @@ def test_units_are_asked_for(own: Path) -> None:
         piece(mesh=own)
     with pytest.raises(InputError, match="belong to a file of one's own"):
         piece(metres_per_unit=1.0)
-    with pytest.raises(InputError, match=r"measures 1e\+03 m; allowed are 0\.001 to 100 m: see to metres_per_unit"):
+    with pytest.raises(
+        InputError, match=r"measures 1e\+03 m; allowed are 0\.001 to 100 m: see to metres_per_unit"
+    ):
         piece(mesh=own, metres_per_unit=1.0).triangles()
     with pytest.raises(InputError, match="measures 1e-05 m"):
         piece(mesh=own, metres_per_unit=1e-6, scale=0.01).triangles()
@@ -60,7 +72,9 @@ def test_sheets(sheet: Path, own: Path) -> None:
     metal = material("metal")
     with pytest.raises(InputError, match="is not closed; close its holes, or say sheet = true"):
         piece(mesh=sheet, metres_per_unit=1, material=metal).triangles()
-    with pytest.raises(InputError, match="'wood' of a thin sheet; allowed: metal, perfect-conductor"):
+    with pytest.raises(
+        InputError, match="'wood' of a thin sheet; allowed: metal, perfect-conductor"
+    ):
         piece(mesh=sheet, metres_per_unit=1, sheet=True).triangles()
     with pytest.raises(InputError, match="is closed, so it is no thin sheet"):
         piece(mesh=own, metres_per_unit=0.001, sheet=True).triangles()

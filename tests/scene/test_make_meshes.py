@@ -30,7 +30,9 @@ def test_made_again_they_are_the_same(make: ModuleType, tmp_path: Path) -> None:
     make.main(tmp_path)
     assert sorted(file.stem for file in tmp_path.iterdir()) == list(mesh_names())
     for name in mesh_names():
-        assert (tmp_path / f"{name}.ply").read_bytes() == (meshes_folder() / f"{name}.ply").read_bytes(), name
+        assert (tmp_path / f"{name}.ply").read_bytes() == (
+            meshes_folder() / f"{name}.ply"
+        ).read_bytes(), name
 
 
 @pytest.mark.parametrize("name", FURNITURE)
@@ -58,8 +60,12 @@ def test_furniture_stands_centred_on_the_floor(name: str) -> None:
 
 def test_volumes_by_hand(make: ModuleType) -> None:
     tub = read_mesh(meshes_folder() / "bathtub.ply")
-    assert trimesh.Trimesh(tub.vertices, tub.faces).volume == pytest.approx(0.75 * 1.7 * 0.58 - 0.61 * 1.54 * 0.44)
-    vertices, faces = make.boxes([(0, 1, 0, 1, 0, 1), (0.5, 2, 0, 1, 0, 1)], hollow=[(0.4, 0.6, 0.4, 0.6, 0.4, 0.6)])
+    assert trimesh.Trimesh(tub.vertices, tub.faces).volume == pytest.approx(
+        0.75 * 1.7 * 0.58 - 0.61 * 1.54 * 0.44
+    )
+    vertices, faces = make.boxes(
+        [(0, 1, 0, 1, 0, 1), (0.5, 2, 0, 1, 0, 1)], hollow=[(0.4, 0.6, 0.4, 0.6, 0.4, 0.6)]
+    )
     assert trimesh.Trimesh(vertices, faces, process=False).volume == pytest.approx(2.0 - 0.008)
 
 

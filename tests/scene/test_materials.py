@@ -17,7 +17,9 @@ ROOMS = (12e9, 16e9, 77e9, 81e9)
 
 
 def conductivity(name: str, frequency_hz: float) -> float:
-    return float(-material(name).eta(frequency_hz).imag * 2 * np.pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
+    return float(
+        -material(name).eta(frequency_hz).imag * 2 * np.pi * frequency_hz * VACUUM_PERMITTIVITY_FPM
+    )
 
 
 @pytest.mark.parametrize(
@@ -43,7 +45,9 @@ def conductivity(name: str, frequency_hz: float) -> float:
         ("wet-ground", 10, 11.943, 2.9929),
     ],
 )
-def test_figures_of_the_recommendation(name: str, ghz: float, permittivity: float, sigma: float) -> None:
+def test_figures_of_the_recommendation(
+    name: str, ghz: float, permittivity: float, sigma: float
+) -> None:
     # Five digits are written above.
     assert material(name).eta(ghz * 1e9).real == pytest.approx(permittivity, rel=5e-5)
     assert conductivity(name, ghz * 1e9) == pytest.approx(sigma, rel=5e-5)
@@ -63,17 +67,29 @@ def test_skin_against_published_figures(ghz: float, permittivity: float, sigma: 
 @pytest.mark.parametrize(
     ("khz", "permittivity", "sigma"),
     # Table 3 of doi:10.1186/s12938-018-0473-9, dry skin after Gabriel: slower than radars, so the law itself is asked.
-    [(10, 1133.6, 0.00020), (100, 1119.2, 0.00045), (200, 1104.8, 0.00105), (400, 1076.3, 0.00305), (1000, 990.76, 0.0132)],
+    [
+        (10, 1133.6, 0.00020),
+        (100, 1119.2, 0.00045),
+        (200, 1104.8, 0.00105),
+        (400, 1076.3, 0.00305),
+        (1000, 990.76, 0.0132),
+    ],
 )
-def test_slow_terms_of_skin_against_published_figures(khz: float, permittivity: float, sigma: float) -> None:
+def test_slow_terms_of_skin_against_published_figures(
+    khz: float, permittivity: float, sigma: float
+) -> None:
     eta = material("skin").bands[0].eta(np.array(khz * 1e3))
     assert eta.real == pytest.approx(permittivity, abs=0.06)  # as the table is rounded
-    assert -eta.imag * 2 * np.pi * khz * 1e3 * VACUUM_PERMITTIVITY_FPM == pytest.approx(sigma, rel=0.03, abs=1e-7)
+    assert -eta.imag * 2 * np.pi * khz * 1e3 * VACUUM_PERMITTIVITY_FPM == pytest.approx(
+        sigma, rel=0.03, abs=1e-7
+    )
 
 
 def test_imaginary_part_by_the_rule_of_the_recommendation() -> None:
     # eta = eps_r - j 17.98 sigma / f, where 17.98 stands for 17.975.
-    assert material("concrete").eta(60e9) == pytest.approx(5.24 - 1j * 17.98 * 0.0462 * 60**0.7822 / 60, rel=2e-5)
+    assert material("concrete").eta(60e9) == pytest.approx(
+        5.24 - 1j * 17.98 * 0.0462 * 60**0.7822 / 60, rel=2e-5
+    )
 
 
 @pytest.mark.parametrize("name", sorted(MATERIALS))
@@ -89,7 +105,13 @@ def test_no_material_makes_waves_grow(name: str) -> None:
 
 @pytest.mark.parametrize(
     ("name", "low", "high"),
-    [("brick", 1e9, 40e9), ("marble", 1e9, 60e9), ("floorboard", 50e9, 100e9), ("wet-ground", 1e9, 10e9), ("skin", 1e9, 100e9)],
+    [
+        ("brick", 1e9, 40e9),
+        ("marble", 1e9, 60e9),
+        ("floorboard", 50e9, 100e9),
+        ("wet-ground", 1e9, 10e9),
+        ("skin", 1e9, 100e9),
+    ],
 )
 def test_limits_belong_to_it_and_nothing_beyond(name: str, low: float, high: float) -> None:
     assert np.isfinite(material(name).eta([low, high])).all()
@@ -129,7 +151,10 @@ def test_shapes_stay() -> None:
 
 
 def test_conductors() -> None:
-    assert [name for name in MATERIALS if MATERIALS[name].conducts] == ["metal", "perfect-conductor"]
+    assert [name for name in MATERIALS if MATERIALS[name].conducts] == [
+        "metal",
+        "perfect-conductor",
+    ]
     assert np.isinf(material("perfect-conductor").eta(ROOMS)).all()
 
 
@@ -140,11 +165,22 @@ def test_unknown_material(name: Any) -> None:
 
 
 def test_own_material_is_a_power_law() -> None:
-    mine = own_material("old brick", source="measured by us", low_hz=70e9, high_hz=90e9, a=4.0, b=-0.1, c=0.02, d=0.5)
+    mine = own_material(
+        "old brick",
+        source="measured by us",
+        low_hz=70e9,
+        high_hz=90e9,
+        a=4.0,
+        b=-0.1,
+        c=0.02,
+        d=0.5,
+    )
     assert mine.eta(80e9).real == pytest.approx(4 * 80**-0.1)
     assert mine.source == "measured by us"
     assert not mine.conducts
-    with pytest.raises(InputError, match="'old brick' at 60 GHz: measured by us gives it for 70 to 90 GHz"):
+    with pytest.raises(
+        InputError, match="'old brick' at 60 GHz: measured by us gives it for 70 to 90 GHz"
+    ):
         mine.eta(60e9)
 
 
@@ -169,7 +205,9 @@ GOOD = {"source": "here", "low_hz": 1e9, "high_hz": 2e9, "a": 4.0}
     ],
 )
 def test_own_material_without_meaning(key: str, value: Any) -> None:
-    constants: dict[str, Any] = {**GOOD, "b": 1.0, key: value} if key == "b" and value > 0 else {**GOOD, key: value}
+    constants: dict[str, Any] = (
+        {**GOOD, "b": 1.0, key: value} if key == "b" and value > 0 else {**GOOD, key: value}
+    )
     if key == "b":
         constants["high_hz"] = 80e9  # 4 f^-1 falls below 1 there
     with pytest.raises(InputError) as caught:

@@ -86,7 +86,9 @@ end_header
 
 
 def solid() -> trimesh.Trimesh:
-    return trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    return trimesh.Trimesh(
+        [[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]
+    )
 
 
 def stl_of_text() -> bytes:
@@ -111,7 +113,9 @@ def stl_of_text() -> bytes:
     ],
     ids=["obj", "obj in UTF-8", "stl", "stl of Windows", "ply"],
 )
-def test_names_and_comments_may_be_in_any_encoding(tmp_path: Path, ending: str, content: bytes, mark: bytes) -> None:
+def test_names_and_comments_may_be_in_any_encoding(
+    tmp_path: Path, ending: str, content: bytes, mark: bytes
+) -> None:
     path = tmp_path / f"x.{ending}"
     path.write_bytes(mark + content)
     mesh = read_mesh(path)
@@ -132,13 +136,18 @@ def test_headers_of_binary_files_may_be_in_any_encoding(tmp_path: Path, ending: 
     np.testing.assert_array_equal(plain.corners, other.corners)
 
 
-def test_a_package_that_trimesh_lacks_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_package_that_trimesh_lacks_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def lacking(*words: object, **named: object) -> None:
         raise ModuleNotFoundError("No module named 'extra'", name="extra")
 
     monkeypatch.setattr(trimesh, "load_scene", lacking)
     cube().export(tmp_path / "cube.ply")
-    assert "takes the Python package 'extra'; install that, or save the mesh as binary PLY" in refusal(tmp_path / "cube.ply")
+    assert (
+        "takes the Python package 'extra'; install that, or save the mesh as binary PLY"
+        in refusal(tmp_path / "cube.ply")
+    )
 
 
 def test_endings_in_capitals(tmp_path: Path) -> None:
@@ -180,7 +189,9 @@ def test_pieces_of_a_glb_stand_where_its_nodes_put_them(tmp_path: Path) -> None:
     mesh = read_mesh(tmp_path / "two.glb")
     assert mesh.closed
     assert volume(mesh) == pytest.approx(12.0)
-    np.testing.assert_allclose([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)], [[-0.5, -1, -1.5], [10.5, 1, 1.5]])
+    np.testing.assert_allclose(
+        [mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)], [[-0.5, -1, -1.5], [10.5, 1, 1.5]]
+    )
 
 
 def test_a_changed_file_is_read_again(tmp_path: Path) -> None:
@@ -201,7 +212,16 @@ def test_missing_folder_and_ending(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("ending", MESH_ENDINGS)
 @pytest.mark.parametrize(
-    "content", [b"", b"\0", b"hello\nworld\n", b"ply\n", b"glTF" + bytes(40), b"v 1 2\nf 1 2 3\n", b"\xff" * 200]
+    "content",
+    [
+        b"",
+        b"\0",
+        b"hello\nworld\n",
+        b"ply\n",
+        b"glTF" + bytes(40),
+        b"v 1 2\nf 1 2 3\n",
+        b"\xff" * 200,
+    ],
 )
 def test_what_is_no_mesh(tmp_path: Path, ending: str, content: bytes) -> None:
     file = tmp_path / f"bad{ending}"
@@ -230,7 +250,9 @@ def test_promises_of_a_header_are_not_believed(tmp_path: Path) -> None:
         (tmp_path / "huge.ply").write_text(head)
         assert "promises more" in refusal(tmp_path / "huge.ply")
     comments = "comment nothing\n" * 9000
-    (tmp_path / "long.ply").write_text(f"ply\nformat ascii 1.0\n{comments}element face 9999999999\nend_header\n")
+    (tmp_path / "long.ply").write_text(
+        f"ply\nformat ascii 1.0\n{comments}element face 9999999999\nend_header\n"
+    )
     assert "header has no end" in refusal(tmp_path / "long.ply")
     (tmp_path / "huge.stl").write_bytes(bytes(80) + struct.pack("<I", 2**32 - 1) + bytes(100))
     refusal(tmp_path / "huge.stl")
@@ -244,10 +266,16 @@ def test_limits(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "MB are allowed" in refusal(tmp_path / "cube.obj")
 
 
-def test_a_glb_that_repeats_its_mesh_is_counted_before_it_is_unfolded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_glb_that_repeats_its_mesh_is_counted_before_it_is_unfolded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = trimesh.Scene()
     for k in range(5):
-        scene.add_geometry(cube(), geom_name="cube", transform=trimesh.transformations.translation_matrix((4 * k, 0, 0)))
+        scene.add_geometry(
+            cube(),
+            geom_name="cube",
+            transform=trimesh.transformations.translation_matrix((4 * k, 0, 0)),
+        )
     scene.export(tmp_path / "many.glb")
     monkeypatch.setattr(mesh_files, "MOST_FACES", 50)
     assert "has 60 triangles" in refusal(tmp_path / "many.glb")
@@ -278,12 +306,19 @@ def test_other_files_are_never_opened(tmp_path: Path) -> None:
     }
     (tmp_path / "thief.glb").write_bytes(glb({**TREE, **outside}))
     refusal(tmp_path / "thief.glb")
-    (tmp_path / "lib.obj").write_text("mtllib secret.bin\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n")
+    (tmp_path / "lib.obj").write_text(
+        "mtllib secret.bin\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl x\nf 1 2 3\n"
+    )
     assert len(read_mesh(tmp_path / "lib.obj").faces) == 1
 
 
-@pytest.mark.parametrize("accessors", [[{"componentType": 5126, "count": 10**11, "type": "VEC3"}], [{"count": 10**7}] * 3])
-def test_a_glb_cannot_ask_for_zeros_without_end(tmp_path: Path, accessors: list[dict[str, Any]]) -> None:
+@pytest.mark.parametrize(
+    "accessors",
+    [[{"componentType": 5126, "count": 10**11, "type": "VEC3"}], [{"count": 10**7}] * 3],
+)
+def test_a_glb_cannot_ask_for_zeros_without_end(
+    tmp_path: Path, accessors: list[dict[str, Any]]
+) -> None:
     (tmp_path / "zeros.glb").write_bytes(glb({**TREE, "accessors": accessors}))
     assert "promises more data" in refusal(tmp_path / "zeros.glb")
 
@@ -294,11 +329,17 @@ def test_a_glb_with_a_broken_header(tmp_path: Path, accessors: Any) -> None:
     assert "header cannot be read" in refusal(tmp_path / "broken.glb")
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=60, deadline=None
+)
 @given(data=st.data())
 def test_damaged_files_give_a_mesh_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
     ending = data.draw(st.sampled_from(MESH_ENDINGS))
-    whole = bytearray(cube().export(file_type=ending[1:]) if ending != ".obj" else cube().export(file_type="obj").encode())
+    whole = bytearray(
+        cube().export(file_type=ending[1:])
+        if ending != ".obj"
+        else cube().export(file_type="obj").encode()
+    )
     for _ in range(data.draw(st.integers(1, 6))):
         whole[data.draw(st.integers(0, len(whole) - 1))] = data.draw(st.integers(0, 255))
     file = tmp_path / f"damaged{ending}"

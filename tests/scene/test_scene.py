@@ -48,7 +48,9 @@ def test_a_file(tmp_path: Path) -> None:
     assert Scene.load(write(tmp_path, "")).name == "attic"
 
 
-@pytest.mark.parametrize("name", ["ballroom", "", "free-space.tml", "Free-Space", "no/such/place", "nul\0l"])
+@pytest.mark.parametrize(
+    "name", ["ballroom", "", "free-space.tml", "Free-Space", "no/such/place", "nul\0l"]
+)
 def test_unknown_name(name: str) -> None:
     message = refusal(name)
     assert f"scene {name!r} is unknown" in message
@@ -71,7 +73,9 @@ def test_not_toml(tmp_path: Path, text: str | bytes) -> None:
     assert "attic.toml' is not TOML: " in refusal(write(tmp_path, text))
 
 
-@pytest.mark.parametrize(("text", "key"), [('colour = "red"', "colour"), ("[lights]\nnorth = 3", "lights")])
+@pytest.mark.parametrize(
+    ("text", "key"), [('colour = "red"', "colour"), ("[lights]\nnorth = 3", "lights")]
+)
 def test_unknown_key(tmp_path: Path, text: str, key: str) -> None:
     message = refusal(write(tmp_path, text))
     assert f"unknown key '{key}'" in message
@@ -142,7 +146,10 @@ def test_the_radar_stands_where_the_scene_says() -> None:
     ("fields", "reason"),
     [
         # The front of the screen looks along -x, so its slab is at -3 to -2.9875 m.
-        ({"walls": (WALL,), "radar_position_m": (-2.995, 1.0, 1.0)}, "antennas inside wall 'screen'"),
+        (
+            {"walls": (WALL,), "radar_position_m": (-2.995, 1.0, 1.0)},
+            "antennas inside wall 'screen'",
+        ),
         ({"furniture": (CHAIR,), "radar_position_m": (1.0, 2.0, 1.3)}, "'chair' is 0."),
         ({"furniture": (CHAIR,), "radar_position_m": (0.5, 2.0, 0.5)}, "0.3 m or more are needed"),
     ],

@@ -79,7 +79,15 @@ def test_everything(tmp_path: Path) -> None:
     assert scene.radar_position_m == (-4, 1, 1)
     assert scene.person_position_m == (0.5, 0)
     assert scene.heading_deg == 30
-    assert [wall.name for wall in scene.walls] == ["near", "far", "right", "left", "floor", "ceiling", "screen"]
+    assert [wall.name for wall in scene.walls] == [
+        "near",
+        "far",
+        "right",
+        "left",
+        "floor",
+        "ceiling",
+        "screen",
+    ]
     assert scene.walls[4].roughness_m == 0.001
     assert scene.walls[0].roughness_m == 0
     assert scene.furniture[0].material.source == "a table of mine"
@@ -99,7 +107,10 @@ def test_one_side_of_a_room_may_differ(tmp_path: Path) -> None:
 def test_a_mesh_beside_the_file(tmp_path: Path) -> None:
     (tmp_path / "things").mkdir()
     trimesh.creation.box((300.0, 200.0, 100.0)).export(tmp_path / "things" / "box.glb")
-    own = FURNITURE.replace('"chair"', '"things/box.glb"') + "metres_per_unit = 0.001\nyaw_deg = 90\nscale = 2\n"
+    own = (
+        FURNITURE.replace('"chair"', '"things/box.glb"')
+        + "metres_per_unit = 0.001\nyaw_deg = 90\nscale = 2\n"
+    )
     scene = load(tmp_path, own)
     size = np.ptp(scene.furniture[0].triangles().vertices, axis=0)
     np.testing.assert_allclose(size, (0.4, 0.6, 0.2))
@@ -109,14 +120,24 @@ def test_a_mesh_beside_the_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "mesh", ["../box.ply", "/tmp/box.ply", "a/../../box.ply", "nul\\u0000l.ply", "link/box.ply", "loop/box.ply"]
+    "mesh",
+    [
+        "../box.ply",
+        "/tmp/box.ply",
+        "a/../../box.ply",
+        "nul\\u0000l.ply",
+        "link/box.ply",
+        "loop/box.ply",
+    ],
 )
 def test_no_mesh_from_elsewhere(tmp_path: Path, mesh: str) -> None:
     (tmp_path / "scene").mkdir()
     (tmp_path / "scene" / "link").symlink_to(tmp_path)
     (tmp_path / "scene" / "loop").symlink_to(tmp_path / "scene" / "loop")
     trimesh.creation.box((1.0, 1.0, 1.0)).export(tmp_path / "box.ply")
-    message = refusal(tmp_path / "scene", FURNITURE.replace('"chair"', f'"{mesh}"') + "metres_per_unit = 1\n")
+    message = refusal(
+        tmp_path / "scene", FURNITURE.replace('"chair"', f'"{mesh}"') + "metres_per_unit = 1\n"
+    )
     assert "leaves the folder" in message or "mesh = " in message or "loop" in message
 
 
@@ -128,16 +149,34 @@ def test_no_mesh_from_elsewhere(tmp_path: Path, mesh: str) -> None:
         (ROOM.replace("[6, 4, 2.5]", "[6, 4]"), ["size_m = [6, 4]", "3 numbers"]),
         (ROOM.replace("[6, 4, 2.5]", "[6, -4, 2.5]"), ["size_m", "0.1 to 100 m"]),
         (ROOM.replace("[room.floor]", "[room.roof]"), ["[room] unknown key 'roof'", "floor"]),
-        (ROOM.replace("[room.walls]", "[room.far]"), ["[room.near], or [room.walls] for all four is missing"]),
-        (ROOM.replace('"concrete"', '"concreet"'), ["[room.floor]", "'concreet'", "concrete", "[materials.NAME]"]),
-        (ROOM.replace("thickness_m = 0.2\n", "thickness_m = 20\n"), ["thickness_m = 20", "'floor'", "10"]),
-        (ROOM.replace("thickness_m = 0.2\n", "thicknes_m = 0.2\n"), ["[room.floor] unknown key 'thicknes_m'"]),
+        (
+            ROOM.replace("[room.walls]", "[room.far]"),
+            ["[room.near], or [room.walls] for all four is missing"],
+        ),
+        (
+            ROOM.replace('"concrete"', '"concreet"'),
+            ["[room.floor]", "'concreet'", "concrete", "[materials.NAME]"],
+        ),
+        (
+            ROOM.replace("thickness_m = 0.2\n", "thickness_m = 20\n"),
+            ["thickness_m = 20", "'floor'", "10"],
+        ),
+        (
+            ROOM.replace("thickness_m = 0.2\n", "thicknes_m = 0.2\n"),
+            ["[room.floor] unknown key 'thicknes_m'"],
+        ),
         ("walls = 3", ["walls = 3", "[[walls]]"]),
-        (WALL.replace("[0, 2, 0]", "[0, 2, 1]"), ["[[walls]] number 1", "'screen'", "right angles"]),
+        (
+            WALL.replace("[0, 2, 0]", "[0, 2, 1]"),
+            ["[[walls]] number 1", "'screen'", "right angles"],
+        ),
         (WALL + WALL, ["two of the name 'screen'"]),
         (ROOM + WALL.replace("screen", "far"), ["two of the name 'far'"]),
         (WALL.replace('"glass"', "7"), ["[[walls]] number 1", "material = 7"]),
-        (FURNITURE.replace('"chair"', '"throne"'), ["[[furniture]] number 1", "'throne'", "sofa", ".ply"]),
+        (
+            FURNITURE.replace('"chair"', '"throne"'),
+            ["[[furniture]] number 1", "'throne'", "sofa", ".ply"],
+        ),
         (FURNITURE.replace('"chair"', '"throne.fbx"'), ["throne.fbx", ".glb"]),
         (FURNITURE.replace('"chair"', '"throne.ply"'), ["metres_per_unit is missing"]),
         (FURNITURE.replace('"chair"', "[]"), ["[[furniture]] number 1", "mesh = []"]),
@@ -145,7 +184,10 @@ def test_no_mesh_from_elsewhere(tmp_path: Path, mesh: str) -> None:
         (FURNITURE + "yaw = 2", ["unknown key 'yaw'", "yaw_deg"]),
         (FURNITURE.replace('name = "seat"\n', ""), ["[[furniture]] number 1 name is missing"]),
         (FURNITURE + FURNITURE, ["two of the name 'seat'"]),
-        (MATERIAL.replace('source = "a table of mine"\n', ""), ["[materials.felt] source is missing"]),
+        (
+            MATERIAL.replace('source = "a table of mine"\n', ""),
+            ["[materials.felt] source is missing"],
+        ),
         (MATERIAL.replace('"a table of mine"', '""'), ["material 'felt'", "source = ''"]),
         (MATERIAL.replace("felt", "glass"), ["'glass'", "ITU-R P.2040-3", "another"]),
         (MATERIAL.replace("a = 1.3", "a = 0.3"), ["'felt'", "1 or more"]),
@@ -166,7 +208,9 @@ def test_mistakes(tmp_path: Path, text: str, parts: list[str]) -> None:
 
 def test_meshes_are_judged_when_the_scene_is_read(tmp_path: Path) -> None:
     (tmp_path / "bad.ply").write_text("ply\n")
-    assert "bad.ply' is broken" in refusal(tmp_path, FURNITURE.replace('"chair"', '"bad.ply"') + "metres_per_unit = 1\n")
+    assert "bad.ply' is broken" in refusal(
+        tmp_path, FURNITURE.replace('"chair"', '"bad.ply"') + "metres_per_unit = 1\n"
+    )
     thin = FURNITURE.replace('"chair"', '"trihedral"')
     assert "'wood' of a thin sheet; allowed: metal" in refusal(tmp_path, thin)
 
@@ -194,19 +238,36 @@ def test_long_and_broken_lines_stay_one_line(tmp_path: Path, text: str) -> None:
 
 # -- anything at all -------------------------------------------------------------------------------------------------
 
-_WORDS = st.sampled_from(["chair", "trihedral", "concrete", "metal", "felt", "../x.ply", "x.ply", "", "\n", "near"])
+_WORDS = st.sampled_from(
+    ["chair", "trihedral", "concrete", "metal", "felt", "../x.ply", "x.ply", "", "\n", "near"]
+)
 _VALUES = st.recursive(
-    st.one_of(st.integers(-3, 3), st.integers(), st.floats(), st.booleans(), _WORDS, st.text(max_size=3)),
-    lambda inner: st.one_of(st.lists(inner, max_size=4), st.dictionaries(st.text(max_size=3), inner, max_size=3)),
+    st.one_of(
+        st.integers(-3, 3), st.integers(), st.floats(), st.booleans(), _WORDS, st.text(max_size=3)
+    ),
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4), st.dictionaries(st.text(max_size=3), inner, max_size=3)
+    ),
     max_leaves=6,
 )
-_SCALARS = st.one_of(st.lists(st.floats(-3, 3), min_size=2, max_size=3), st.floats(0, 3), _WORDS, _VALUES)
+_SCALARS = st.one_of(
+    st.lists(st.floats(-3, 3), min_size=2, max_size=3), st.floats(0, 3), _WORDS, _VALUES
+)
 _KEYS = {
     "radar": ("position_m",),
     "person": ("position_m", "heading_deg"),
     "room": ("size_m", "corner_m", "walls", "floor", "ceiling", "near"),
     "walls": ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m", "roughness_m"),
-    "furniture": ("name", "mesh", "material", "position_m", "yaw_deg", "scale", "metres_per_unit", "sheet"),
+    "furniture": (
+        "name",
+        "mesh",
+        "material",
+        "position_m",
+        "yaw_deg",
+        "scale",
+        "metres_per_unit",
+        "sheet",
+    ),
     "materials": ("felt", "concrete"),
 }
 
@@ -218,8 +279,15 @@ def _tables(keys: tuple[str, ...]) -> st.SearchStrategy[dict[str, Any]]:
 _SCENES = st.fixed_dictionaries(
     {},
     optional={
-        **{key: st.one_of(_tables(keys), _VALUES) for key, keys in _KEYS.items() if key not in ("walls", "furniture")},
-        **{key: st.one_of(st.lists(_tables(_KEYS[key]), max_size=2), _VALUES) for key in ("walls", "furniture")},
+        **{
+            key: st.one_of(_tables(keys), _VALUES)
+            for key, keys in _KEYS.items()
+            if key not in ("walls", "furniture")
+        },
+        **{
+            key: st.one_of(st.lists(_tables(_KEYS[key]), max_size=2), _VALUES)
+            for key in ("walls", "furniture")
+        },
         "name": _VALUES,
         "other": _VALUES,
     },
@@ -231,7 +299,9 @@ def _toml(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_toml(key)} = {_toml(inner)}" for key, inner in value.items()) + "}"
+        return (
+            "{" + ", ".join(f"{_toml(key)} = {_toml(inner)}" for key, inner in value.items()) + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, str):
@@ -249,14 +319,18 @@ def _only_input_errors(folder: Path, content: bytes) -> None:
         assert str(error).isprintable()  # noqa: PT017
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=150
+)
 @given(table=_SCENES)
 def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, table: dict[str, Any]) -> None:
     text = "\n".join(f"{key} = {_toml(value)}" for key, value in table.items())
     _only_input_errors(tmp_path, text.encode("utf-8", "surrogatepass"))
 
 
-@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=100)
+@settings(
+    suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None, max_examples=100
+)
 @given(data=st.data())
 def test_any_damage_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
     whole = bytearray((scenes_folder() / "bathroom.toml").read_bytes())

@@ -23,7 +23,14 @@ def box(scene: Scene) -> np.ndarray:
 
 
 def test_the_scenes_promised_are_there() -> None:
-    promised = {"free-space", "anechoic-with-corner-reflectors", "living-room", "bedroom", "corridor", "bathroom"}
+    promised = {
+        "free-space",
+        "anechoic-with-corner-reflectors",
+        "living-room",
+        "bedroom",
+        "corridor",
+        "bathroom",
+    }
     assert promised <= set(NAMES)
 
 

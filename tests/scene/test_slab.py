@@ -39,8 +39,16 @@ def chain(
     return complex(tangential if polarization == "te" else -tangential), complex(2 / total)
 
 
-@given(eps=permittivities, loss=losses, cosine=cosines, thickness=st.floats(1e-4, 0.02), polarization=polarizations)
-def test_slab_against_chain_matrix(eps: float, loss: float, cosine: float, thickness: float, polarization: Polarization) -> None:
+@given(
+    eps=permittivities,
+    loss=losses,
+    cosine=cosines,
+    thickness=st.floats(1e-4, 0.02),
+    polarization=polarizations,
+)
+def test_slab_against_chain_matrix(
+    eps: float, loss: float, cosine: float, thickness: float, polarization: Polarization
+) -> None:
     ours = slab(eps - 1j * loss, thickness, 12e9, cosine, polarization)
     theirs = chain(eps - 1j * loss, thickness, 12e9, cosine, polarization)
     # Cosine and sine of a complex phase grow to 1e17 here, and a near-resonance divides by 1e-3.
@@ -49,20 +57,33 @@ def test_slab_against_chain_matrix(eps: float, loss: float, cosine: float, thick
 
 
 @given(eps=permittivities, cosine=cosines, thickness=thicknesses, polarization=polarizations)
-def test_a_slab_without_loss_keeps_the_energy(eps: float, cosine: float, thickness: float, polarization: Polarization) -> None:
+def test_a_slab_without_loss_keeps_the_energy(
+    eps: float, cosine: float, thickness: float, polarization: Polarization
+) -> None:
     reflected, transmitted = slab(eps, thickness, 77e9, cosine, polarization)
     assert abs(reflected) ** 2 + abs(transmitted) ** 2 == pytest.approx(1.0, abs=1e-9)
 
 
-@given(eps=permittivities, loss=losses, cosine=cosines, thickness=thicknesses, polarization=polarizations)
-def test_no_slab_gives_energy(eps: float, loss: float, cosine: float, thickness: float, polarization: Polarization) -> None:
+@given(
+    eps=permittivities,
+    loss=losses,
+    cosine=cosines,
+    thickness=thicknesses,
+    polarization=polarizations,
+)
+def test_no_slab_gives_energy(
+    eps: float, loss: float, cosine: float, thickness: float, polarization: Polarization
+) -> None:
     reflected, transmitted = slab(eps - 1j * loss, thickness, 77e9, cosine, polarization)
     assert abs(reflected) ** 2 + abs(transmitted) ** 2 <= 1 + 1e-9
     assert abs(reflection(eps - 1j * loss, cosine, polarization)) <= 1 + 1e-12
 
 
 @BOTH
-@pytest.mark.parametrize("name", [name for name in MATERIALS if MATERIALS[name].holds(77e9) and not MATERIALS[name].conducts])
+@pytest.mark.parametrize(
+    "name",
+    [name for name in MATERIALS if MATERIALS[name].holds(77e9) and not MATERIALS[name].conducts],
+)
 def test_a_thin_enough_slab_is_not_there(name: str, polarization: Polarization) -> None:
     reflected, transmitted = slab(material(name).eta(77e9), 1e-12, 77e9, [1.0, 0.5], polarization)
     # k (eta - 1) d is 1e-8 at most.
@@ -164,7 +185,10 @@ def test_broadcasting(polarization: Polarization) -> None:
     reflected, transmitted = slab(eta, thickness, frequency, 0.7, polarization)
     assert reflected.shape == transmitted.shape == (2, 3)
     alone = slab(eta[1], 0.025, 14e9, 0.7, polarization)
-    assert (reflected[1, 1], transmitted[1, 1]) == (pytest.approx(alone[0]), pytest.approx(alone[1]))
+    assert (reflected[1, 1], transmitted[1, 1]) == (
+        pytest.approx(alone[0]),
+        pytest.approx(alone[1]),
+    )
 
 
 @pytest.mark.parametrize(
@@ -182,7 +206,9 @@ def test_broadcasting(polarization: Polarization) -> None:
         (4.0, 0.1, 12e9, 1.0, "v"),
     ],
 )
-def test_values_without_meaning(eta: complex, thickness: float, frequency: float, cosine: float, polarization: str) -> None:
+def test_values_without_meaning(
+    eta: complex, thickness: float, frequency: float, cosine: float, polarization: str
+) -> None:
     with pytest.raises(InputError) as caught:
         slab(eta, thickness, frequency, cosine, polarization)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)

@@ -74,7 +74,10 @@ def test_a_wall_without_meaning(key: str, value: Any) -> None:
 
 
 def surfaces() -> dict[str, Surface]:
-    return {side: Surface(material=CONCRETE, thickness_m=0.1 + 0.01 * k) for k, side in enumerate(ROOM_SIDES)}
+    return {
+        side: Surface(material=CONCRETE, thickness_m=0.1 + 0.01 * k)
+        for k, side in enumerate(ROOM_SIDES)
+    }
 
 
 sizes = st.tuples(*[st.floats(0.1, 100)] * 3)
@@ -82,7 +85,9 @@ places = st.tuples(*[st.floats(-100, 100)] * 2)
 
 
 @given(size=sizes, corner=places)
-def test_a_room_is_closed_and_looks_inward(size: tuple[float, float, float], corner: tuple[float, float]) -> None:
+def test_a_room_is_closed_and_looks_inward(
+    size: tuple[float, float, float], corner: tuple[float, float]
+) -> None:
     walls = room_walls(size, corner, surfaces())
     low = np.array([*corner, 0.0])
     middle = low + np.array(size) / 2
@@ -96,19 +101,30 @@ def test_a_room_is_closed_and_looks_inward(size: tuple[float, float, float], cor
         assert np.all(made.corners <= low + np.array(size) + 1e-12)
     # A closed surface: its directed areas cancel, and by Gauss it holds the room's volume.
     np.testing.assert_allclose(sum(made.area_m2 * made.normal for made in walls), 0, atol=1e-9)
-    volume = sum(made.area_m2 * float((middle - made.corners[0]) @ made.normal) for made in walls) / 3
+    volume = (
+        sum(made.area_m2 * float((middle - made.corners[0]) @ made.normal) for made in walls) / 3
+    )
     assert volume == pytest.approx(np.prod(size), rel=1e-9)
 
 
 def test_sides_of_a_room_are_where_their_names_say() -> None:
     walls = {made.name: made for made in room_walls((4, 3, 2.5), (-1, -2), surfaces())}
-    expected = {"near": (0, -1), "far": (0, 3), "right": (1, -2), "left": (1, 1), "floor": (2, 0), "ceiling": (2, 2.5)}
+    expected = {
+        "near": (0, -1),
+        "far": (0, 3),
+        "right": (1, -2),
+        "left": (1, 1),
+        "floor": (2, 0),
+        "ceiling": (2, 2.5),
+    }
     for name, (axis, place) in expected.items():
         assert np.all(walls[name].corners[:, axis] == place)
     assert walls["floor"].thickness_m == pytest.approx(0.14)
 
 
-@pytest.mark.parametrize("size", [(0, 1, 1), (1, -1, 1), (1, 1, 1000), (1, 1), "abc", None, (1, 1, float("inf"))])
+@pytest.mark.parametrize(
+    "size", [(0, 1, 1), (1, -1, 1), (1, 1, 1000), (1, 1), "abc", None, (1, 1, float("inf"))]
+)
 def test_rooms_without_meaning(size: Any) -> None:
     with pytest.raises(InputError, match="size_m"):
         room_walls(size, (0, 0), surfaces())

@@ -21,7 +21,9 @@ LOW = Radar.preset("paper-12ghz")
 SMALL = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=8, frame_duration_s=3.75e-3)
 
 
-def noise(power: float, radar: Radar, chirps: int, seed: int = 0, first: int = 0) -> NDArray[np.complex64]:
+def noise(
+    power: float, radar: Radar, chirps: int, seed: int = 0, first: int = 0
+) -> NDArray[np.complex64]:
     samples = np.zeros((chirps, radar.n_rx, radar.samples_per_chirp), np.complex64)
     Noise(power, seed).add(samples, radar, first)
     return samples
@@ -35,15 +37,21 @@ def plenty() -> NDArray[np.complex64]:
 def test_power(plenty: NDArray[np.complex64]) -> None:
     # |n|^2 of power 1 has standard deviation 1: five of them for the mean, each with its own seed.
     for power, samples in ((1.0, plenty), (2.5e-7, noise(2.5e-7, LOW, 480, seed=2))):
-        assert np.mean(np.abs(samples) ** 2) == pytest.approx(power, rel=5 / math.sqrt(samples.size))
+        assert np.mean(np.abs(samples) ** 2) == pytest.approx(
+            power, rel=5 / math.sqrt(samples.size)
+        )
 
 
 def test_circular_and_gaussian(plenty: NDArray[np.complex64]) -> None:
     spread = 5 / math.sqrt(plenty.size)
     assert abs(plenty.mean()) < spread
-    assert abs(np.mean(plenty.astype(complex) ** 2)) < spread * math.sqrt(2)  # real and imaginary alike and unrelated
+    assert abs(np.mean(plenty.astype(complex) ** 2)) < spread * math.sqrt(
+        2
+    )  # real and imaginary alike and unrelated
     # Fourth moment of a complex Gaussian: 2, where |n|^4 has variance 24 - 4.
-    assert np.mean(np.abs(plenty.astype(complex)) ** 4) == pytest.approx(2, abs=spread * math.sqrt(20))
+    assert np.mean(np.abs(plenty.astype(complex)) ** 4) == pytest.approx(
+        2, abs=spread * math.sqrt(20)
+    )
 
 
 def test_both_parts_are_normal_and_the_phase_is_even(plenty: NDArray[np.complex64]) -> None:
@@ -71,7 +79,9 @@ def test_white(plenty: NDArray[np.complex64], lag: tuple[int, int, int]) -> None
     late = plenty[tuple(slice(k, None) for k in lag)]
     assert abs(np.mean(late * early.conj())) < 5 / math.sqrt(early.size)
     # Nor do powers know of each other, whose deviation is 1.
-    assert abs(np.mean((np.abs(late) ** 2 - 1) * (np.abs(early) ** 2 - 1))) < 5 / math.sqrt(early.size)
+    assert abs(np.mean((np.abs(late) ** 2 - 1) * (np.abs(early) ** 2 - 1))) < 5 / math.sqrt(
+        early.size
+    )
 
 
 @given(cuts=st.lists(st.integers(0, 10), max_size=4), end=st.integers(1, 32))
@@ -99,7 +109,9 @@ def test_seed() -> None:
 
 
 @pytest.mark.parametrize("threads", [1, 3])
-def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch, threads: int) -> None:
+def test_any_number_of_threads_makes_the_same(
+    monkeypatch: pytest.MonkeyPatch, threads: int
+) -> None:
     usual = noise(1.0, SMALL, 300)
     with ThreadPoolExecutor(threads) as pool:
         monkeypatch.setattr(rtradar.system.threads, "_pool", lambda: pool)
@@ -115,7 +127,9 @@ def test_it_is_the_transform_of_its_bits() -> None:
 
 
 def test_power_scales_the_same_noise() -> None:
-    np.testing.assert_allclose(noise(4.0, SMALL, 30), 2 * noise(1.0, SMALL, 30), rtol=1e-6)  # float32
+    np.testing.assert_allclose(
+        noise(4.0, SMALL, 30), 2 * noise(1.0, SMALL, 30), rtol=1e-6
+    )  # float32
 
 
 def test_it_is_added_to_what_is_there() -> None:
@@ -127,7 +141,9 @@ def test_it_is_added_to_what_is_there() -> None:
 @pytest.mark.parametrize(("snr_db", "power"), [(20, 0.03), (0, 3), (-10, 30), (3.0103, 1.5)])
 def test_power_for_an_snr(snr_db: float, power: float) -> None:
     made = Noise.for_snr(3.0, snr_db, seed=9)
-    assert made.power == pytest.approx(power, rel=1e-6)  # 3.0103 dB is a factor of two to seven digits
+    assert made.power == pytest.approx(
+        power, rel=1e-6
+    )  # 3.0103 dB is a factor of two to seven digits
     assert made.seed == 9
 
 

@@ -15,11 +15,15 @@ from rtradar.signal import synthesize
 from rtradar.signal.synthesis import MANY_ECHOES
 
 LOW = Radar.preset("paper-12ghz")
-FEW, TWO, ONE = (Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=n, bandwidth_hz=1e8) for n in (16, 2, 1))
+FEW, TWO, ONE = (
+    Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=n, bandwidth_hz=1e8) for n in (16, 2, 1)
+)
 ODD = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=45, frame_duration_s=3.75e-3)
 
 
-def crowd(radar: Radar, nodes: int, seed: int, *, count: int = MANY_ECHOES, chirps: int = 3) -> Echoes:
+def crowd(
+    radar: Radar, nodes: int, seed: int, *, count: int = MANY_ECHOES, chirps: int = 3
+) -> Echoes:
     rng = np.random.default_rng(seed)
     shape = (chirps, radar.n_rx, count)
     places = -np.cos(np.pi * (np.arange(nodes) + 0.5) / nodes) / 2
@@ -45,14 +49,18 @@ def plain(echoes: Echoes, radar: Radar) -> NDArray[np.complex128]:
     amplitude = np.zeros(turns.shape, dtype=np.complex128)
     for node, own in enumerate(echoes.frequency):
         others = np.delete(echoes.frequency, node)
-        amplitude += echoes.amplitude[node][..., None] * np.prod((frequency[:, None] - others) / (own - others), axis=1)
+        amplitude += echoes.amplitude[node][..., None] * np.prod(
+            (frequency[:, None] - others) / (own - others), axis=1
+        )
     heard = (beat >= 0) & (beat < radar.sample_rate_hz)
     return np.asarray(np.sum(np.where(heard, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2))
 
 
 # One grid up to three nodes, two up to six; beyond, no grid. Ten times the rounding of complex64.
 @pytest.mark.parametrize("nodes", [1, 2, 3, 4, 6, 7])
-@pytest.mark.parametrize("radar", [LOW, ODD, FEW, TWO, ONE], ids=["12ghz", "45 samples", "16 samples", "2", "1"])
+@pytest.mark.parametrize(
+    "radar", [LOW, ODD, FEW, TWO, ONE], ids=["12ghz", "45 samples", "16 samples", "2", "1"]
+)
 def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int) -> None:
     echoes = crowd(radar, nodes, seed=nodes)
     expected = plain(echoes, radar)
@@ -63,15 +71,23 @@ def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int) -> N
 
 @settings(max_examples=25)
 @given(st.integers(0, 2**32 - 1))
-def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chirps(seed: int) -> None:
+def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chirps(
+    seed: int,
+) -> None:
     echoes = crowd(ODD, 3, seed, chirps=60)
     order = np.random.default_rng(seed).permutation(MANY_ECHOES)
     times = ODD.chirp_times(60)
-    shuffled = replace(echoes, length=echoes.length[..., order], amplitude=echoes.amplitude[..., order])
+    shuffled = replace(
+        echoes, length=echoes.length[..., order], amplitude=echoes.amplitude[..., order]
+    )
     found = synthesize(echoes, ODD, times, dtype=np.complex64)
     largest = np.abs(found).max()
-    np.testing.assert_allclose(synthesize(shuffled, ODD, times, dtype=np.complex64), found, rtol=0, atol=2e-6 * largest)
-    tail = replace(echoes, length=echoes.length[50:], amplitude=echoes.amplitude[:, 50:], tx=echoes.tx[50:])
+    np.testing.assert_allclose(
+        synthesize(shuffled, ODD, times, dtype=np.complex64), found, rtol=0, atol=2e-6 * largest
+    )
+    tail = replace(
+        echoes, length=echoes.length[50:], amplitude=echoes.amplitude[:, 50:], tx=echoes.tx[50:]
+    )
     np.testing.assert_array_equal(synthesize(tail, ODD, times[50:], dtype=np.complex64), found[50:])
 
 

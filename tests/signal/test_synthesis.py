@@ -26,7 +26,9 @@ LONE = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
 Complex = NDArray[np.complex128]
 
 
-def make_echoes(length: object, amplitude: object, frequency: object = (14e9,), tx: object = None) -> Echoes:
+def make_echoes(
+    length: object, amplitude: object, frequency: object = (14e9,), tx: object = None
+) -> Echoes:
     lengths = np.asarray(length, dtype=np.float64)
     count = lengths.shape[2]
     transmitters = np.arange(lengths.shape[0]) if tx is None else tx
@@ -40,12 +42,18 @@ def make_echoes(length: object, amplitude: object, frequency: object = (14e9,), 
     )
 
 
-def random_echoes(radar: Radar, chirps: int, count: int, *, nodes: int = 1, seed: int = 0) -> Echoes:
+def random_echoes(
+    radar: Radar, chirps: int, count: int, *, nodes: int = 1, seed: int = 0
+) -> Echoes:
     """Echoes anywhere in the band, of every phase."""
     rng = np.random.default_rng(seed)
     shape = (chirps, radar.n_rx, count)
     amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
-    span = np.linspace(0, radar.bandwidth_hz, nodes) if nodes > 1 else np.array([radar.bandwidth_hz / 2])
+    span = (
+        np.linspace(0, radar.bandwidth_hz, nodes)
+        if nodes > 1
+        else np.array([radar.bandwidth_hz / 2])
+    )
     return make_echoes(
         rng.uniform(0.01, 0.999, shape) * 2 * radar.max_range_m,
         amplitude,
@@ -72,7 +80,11 @@ def synthesize_block(echoes: Echoes, radar: Radar) -> Complex:
 
 def plain_sum(echoes: Echoes, radar: Radar) -> Complex:
     """x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, the turns in long double."""
-    t = np.arange(radar.samples_per_chirp, dtype=np.longdouble) * radar.chirp_duration_s / radar.samples_per_chirp
+    t = (
+        np.arange(radar.samples_per_chirp, dtype=np.longdouble)
+        * radar.chirp_duration_s
+        / radar.samples_per_chirp
+    )
     slope = np.longdouble(radar.bandwidth_hz) / radar.chirp_duration_s
     f = radar.start_frequency_hz + slope * t
     amplitude = np.zeros((*echoes.length.shape, len(t)), dtype=np.complex128)
@@ -140,7 +152,9 @@ def test_nodes_anywhere_in_any_order() -> None:
     for nodes in ([12e9, 14e9, 16e9], [15e9, 12.5e9, 13e9], [11e9, 17e9, 14e9]):
         frequency = np.array(nodes)
         amplitude = np.broadcast_to(parabola(frequency)[:, None, None, None], (3, 2, 8, 1))
-        results.append(synthesize_block(make_echoes(np.full((2, 8, 1), 8.0), amplitude, frequency), LOW))
+        results.append(
+            synthesize_block(make_echoes(np.full((2, 8, 1), 8.0), amplitude, frequency), LOW)
+        )
     assert relative_error(results[1], results[0]) < TOLERANCE
     assert relative_error(results[2], results[0]) < TOLERANCE
     # The amplitude of sample n is that at 12 GHz + n / 256 x 4 GHz.
@@ -153,7 +167,9 @@ def test_nodes_anywhere_in_any_order() -> None:
 
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
 @pytest.mark.parametrize("reflection", [1, -1, 1j, 0.3 - 0.8j])
-def test_if_is_the_chirp_times_the_conjugate_of_what_comes_back(radar: Radar, reflection: complex) -> None:
+def test_if_is_the_chirp_times_the_conjugate_of_what_comes_back(
+    radar: Radar, reflection: complex
+) -> None:
     # With exp(+j omega t) a chirp leaves, comes back tau later and multiplied by the reflection coefficient, and is mixed.
     tau = 8.4 / SPEED_OF_LIGHT_MPS
     slope = np.longdouble(radar.bandwidth_hz) / radar.chirp_duration_s
@@ -179,8 +195,12 @@ def test_conjugate_of_the_if_is_the_received_spectrum() -> None:
     scattering = np.array([1j, -0.4 + 0.2j, 0.8])
     echoes = make_echoes(length[None, None], np.conj(scattering)[None, None, None])
     f = slow.start_frequency_hz + np.arange(256) / 256 * slow.bandwidth_hz
-    spectrum = (scattering[:, None] * np.exp(-2j * np.pi * f * length[:, None] / SPEED_OF_LIGHT_MPS)).sum(axis=0)
-    np.testing.assert_allclose(np.conj(synthesize_block(echoes, slow)[0, 0]), spectrum, rtol=0, atol=3e-6)
+    spectrum = (
+        scattering[:, None] * np.exp(-2j * np.pi * f * length[:, None] / SPEED_OF_LIGHT_MPS)
+    ).sum(axis=0)
+    np.testing.assert_allclose(
+        np.conj(synthesize_block(echoes, slow)[0, 0]), spectrum, rtol=0, atol=3e-6
+    )
 
 
 def test_a_phase_over_frequency_is_a_way() -> None:
@@ -189,11 +209,17 @@ def test_a_phase_over_frequency_is_a_way() -> None:
     frequency = np.array([12e9, 14e9, 16e9])
     scattering = np.exp(-2j * np.pi * frequency * delta)
     told = make_echoes(
-        np.full((1, 8, 1), 8.0), np.broadcast_to(np.conj(scattering)[:, None, None, None], (3, 1, 8, 1)), frequency
+        np.full((1, 8, 1), 8.0),
+        np.broadcast_to(np.conj(scattering)[:, None, None, None], (3, 1, 8, 1)),
+        frequency,
     )
-    walked = make_echoes(np.full((1, 8, 1), 8.0 + SPEED_OF_LIGHT_MPS * delta), np.ones((1, 1, 8, 1)))
+    walked = make_echoes(
+        np.full((1, 8, 1), 8.0 + SPEED_OF_LIGHT_MPS * delta), np.ones((1, 1, 8, 1))
+    )
     # A detour in amplitude misses its part of s tau^2 / 2: 2 pi s tau delta = 1.1e-5 rad. A wrong sign would give 0.2.
-    np.testing.assert_allclose(synthesize_block(told, LOW), synthesize_block(walked, LOW), rtol=0, atol=2e-5)
+    np.testing.assert_allclose(
+        synthesize_block(told, LOW), synthesize_block(walked, LOW), rtol=0, atol=2e-5
+    )
 
 
 @pytest.mark.parametrize("velocity", [1.0, -1.0])
@@ -232,7 +258,9 @@ def test_echoes_add_up(counts: tuple[int, int], nodes: int, seed: int, factor: c
     scaled = dataclasses.replace(second, amplitude=factor * second.amplitude)
     both = synthesize_block(together(first, scaled), SMALL)
     apart = synthesize_block(first, SMALL) + factor * synthesize_block(second, SMALL)
-    np.testing.assert_allclose(both, apart, rtol=0, atol=1e-13 * (1 + abs(factor)) * 40)  # rounding of eight tones
+    np.testing.assert_allclose(
+        both, apart, rtol=0, atol=1e-13 * (1 + abs(factor)) * 40
+    )  # rounding of eight tones
 
 
 @given(offset=st.floats(-7, 7), seed=st.integers(0, 99))
@@ -241,7 +269,9 @@ def test_a_phase_of_all_amplitudes_is_a_phase_of_the_if(offset: float, seed: int
     echoes = random_echoes(SMALL, 2, 3, nodes=3, seed=seed)
     turned = dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(1j * offset))
     expected = synthesize_block(echoes, SMALL) * np.exp(1j * offset)
-    np.testing.assert_allclose(synthesize_block(turned, SMALL), expected, rtol=0, atol=1e-12)  # rounding of float64
+    np.testing.assert_allclose(
+        synthesize_block(turned, SMALL), expected, rtol=0, atol=1e-12
+    )  # rounding of float64
 
 
 @given(cuts=st.lists(st.integers(0, 30), max_size=4))
@@ -253,7 +283,9 @@ def test_how_a_capture_is_cut_into_blocks_does_not_matter(cuts: list[int]) -> No
     blocks = []
     for first, last in pairwise(edges):
         part = slice(first, last)
-        block = make_echoes(echoes.length[part], echoes.amplitude[:, part], echoes.frequency, echoes.tx[part])
+        block = make_echoes(
+            echoes.length[part], echoes.amplitude[:, part], echoes.frequency, echoes.tx[part]
+        )
         blocks.append(synthesize_block(block, SMALL))
     np.testing.assert_array_equal(np.concatenate(blocks), whole)
 
@@ -262,17 +294,23 @@ def test_hidden_echoes_add_nothing() -> None:
     echoes = random_echoes(SMALL, 6, 3)
     hidden = random_echoes(SMALL, 6, 2, seed=1)
     hidden = dataclasses.replace(hidden, amplitude=0 * hidden.amplitude)
-    np.testing.assert_array_equal(synthesize_block(together(echoes, hidden), SMALL), synthesize_block(echoes, SMALL))
+    np.testing.assert_array_equal(
+        synthesize_block(together(echoes, hidden), SMALL), synthesize_block(echoes, SMALL)
+    )
 
 
 @pytest.mark.parametrize("nodes", [3, 5])
 def test_constant_echoes_among_others_are_what_they_are_alone(nodes: int) -> None:
     varying, constant = random_echoes(SMALL, 6, 3, nodes=nodes), random_echoes(SMALL, 6, 2, seed=1)
     everywhere = dataclasses.replace(
-        constant, amplitude=np.repeat(constant.amplitude, nodes, axis=0), frequency=varying.frequency
+        constant,
+        amplitude=np.repeat(constant.amplitude, nodes, axis=0),
+        frequency=varying.frequency,
     )
     alone = synthesize_block(varying, SMALL) + synthesize_block(constant, SMALL)
-    assert relative_error(synthesize_block(together(varying, everywhere), SMALL), alone) < 1e-12  # rounding
+    assert (
+        relative_error(synthesize_block(together(varying, everywhere), SMALL), alone) < 1e-12
+    )  # rounding
 
 
 def test_an_amplitude_that_vanishes_at_one_node_is_not_hidden() -> None:
@@ -292,9 +330,15 @@ def test_echoes_out_of_band_are_left_out(radar: Radar) -> None:
         echoes = make_echoes(np.full(shape, one), np.ones((1, *shape)))
         assert (in_band(echoes, radar) == expected).all()
         assert synthesize_block(echoes, radar).any() == expected
-    everything = make_echoes(np.broadcast_to(length, (1, radar.n_rx, 5)), np.ones((1, 1, radar.n_rx, 5)))
-    kept = make_echoes(np.broadcast_to(length[inside], (1, radar.n_rx, 2)), np.ones((1, 1, radar.n_rx, 2)))
-    np.testing.assert_array_equal(synthesize_block(everything, radar), synthesize_block(kept, radar))
+    everything = make_echoes(
+        np.broadcast_to(length, (1, radar.n_rx, 5)), np.ones((1, 1, radar.n_rx, 5))
+    )
+    kept = make_echoes(
+        np.broadcast_to(length[inside], (1, radar.n_rx, 2)), np.ones((1, 1, radar.n_rx, 2))
+    )
+    np.testing.assert_array_equal(
+        synthesize_block(everything, radar), synthesize_block(kept, radar)
+    )
 
 
 @pytest.mark.parametrize("nodes", [1, 3, 4])
@@ -308,13 +352,17 @@ def test_single_precision_is_the_double_to_a_millionth(nodes: int) -> None:
     # float32 has 6e-8; a tone is a product of three such numbers, and there are four tones. Polynomials between the nodes are
     # at most three times as large as the amplitudes.
     magnitudes = 3 * np.abs(echoes.amplitude).max(axis=0).sum(axis=-1, keepdims=True)
-    np.testing.assert_array_less(np.abs(single - double), 1e-6 * np.broadcast_to(magnitudes, double.shape))
+    np.testing.assert_array_less(
+        np.abs(single - double), 1e-6 * np.broadcast_to(magnitudes, double.shape)
+    )
 
 
 def test_amplitudes_of_single_precision_do() -> None:
     echoes = random_echoes(SMALL, 3, 4)
     single = dataclasses.replace(echoes, amplitude=echoes.amplitude.astype(np.complex64))
-    np.testing.assert_allclose(synthesize_block(single, SMALL), synthesize_block(echoes, SMALL), rtol=0, atol=1e-6)
+    np.testing.assert_allclose(
+        synthesize_block(single, SMALL), synthesize_block(echoes, SMALL), rtol=0, atol=1e-6
+    )
 
 
 # -- what is asked of times ------------------------------------------------------------------------------------------
@@ -373,5 +421,12 @@ def test_into_an_array_that_is_there(kind: type, count: int, nodes: int) -> None
 
 
 def test_an_array_that_cannot_be_filled() -> None:
-    with pytest.raises(ValueError, match=r"synthesize: out has shape \(6, 4, 40\), type complex64; .*complex128"):
-        synthesize(random_echoes(SMALL, 6, 0), SMALL, SMALL.chirp_times(6), out=np.empty((6, 4, 40), np.complex64))
+    with pytest.raises(
+        ValueError, match=r"synthesize: out has shape \(6, 4, 40\), type complex64; .*complex128"
+    ):
+        synthesize(
+            random_echoes(SMALL, 6, 0),
+            SMALL,
+            SMALL.chirp_times(6),
+            out=np.empty((6, 4, 40), np.complex64),
+        )

@@ -63,7 +63,9 @@ def test_a_gpu_is_there_where_the_driver_starts_and_counts_one(
     assert gpu_name() == ("Some GPU, driver 12080" if there else "")
 
 
-def test_in_the_child_of_a_process_that_asked_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_in_the_child_of_a_process_that_asked_there_is_none(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(ctypes, "CDLL", lambda name: Driver(0, 0, 1))
     assert has_nvidia_gpu()
     child = os.getpid() + 1
@@ -95,13 +97,27 @@ class Cuda:
     ("cuda", "device", "said"),
     [
         (Cuda(True), "cuda", "Some GPU, driver 12080, wherever it is found to be faster"),
-        (Cuda(False), None, "Some GPU, driver 12080, which torch 9.9 cannot use; install a CUDA build of torch"),
-        (Cuda(True, RuntimeError("no\nlibrary")), None, "Some GPU, driver 12080, but torch fails: no"),
-        (Cuda(True, AssertionError()), None, "Some GPU, driver 12080, but torch fails: AssertionError"),
+        (
+            Cuda(False),
+            None,
+            "Some GPU, driver 12080, which torch 9.9 cannot use; install a CUDA build of torch",
+        ),
+        (
+            Cuda(True, RuntimeError("no\nlibrary")),
+            None,
+            "Some GPU, driver 12080, but torch fails: no",
+        ),
+        (
+            Cuda(True, AssertionError()),
+            None,
+            "Some GPU, driver 12080, but torch fails: AssertionError",
+        ),
         (None, None, "Some GPU, driver 12080, but no torch; install it: pip install torch"),
     ],
 )
-def test_what_torch_makes_of_it(monkeypatch: pytest.MonkeyPatch, cuda: Cuda | None, device: str | None, said: str) -> None:
+def test_what_torch_makes_of_it(
+    monkeypatch: pytest.MonkeyPatch, cuda: Cuda | None, device: str | None, said: str
+) -> None:
     monkeypatch.setattr(ctypes, "CDLL", lambda name: Driver(0, 0, 1))
     monkeypatch.setattr(gpu, "find_spec", lambda name: cuda)
     monkeypatch.setitem(sys.modules, "torch", SimpleNamespace(cuda=cuda, __version__="9.9"))

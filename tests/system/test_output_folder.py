@@ -21,7 +21,9 @@ from rtradar.system import output_folder
 from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole
 
 KIND = OutputFiles(
-    "list.json", r"list\.json|maps|clouds|plan\.png|learning-\d+\.png|store\.zarr/(zarr\.json|c/\d+)", r"store\.zarr(/c)?"
+    "list.json",
+    r"list\.json|maps|clouds|plan\.png|learning-\d+\.png|store\.zarr/(zarr\.json|c/\d+)",
+    r"store\.zarr(/c)?",
 )
 
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="links, locks and permissions of POSIX")
@@ -77,7 +79,10 @@ def test_files_of_an_earlier_run_are_replaced_or_removed_and_others_left(tmp_pat
     with atomic_folder(out, KIND) as folder:
         fill(folder, "second", "learning-1.png")
         assert (out / "maps").read_text() == "first"  # nothing moves before the end
-    assert unlisted(out) == made("second", "learning-1.png") | {"mine": "mine", "store.zarr/notes": "mine"}
+    assert unlisted(out) == made("second", "learning-1.png") | {
+        "mine": "mine",
+        "store.zarr/notes": "mine",
+    }
     files = json.loads((out / "list.json").read_text())["files"]
     assert files == ["learning-1.png", "list.json", "maps", "store.zarr/"]
 
@@ -148,7 +153,9 @@ FOREIGN: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("overwrite", [False, True])
 @pytest.mark.parametrize("kind", FOREIGN)
 @pytest.mark.parametrize("name", ["maps", "plan.png", "list.json", "store.zarr/c/0"])
-def test_what_no_list_names_is_refused_before_any_work(tmp_path: Path, name: str, kind: str, overwrite: bool) -> None:
+def test_what_no_list_names_is_refused_before_any_work(
+    tmp_path: Path, name: str, kind: str, overwrite: bool
+) -> None:
     out = tmp_path / "out"
     (out / name).parent.mkdir(parents=True)
     FOREIGN[kind](out / name)
@@ -157,14 +164,24 @@ def test_what_no_list_names_is_refused_before_any_work(tmp_path: Path, name: str
         make(out, "first", overwrite=True)
         after = contents(tmp_path)
         new = {f"out/{own}": text for own, text in made("first").items()}
-        assert after.items() >= new.items()  # replaced, or left where the new files have no such name
-        kept = {own: text for own, text in before.items() if own != f"out/{name}" or own not in new | {"out/list.json": ""}}
+        assert (
+            after.items() >= new.items()
+        )  # replaced, or left where the new files have no such name
+        kept = {
+            own: text
+            for own, text in before.items()
+            if own != f"out/{name}" or own not in new | {"out/list.json": ""}
+        }
         assert after.items() >= kept.items()
         return
     with pytest.raises(InputError) as caught, atomic_folder(out, KIND, overwrite=overwrite):
         pytest.fail("the work has begun")
     assert name in str(caught.value)
-    assert "is no file; move it away" in str(caught.value) if overwrite else "--overwrite" in str(caught.value)
+    assert (
+        "is no file; move it away" in str(caught.value)
+        if overwrite
+        else "--overwrite" in str(caught.value)
+    )
     assert contents(tmp_path) == before
 
 
@@ -209,7 +226,10 @@ def test_a_list_of_anybody_gives_nothing_away(tmp_path: Path, told: str) -> None
 
 
 @POSIX
-@pytest.mark.parametrize("how", ["unmarked", "marked for another", "link", "of notes", "marker is a link", "marker is a pipe"])
+@pytest.mark.parametrize(
+    "how",
+    ["unmarked", "marked for another", "link", "of notes", "marker is a link", "marker is a pipe"],
+)
 def test_a_work_folder_that_is_none_stays(tmp_path: Path, how: str) -> None:
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     for folder in (out, elsewhere):
@@ -244,7 +264,9 @@ def test_hard_links_keep_what_they_hold(tmp_path: Path) -> None:
     make(out, "first")
     for name in ("maps", "list.json", "store.zarr/zarr.json"):
         os.link(out / name, tmp_path / name.replace("/", "-"))
-    before = {name: text for name, text in contents(tmp_path).items() if not name.startswith("out/")}
+    before = {
+        name: text for name, text in contents(tmp_path).items() if not name.startswith("out/")
+    }
     make(out, "second")
     assert contents(tmp_path).items() >= before.items()
 
@@ -261,7 +283,9 @@ def test_names_with_newlines_and_twins_in_capitals_stay(tmp_path: Path) -> None:
     assert contents(tmp_path).items() >= dict.fromkeys(names, "mine").items()
 
 
-def test_a_twin_is_refused_where_capitals_do_not_tell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_twin_is_refused_where_capitals_do_not_tell(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """As on macOS and Windows: there ``maps`` leads to a file that is listed as ``Maps``."""
     (tmp_path / "Maps").write_text("mine")
     real = output_folder._Directory.mode
@@ -280,7 +304,9 @@ def test_a_twin_is_refused_where_capitals_do_not_tell(tmp_path: Path, monkeypatc
 
 @POSIX
 @pytest.mark.parametrize("when", ["before the moves", "while a file moves"])
-def test_a_folder_that_becomes_a_link_is_not_followed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str) -> None:
+def test_a_folder_that_becomes_a_link_is_not_followed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, when: str
+) -> None:
     """Somebody puts a link in place of the store between two looks at it."""
     out, elsewhere = tmp_path / "out", tmp_path / "elsewhere"
     make(out, "first")
@@ -289,8 +315,13 @@ def test_a_folder_that_becomes_a_link_is_not_followed(tmp_path: Path, monkeypatc
         (elsewhere / name).write_text("mine")
     real = output_folder._Directory.move
 
-    def move(self: output_folder._Directory, name: str, target: output_folder._Directory, new: str) -> None:
-        if new == ("list.json" if when == "before the moves" else "maps") and not (out / "store.zarr").is_symlink():
+    def move(
+        self: output_folder._Directory, name: str, target: output_folder._Directory, new: str
+    ) -> None:
+        if (
+            new == ("list.json" if when == "before the moves" else "maps")
+            and not (out / "store.zarr").is_symlink()
+        ):
             os.rename(out / "store.zarr", tmp_path / "was")
             (out / "store.zarr").symlink_to(elsewhere)
         real(self, name, target, new)
@@ -312,7 +343,10 @@ def test_an_output_folder_that_is_renamed_meanwhile_is_told(tmp_path: Path) -> N
 
     with pytest.raises(InputError, match="was renamed, moved or removed while"):
         disturbed(out, rename)
-    assert sorted(path.name for path in tmp_path.rglob("*")) == ["moved", "out"]  # no work folder is left in it
+    assert sorted(path.name for path in tmp_path.rglob("*")) == [
+        "moved",
+        "out",
+    ]  # no work folder is left in it
 
 
 def test_an_output_folder_that_vanishes_is_told(tmp_path: Path) -> None:
@@ -332,9 +366,13 @@ def disturbed(out: Path, disturb: Callable[[], object]) -> None:
 FULL = "Can't decrement id ref count (file write failed: time = now, errno = 28, error message = 'No space left on device')"
 
 
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), RuntimeError(FULL)])  # as of HDF5
+@pytest.mark.parametrize(
+    "error", [OSError(errno.ENOSPC, "No space left on device"), RuntimeError(FULL)]
+)  # as of HDF5
 def test_a_full_disk_is_said_in_one_line(tmp_path: Path, error: Exception) -> None:
-    with pytest.raises(InputError, match=r"cannot write to '.*out': No space left on device; .*--out"):
+    with pytest.raises(
+        InputError, match=r"cannot write to '.*out': No space left on device; .*--out"
+    ):
         raise_in(tmp_path / "out", error)
     assert contents(tmp_path) == {}
     assert not (tmp_path / "out").exists()
@@ -347,7 +385,11 @@ def raise_in(out: Path, error: BaseException | type[BaseException]) -> None:
 
 
 def test_other_errors_are_not_taken_for_a_full_disk(tmp_path: Path) -> None:
-    for error in (FileNotFoundError(errno.ENOENT, "No such file", "x"), OSError("what"), RuntimeError("errno = 2")):
+    for error in (
+        FileNotFoundError(errno.ENOENT, "No such file", "x"),
+        OSError("what"),
+        RuntimeError("errno = 2"),
+    ):
         with pytest.raises(type(error)) as caught:
             raise_in(tmp_path / "out", error)
         assert caught.value is error
@@ -372,7 +414,9 @@ def test_a_name_that_cannot_be_is_refused(tmp_path: Path) -> None:
         make(tmp_path / ("x" * 300), "first")
 
 
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere")
+@pytest.mark.skipif(
+    not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write everywhere"
+)
 def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
     tmp_path.chmod(0o500)
     try:
@@ -383,11 +427,15 @@ def test_a_folder_that_cannot_be_written_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("forgotten", ["list.json", "unforeseen"])
-def test_a_command_whose_files_are_not_foreseen_is_a_mistake_of_ours(tmp_path: Path, forgotten: str) -> None:
+def test_a_command_whose_files_are_not_foreseen_is_a_mistake_of_ours(
+    tmp_path: Path, forgotten: str
+) -> None:
     def forget() -> None:
         with atomic_folder(tmp_path, KIND) as folder:
             fill(folder, "first")
-            (folder / forgotten).unlink() if forgotten == "list.json" else (folder / forgotten).touch()
+            (folder / forgotten).unlink() if forgotten == "list.json" else (
+                folder / forgotten
+            ).touch()
 
     with pytest.raises(AssertionError, match=forgotten):
         forget()
@@ -468,7 +516,9 @@ print("whole")
 
 
 @POSIX
-def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_folder_that_says_so(tmp_path: Path) -> None:
+def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_folder_that_says_so(
+    tmp_path: Path,
+) -> None:
     new = {"clouds": "second", "maps": "second", "store.zarr/c/2": "second"}
     ends = []
     for last in range(40):
@@ -476,7 +526,9 @@ def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_
         make(out, "first", "plan.png")
         (out / "mine").write_text("mine")
         words, environment = command(tmp_path, KILLED, str(out), str(last))
-        done = subprocess.run(words, stdout=subprocess.PIPE, text=True, check=False, env=environment)
+        done = subprocess.run(
+            words, stdout=subprocess.PIPE, text=True, check=False, env=environment
+        )
         killed = contents(out)
         if "unfinished" in json.loads((out / "list.json").read_text()):
             ends.append("says so")
@@ -492,7 +544,10 @@ def test_a_process_killed_anywhere_leaves_all_of_the_old_or_all_of_the_new_or_a_
         with atomic_folder(out, KIND) as folder:
             (folder / "maps").write_text("third")
             finish(folder)
-        assert unlisted(out) == {"maps": "third", "mine": "mine"}  # what the killed one had still to move is gone, too
+        assert unlisted(out) == {
+            "maps": "third",
+            "mine": "mine",
+        }  # what the killed one had still to move is gone, too
         make(out, "second")
         assert unlisted(out) == made("second") | {"mine": "mine"}
         if done.stdout:

@@ -20,8 +20,19 @@ from rtradar.system.output_folder import OutputFiles, atomic_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of POSIX")
 
-KIND = OutputFiles("list.json", r"list\.json|maps|plan\.png|store\.zarr/(zarr\.json|c/\d+)", r"store\.zarr(/c)?")
-OWN = ["maps", "plan.png", "list.json", "store.zarr", "store.zarr/zarr.json", "store.zarr/c", "store.zarr/c/0", "store.zarr/c/1"]
+KIND = OutputFiles(
+    "list.json", r"list\.json|maps|plan\.png|store\.zarr/(zarr\.json|c/\d+)", r"store\.zarr(/c)?"
+)
+OWN = [
+    "maps",
+    "plan.png",
+    "list.json",
+    "store.zarr",
+    "store.zarr/zarr.json",
+    "store.zarr/c",
+    "store.zarr/c/0",
+    "store.zarr/c/1",
+]
 NEAR = [
     "Maps",
     "maps\n",
@@ -32,22 +43,38 @@ NEAR = [
     ".rtradar-notes",
     "maps.h5",
 ]
-KINDS = ["file", "folder", "link to a file", "link to a folder", "link within", "dangling", "hard link", "pipe"]
+KINDS = [
+    "file",
+    "folder",
+    "link to a file",
+    "link to a folder",
+    "link within",
+    "dangling",
+    "hard link",
+    "pipe",
+]
 
 names = st.one_of(
     st.sampled_from(OWN),
     st.sampled_from(NEAR),
-    st.text(st.characters(exclude_characters="/\0", exclude_categories=["Cs"]), min_size=1, max_size=12).filter(
-        lambda name: name not in (".", "..") and len(name.encode()) < 200
-    ),
+    st.text(
+        st.characters(exclude_characters="/\0", exclude_categories=["Cs"]), min_size=1, max_size=12
+    ).filter(lambda name: name not in (".", "..") and len(name.encode()) < 200),
 )
 trees = st.dictionaries(names, st.sampled_from(KINDS), max_size=8)
 lists = st.one_of(
     st.none(),
-    st.lists(st.sampled_from([*OWN, *NEAR, "../outside/thesis", "store.zarr/", "../", "/"]), max_size=8).map(
-        lambda files: json.dumps({"files": [*files, "list.json"]})
+    st.lists(
+        st.sampled_from([*OWN, *NEAR, "../outside/thesis", "store.zarr/", "../", "/"]), max_size=8
+    ).map(lambda files: json.dumps({"files": [*files, "list.json"]})),
+    st.sampled_from(
+        [
+            "[]",
+            "{",
+            '{"files": 3}',
+            '{"unfinished": ".rtradar-0123456789abcdef", "files": ["list.json", "maps"]}',
+        ]
     ),
-    st.sampled_from(["[]", "{", '{"files": 3}', '{"unfinished": ".rtradar-0123456789abcdef", "files": ["list.json", "maps"]}']),
 )
 
 Status = tuple[int, int, object]
@@ -86,7 +113,11 @@ def plant(out: Path, outside: Path, tree: dict[str, str]) -> None:
             elif kind == "pipe":
                 os.mkfifo(path)
             else:
-                targets = {"link to a file": "../outside/thesis", "link to a folder": "../outside", "link within": "maps"}
+                targets = {
+                    "link to a file": "../outside/thesis",
+                    "link to a folder": "../outside",
+                    "link within": "maps",
+                }
                 path.symlink_to(targets.get(kind, f"nowhere-{number}"))
         except OSError:
             continue
@@ -144,7 +175,12 @@ def command(out: Path, *, overwrite: bool, fails: bool) -> None:
     last=st.one_of(st.none(), st.integers(0, 25)),
 )
 def test_only_files_that_rtradar_made_change(
-    tree: dict[str, str], told: str | None, earlier: bool, overwrite: bool, fails: bool, last: int | None
+    tree: dict[str, str],
+    told: str | None,
+    earlier: bool,
+    overwrite: bool,
+    fails: bool,
+    last: int | None,
 ) -> None:
     with tempfile.TemporaryDirectory() as name:
         root = Path(name)
@@ -175,13 +211,19 @@ def test_only_files_that_rtradar_made_change(
             regular = stat.S_ISREG(what[0])
             ours = KIND.is_file(path) and regular and path in listed
             ours |= overwrite and path in new and (regular or stat.S_ISLNK(what[0]))
-            ours |= KIND.is_folder(path) and stat.S_ISDIR(what[0])  # which goes when its last file has gone
+            ours |= KIND.is_folder(path) and stat.S_ISDIR(
+                what[0]
+            )  # which goes when its last file has gone
             if not ours or ended in (InputError, ValueError):
                 assert after.get(path) == what, path
             elif path not in after:
                 assert path not in new or ended is Killed
         if ended is type(None):
-            assert {path for path, what in after.items() if path.startswith(".rtradar") and path not in before} == set()
+            assert {
+                path
+                for path, what in after.items()
+                if path.startswith(".rtradar") and path not in before
+            } == set()
             assert all(after[path][2] == b"new" for path in new - {"list.json"})
         elif ended is not Killed:
             assert after == before
@@ -198,4 +240,8 @@ def _listed(out: Path) -> set[str]:
     if not isinstance(files, list) or "list.json" not in files:
         return set()
     inside = {str(found.relative_to(out)) for found in out.rglob("*")}
-    return {path for path in inside if path in files or ("store.zarr/" in files and path.startswith("store.zarr/"))}
+    return {
+        path
+        for path in inside
+        if path in files or ("store.zarr/" in files and path.startswith("store.zarr/"))
+    }

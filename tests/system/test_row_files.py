@@ -75,7 +75,9 @@ def test_blocks_cover_all_rows() -> None:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_what_waits_in_a_file_is_no_memory() -> None:
     def resident_mb() -> float:
-        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        return (
+            int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+        )
 
     file_backed([np.ones((1, 100))] * 2000)  # what the first of all takes
     before = resident_mb()
@@ -100,7 +102,12 @@ from rtradar.system import row_files
 from rtradar.system.row_files import file_backed
 resource.setrlimit(resource.{limit}, ({value},) * 2)
 """
-    return subprocess.run([sys.executable, "-W", "error", "-c", begin + code], capture_output=True, text=True, check=False)
+    return subprocess.run(
+        [sys.executable, "-W", "error", "-c", begin + code],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="it has no such limits")
@@ -117,7 +124,10 @@ except ValueError as error:
 """
     done = limited("RLIMIT_FSIZE", 2_000_000, code)
     assert done.stderr == ""
-    assert re.fullmatch(r"a long recording, \d+ MB so far, finds no room in \S+ for temporary .*TMPDIR.*\n", done.stdout)
+    assert re.fullmatch(
+        r"a long recording, \d+ MB so far, finds no room in \S+ for temporary .*TMPDIR.*\n",
+        done.stdout,
+    )
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="it has no such limits")
@@ -139,5 +149,7 @@ def test_no_temporary_folder_is_one_line(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(row_files.tempfile, "TemporaryFile", nowhere)
     monkeypatch.setattr(row_files.tempfile, "tempdir", None)
-    with pytest.raises(InputError, match=r"no room in any folder for temporary files [^\n]*TMPDIR[^\n]*$"):
+    with pytest.raises(
+        InputError, match=r"no room in any folder for temporary files [^\n]*TMPDIR[^\n]*$"
+    ):
         file_backed([ROWS])

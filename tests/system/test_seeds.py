@@ -45,14 +45,30 @@ def test_short_seeds_keep_their_streams(seed: int, numbers: tuple[int, ...]) -> 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_no_two_share_a_stream(count: int) -> None:
-    seeds = [0, 1, 5, 7, WORD - 1, *(low + high * WORD for low, high in product((0, 1, 5, 7), (1, 5, 7, 2**31 - 1)))]
+    seeds = [
+        0,
+        1,
+        5,
+        7,
+        WORD - 1,
+        *(low + high * WORD for low, high in product((0, 1, 5, 7), (1, 5, 7, 2**31 - 1))),
+    ]
     told = [(seed, *numbers) for seed in seeds for numbers in product((0, 1, 5, 7), repeat=count)]
     assert len({state(*one) for one in told}) == len(told)
 
 
 def test_long_seeds_keep_clear_of_every_short_one() -> None:
-    short = {state(seed, *numbers) for count in range(4) for seed in (1, 5, 7) for numbers in product((0, 1, 5, 7), repeat=count)}
-    long = {state(1 + 5 * WORD, *numbers) for count in range(4) for numbers in product((0, 1, 5, 7), repeat=count)}
+    short = {
+        state(seed, *numbers)
+        for count in range(4)
+        for seed in (1, 5, 7)
+        for numbers in product((0, 1, 5, 7), repeat=count)
+    }
+    long = {
+        state(1 + 5 * WORD, *numbers)
+        for count in range(4)
+        for numbers in product((0, 1, 5, 7), repeat=count)
+    }
     assert not short & long
 
 
@@ -66,10 +82,25 @@ USERS: dict[str, Callable[[Any], object]] = {
 }
 
 
-@pytest.mark.parametrize("seed", [-1, 2**63, pytest.param(10**5000, id="huge"), 1.5, True, None, "7", np.int64(-3), float("nan")])
+@pytest.mark.parametrize(
+    "seed",
+    [
+        -1,
+        2**63,
+        pytest.param(10**5000, id="huge"),
+        1.5,
+        True,
+        None,
+        "7",
+        np.int64(-3),
+        float("nan"),
+    ],
+)
 @pytest.mark.parametrize("user", USERS)
 def test_what_is_no_seed_is_told_in_one_line(user: str, seed: object) -> None:
-    with pytest.raises(InputError, match=r"seed = .*; it must be a whole number from 0 to 9223372036854775807") as caught:
+    with pytest.raises(
+        InputError, match=r"seed = .*; it must be a whole number from 0 to 9223372036854775807"
+    ) as caught:
         USERS[user](seed)
     assert "\n" not in str(caught.value)
 

@@ -15,7 +15,13 @@ from functools import partial
 import pytest
 
 from rtradar.system import threads
-from rtradar.system.threads import THREADS_VARIABLE, environment_of, in_threads, thread_count, thread_limit
+from rtradar.system.threads import (
+    THREADS_VARIABLE,
+    environment_of,
+    in_threads,
+    thread_count,
+    thread_limit,
+)
 
 COUNT = """
 import numba, rtradar.system.threads
@@ -89,7 +95,9 @@ def test_work_is_not_kept_for_threads_that_have_not_woken() -> None:
 
     array, done = Array(), threading.Event()
     gone = weakref.ref(array)
-    asleep = [threads._pool().submit(done.wait, 60) for _ in range(3)]  # as on a machine that is busy with other things
+    asleep = [
+        threads._pool().submit(done.wait, 60) for _ in range(3)
+    ]  # as on a machine that is busy with other things
     try:
         in_threads(partial(work, array=array), range(8))
         del array
@@ -110,11 +118,20 @@ if child == 0:
     os._exit(0 if in_threads(str, range(4)) == ["0", "1", "2", "3"] else 1)
 raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
-    assert subprocess.run([sys.executable, "-W", "ignore", "-c", program], timeout=60, check=False).returncode == 0
+    assert (
+        subprocess.run(
+            [sys.executable, "-W", "ignore", "-c", program], timeout=60, check=False
+        ).returncode
+        == 0
+    )
 
 
-@pytest.mark.parametrize(("named", "limit"), [("3", 3), ("", None), ("0", None), ("many", None), ("-1", None)])
-def test_the_environment_limits_threads(monkeypatch: pytest.MonkeyPatch, named: str, limit: int | None) -> None:
+@pytest.mark.parametrize(
+    ("named", "limit"), [("3", 3), ("", None), ("0", None), ("many", None), ("-1", None)]
+)
+def test_the_environment_limits_threads(
+    monkeypatch: pytest.MonkeyPatch, named: str, limit: int | None
+) -> None:
     monkeypatch.setenv(THREADS_VARIABLE, named)
     assert thread_limit() == limit
 
@@ -127,5 +144,7 @@ def test_no_environment_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.slow
 def test_every_kind_of_thread_is_limited() -> None:
     environment = {**os.environ, **environment_of(1)}
-    found = subprocess.run([sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True)
+    found = subprocess.run(
+        [sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True
+    )
     assert found.stdout.split() == ["1", "1", "1"]

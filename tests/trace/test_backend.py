@@ -73,7 +73,9 @@ def test_llvm_by_name_passes_over_bad_ones_too(machine: Machine, bad: Library) -
 
 
 @pytest.mark.parametrize("libraries", [(), (OLD,)])
-def test_without_a_good_library_auto_takes_scalar_and_says_how_to_mend_it(machine: Machine, libraries: tuple[Library]) -> None:
+def test_without_a_good_library_auto_takes_scalar_and_says_how_to_mend_it(
+    machine: Machine, libraries: tuple[Library]
+) -> None:
     machine(*libraries)
     with pytest.warns(BackendWarning, match=r"install one: .*scalar_rgb") as caught:
         backend = select("auto")
@@ -106,7 +108,13 @@ def test_cuda_only_where_its_probe_succeeds(machine: Machine) -> None:
 
 @pytest.mark.parametrize(
     ("cuda_s", "cpu_s", "taken"),
-    [(1e-4, 1e-3, "cuda"), (2e-3, 1e-3, "llvm"), (1e-3, 1e-3, "llvm"), (None, 1e-3, "llvm"), (1e-4, None, "cuda")],
+    [
+        (1e-4, 1e-3, "cuda"),
+        (2e-3, 1e-3, "llvm"),
+        (1e-3, 1e-3, "llvm"),
+        (None, 1e-3, "llvm"),
+        (1e-4, None, "cuda"),
+    ],
 )
 def test_auto_takes_a_gpu_only_where_it_was_found_to_be_faster(
     machine: Machine, cuda_s: float | None, cpu_s: float | None, taken: str
@@ -132,7 +140,9 @@ def test_a_gpu_that_was_faster_and_works_no_more_is_not_taken(machine: Machine) 
     assert select("auto").kind == "llvm"
 
 
-def test_what_works_tells_how_fast_it_is_and_is_asked_once(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_works_tells_how_fast_it_is_and_is_asked_once(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     library = backends._first_good()[0]
     kinds = backends.available()
     found = [verdict.query_s(backends.VARIANTS[kind], library) for kind in kinds]
@@ -141,7 +151,9 @@ def test_what_works_tells_how_fast_it_is_and_is_asked_once(empty_cache: Path, mo
     assert [verdict.query_s(backends.VARIANTS[kind], library) for kind in kinds] == found
 
 
-def test_how_fast_it_is_is_asked_anew_on_another_gpu(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_how_fast_it_is_is_asked_anew_on_another_gpu(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     probes = _counted(monkeypatch, "good")
     for name in ("A", "A", "B", "B", "A"):
         monkeypatch.setattr(verdict, "gpu_name", lambda name=name: name)
@@ -149,7 +161,9 @@ def test_how_fast_it_is_is_asked_anew_on_another_gpu(empty_cache: Path, monkeypa
     assert len(probes) == 2
 
 
-def test_a_gpu_that_hangs_is_waited_for_once(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gpu_that_hangs_is_waited_for_once(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     probes = []
 
     def hangs(variant: str, library: Library | None, timed: bool = False) -> tuple[Verdict, int]:
@@ -169,7 +183,9 @@ def test_available_lists_what_works(machine: Machine) -> None:
 
 
 def test_unknown_variant() -> None:
-    with pytest.raises(InputError, match="'metal' is unknown; allowed: auto, cpu, llvm, scalar, cuda"):
+    with pytest.raises(
+        InputError, match="'metal' is unknown; allowed: auto, cpu, llvm, scalar, cuda"
+    ):
         select("metal")
 
 
@@ -182,7 +198,9 @@ def test_use_sets_the_variant_however_often(backend: Backend) -> None:
         assert hit.t == 3.0  # exact in float32
 
 
-def test_use_refuses_llvm_when_another_library_was_loaded_since(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_use_refuses_llvm_when_another_library_was_loaded_since(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(backends, "loaded_llvm_version", lambda: "15.0.6")
     with pytest.raises(BackendError, match="before"):
         use(Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4"))
@@ -191,7 +209,9 @@ def test_use_refuses_llvm_when_another_library_was_loaded_since(monkeypatch: pyt
 # -- where libraries are looked for ----------------------------------------------------------------------------------
 
 
-def test_environment_then_wheel_then_system_newest_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_environment_then_wheel_then_system_newest_first(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     files = {}
     for name in (
         "libLLVM-9.so.1",
@@ -221,7 +241,12 @@ def test_environment_then_wheel_then_system_newest_first(tmp_path: Path, monkeyp
 
 @pytest.mark.parametrize(
     ("name", "version"),
-    [("libLLVM-15.so.1", "15"), ("libLLVM.so.23.1", "23.1"), ("libLLVM-14.0.6.so.1", "14.0.6"), ("libLLVM.dylib", None)],
+    [
+        ("libLLVM-15.so.1", "15"),
+        ("libLLVM.so.23.1", "23.1"),
+        ("libLLVM-14.0.6.so.1", "14.0.6"),
+        ("libLLVM.dylib", None),
+    ],
 )
 def test_version_by_name(name: str, version: str | None) -> None:
     assert Library(f"/lib/{name}", "system").version == version
@@ -247,12 +272,18 @@ def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> l
     return probes
 
 
-def test_a_verdict_is_kept_until_the_library_changes(empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_verdict_is_kept_until_the_library_changes(
+    empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     probes = _counted(monkeypatch, "aborts the process")
     file = tmp_path / "libLLVM-15.so.1"
     file.touch()
     library = Library(str(file), "system")
-    assert verdict.judge("llvm_ad_rgb", library) == verdict.judge("llvm_ad_rgb", library) == Verdict("aborts the process")
+    assert (
+        verdict.judge("llvm_ad_rgb", library)
+        == verdict.judge("llvm_ad_rgb", library)
+        == Verdict("aborts the process")
+    )
     assert len(probes) == 1
     verdict.judge("llvm_ad_rgb", library, fresh=True)
     assert len(probes) == 2
@@ -273,7 +304,9 @@ def test_a_verdict_is_not_kept_when_another_question_is_asked(
     assert len(probes) == 2
 
 
-@pytest.mark.parametrize(("ended", "probed"), [(-signal.SIGABRT, 1), (-signal.SIGKILL, 2), (-signal.SIGTERM, 2)])
+@pytest.mark.parametrize(
+    ("ended", "probed"), [(-signal.SIGABRT, 1), (-signal.SIGKILL, 2), (-signal.SIGTERM, 2)]
+)
 def test_a_probe_that_was_told_to_end_says_nothing_of_the_library(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch, ended: int, probed: int
 ) -> None:
@@ -292,7 +325,9 @@ def test_verdicts_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.Mo
 
 
 @pytest.mark.parametrize("content", ["", "{", "[1]", "\x00"])
-def test_a_spoilt_cache_is_written_anew(empty_cache: Path, monkeypatch: pytest.MonkeyPatch, content: str) -> None:
+def test_a_spoilt_cache_is_written_anew(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch, content: str
+) -> None:
     probes = _counted(monkeypatch, "good")
     empty_cache.mkdir()
     (empty_cache / "verdicts.json").write_text(content, encoding="utf-8")
@@ -301,14 +336,18 @@ def test_a_spoilt_cache_is_written_anew(empty_cache: Path, monkeypatch: pytest.M
     assert len(probes) == 1
 
 
-def test_a_cache_that_cannot_be_written_does_no_harm(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cache_that_cannot_be_written_does_no_harm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     _counted(monkeypatch, "good")
     (tmp_path / "file").touch()
     monkeypatch.setenv("RTRADAR_CACHE", str(tmp_path / "file" / "cache"))
     assert verdict.judge("scalar_rgb", None).good
 
 
-def test_a_probe_that_takes_too_long_is_no_good_and_is_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_probe_that_takes_too_long_is_no_good_and_is_not_kept(
+    empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(verdict, "TIMEOUT_S", 0.01)
     assert verdict.judge("scalar_rgb", None).finding.startswith("hangs")
     assert not empty_cache.exists()
@@ -317,7 +356,9 @@ def test_a_probe_that_takes_too_long_is_no_good_and_is_not_kept(empty_cache: Pat
 def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: Path) -> None:
     file = tmp_path / "libLLVM-23.so.1"
     file.write_text("not a library")
-    assert verdict.judge("llvm_ad_rgb", Library(str(file), "environment")) == Verdict("cannot be loaded", "23")
+    assert verdict.judge("llvm_ad_rgb", Library(str(file), "environment")) == Verdict(
+        "cannot be loaded", "23"
+    )
     assert verdict.judge("scalar_rgb", Library(str(file), "environment")).good
 
 
@@ -332,7 +373,11 @@ def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
 
 
 def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
-    bad = [library.path for library in llvm.candidates() if not verdict.judge("llvm_ad_rgb", library).good]
+    bad = [
+        library.path
+        for library in llvm.candidates()
+        if not verdict.judge("llvm_ad_rgb", library).good
+    ]
     if not bad:
         pytest.skip("this machine has no libLLVM that is bad")
     script = """

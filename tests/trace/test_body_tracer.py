@@ -37,10 +37,14 @@ def clearances(body: Ellipsoids, origins: Array, targets: Array) -> tuple[Array,
 def crowd() -> Ellipsoids:
     rng = np.random.default_rng(0)
     centres = rng.uniform(-0.8, 0.8, (15, 3)) + CHEST
-    return Ellipsoids(centres, Rotation.random(15, random_state=0).as_matrix(), rng.uniform(0.04, 0.25, (15, 3)))
+    return Ellipsoids(
+        centres, Rotation.random(15, random_state=0).as_matrix(), rng.uniform(0.04, 0.25, (15, 3))
+    )
 
 
-def test_the_first_part_is_that_of_the_smooth_ellipsoids(backend: Backend, crowd: Ellipsoids) -> None:
+def test_the_first_part_is_that_of_the_smooth_ellipsoids(
+    backend: Backend, crowd: Ellipsoids
+) -> None:
     rng = np.random.default_rng(1)
     origins = np.array([-4.0, 1.0, 1.0]) + rng.normal(0, 0.2, (3000, 3))
     targets = rng.uniform(-1, 1, (3000, 3)) + CHEST
@@ -49,7 +53,9 @@ def test_the_first_part_is_that_of_the_smooth_ellipsoids(backend: Backend, crowd
     expected = np.where(np.isfinite(distance.min(axis=1)), distance.argmin(axis=1), -1)
     # Near an outline, or where two parts cross, triangles may answer otherwise than what they stand for.
     first, second = np.sort(np.minimum(distance, 1e3), axis=1)[:, :2].T
-    sure = (np.abs(clearance).min(axis=1) > 2 * SAGITTA) & ((second - first > 2e-3) | (expected < 0))
+    sure = (np.abs(clearance).min(axis=1) > 2 * SAGITTA) & (
+        (second - first > 2e-3) | (expected < 0)
+    )
     assert sure.mean() > 0.9
     np.testing.assert_array_equal(hits.part[sure], expected[sure])
     assert 0.2 < (expected >= 0).mean() < 0.9
@@ -61,17 +67,23 @@ def test_a_place_lies_on_the_ellipsoid_and_on_the_ray(backend: Backend, crowd: E
     targets = crowd.centres[rng.integers(15, size=500)]
     hits = first_hits(backend, crowd, origins, targets)
     assert (hits.part >= 0).all()
-    np.testing.assert_allclose(((hits.local / crowd.semi_axes[hits.part]) ** 2).sum(axis=1), 1, rtol=1e-12)
+    np.testing.assert_allclose(
+        ((hits.local / crowd.semi_axes[hits.part]) ** 2).sum(axis=1), 1, rtol=1e-12
+    )
     place = crowd.centres[hits.part] + np.einsum("rij,rj->ri", crowd.frames[hits.part], hits.local)
     away = place - origins
     # Off the triangle onto the ellipsoid along its radius: a sagitta of the largest semi-axis, times a grazing slope.
-    np.testing.assert_allclose(np.linalg.norm(away, axis=1), hits.distance, atol=20 * SAGITTA * 0.25)
+    np.testing.assert_allclose(
+        np.linalg.norm(away, axis=1), hits.distance, atol=20 * SAGITTA * 0.25
+    )
 
 
 def test_nothing_met_is_told(backend: Backend, crowd: Ellipsoids) -> None:
     origins = np.array([[-4.0, 1.0, 1.0], [-4.0, 1.0, 1.0], [5.0, 0.0, 1.0]])
     # Past the body, away from it, and from behind it outward.
-    hits = first_hits(backend, crowd, origins, np.array([[0.0, 9.0, 1.0], [-9.0, 1.0, 1.0], [9.0, 0.0, 1.0]]))
+    hits = first_hits(
+        backend, crowd, origins, np.array([[0.0, 9.0, 1.0], [-9.0, 1.0, 1.0], [9.0, 0.0, 1.0]])
+    )
     np.testing.assert_array_equal(hits.part, -1)
     assert np.isinf(hits.distance).all()
     assert np.isnan(hits.local).all()
@@ -81,7 +93,9 @@ def test_the_ray_goes_through_its_target_and_beyond(backend: Backend) -> None:
     body = Ellipsoids([[0.0, 0, 0]], [np.eye(3)], [[0.1, 0.1, 0.1]])
     hits = first_hits(backend, body, [[-4.0, 0, 0]], [[-3.9, 0, 0]])
     assert hits.part[0] == 0
-    assert hits.distance[0] == pytest.approx(3.9, abs=0.1 * SAGITTA)  # head-on: a corner or a middle of a triangle
+    assert hits.distance[0] == pytest.approx(
+        3.9, abs=0.1 * SAGITTA
+    )  # head-on: a corner or a middle of a triangle
 
 
 def test_posed_again_it_is_as_posed_first(backend: Backend, crowd: Ellipsoids) -> None:

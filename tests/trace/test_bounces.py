@@ -10,7 +10,9 @@ from rtradar.trace.bounces import BodySurfaces, MeshSurfaces
 
 Array = NDArray[np.float64]
 # Face 0 in the plane x = 0, face 1 in y = 0, face 2 parallel to face 0, half a metre behind it.
-VERTICES = np.array([[0, 0, -1], [0, 2, 0], [0, 0, 1], [2, 0, 0], [-0.5, 0, -1], [-0.5, 2, 0], [-0.5, 0, 1.0]])
+VERTICES = np.array(
+    [[0, 0, -1], [0, 2, 0], [0, 0, 1], [2, 0, 0], [-0.5, 0, -1], [-0.5, 2, 0], [-0.5, 0, 1.0]]
+)
 FACES = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
 
 
@@ -32,7 +34,10 @@ def rows(*vectors: object) -> Array:
 def test_a_ray_that_leaves_a_part_meets_the_other_and_not_its_own(backend: Backend) -> None:
     surfaces = body(backend)
     # Along the tangent too: the traced triangles stand out a little beyond the part.
-    points, normals = rows([0, 0.1, 0], [0, 0.1, 0], [0.1, 0, 0]), rows([0, 1, 0], [0, 1, 0], [1, 0, 0])
+    points, normals = (
+        rows([0, 0.1, 0], [0, 0.1, 0], [0.1, 0, 0]),
+        rows([0, 1, 0], [0, 1, 0], [1, 0, 0]),
+    )
     directions = rows([0, 1, 0], [1, 0, 0], [1, 0, 0])
     met, distance = surfaces.meets(points, normals, directions, np.zeros(3, dtype=np.int64))
     np.testing.assert_array_equal(met, [1, -1, -1])
@@ -56,7 +61,9 @@ def test_places_on_a_part_are_exact_and_normals_point_outward(backend: Backend) 
     np.testing.assert_allclose(((places / [0.1, 0.1, 0.3]) ** 2).sum(-1), 1, rtol=1e-12)
     normals = surfaces.normal(part, places, directions)
     gradient = places / np.array([0.1, 0.1, 0.3]) ** 2
-    np.testing.assert_allclose(normals, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True), atol=1e-12)
+    np.testing.assert_allclose(
+        normals, gradient / np.linalg.norm(gradient, axis=-1, keepdims=True), atol=1e-12
+    )
     assert np.isnan(surfaces.distance(np.array([0]), rows([1, 0, 0]), rows([0, 1, 0])))
 
 
@@ -64,12 +71,17 @@ def test_only_other_parts_hide_a_point(backend: Backend) -> None:
     surfaces = body(backend)
     antennas = rows([0, 4, 0], [4, 0, 0], [0, -4, 0])
     points = rows([0, 0.1, 0], [0.1, 0, 0], [0, 0.1, 0])
-    np.testing.assert_array_equal(surfaces.sees(antennas, points, np.zeros(3, dtype=np.int64)), [False, True, True])
+    np.testing.assert_array_equal(
+        surfaces.sees(antennas, points, np.zeros(3, dtype=np.int64)), [False, True, True]
+    )
 
 
 def test_faces_keep_their_numbers_and_their_planes_have_no_border(backend: Backend) -> None:
     surfaces = mesh(backend)
-    points, normals = rows([1, 0, 0.1], [1, 0, 0.1], [1, 0, 0.1]), rows([0, 1, 0], [0, 1, 0], [0, -1, 0])
+    points, normals = (
+        rows([1, 0, 0.1], [1, 0, 0.1], [1, 0, 0.1]),
+        rows([0, 1, 0], [0, 1, 0], [0, -1, 0]),
+    )
     directions = rows([-1, 1, 0], [-1, 5, 0], [-1, -1, 0]) / np.sqrt([[2], [26], [2]])
     met, distance = surfaces.meets(points, normals, directions, np.ones(3, dtype=np.int64))
     np.testing.assert_array_equal(met, [0, -1, -1])
@@ -86,11 +98,15 @@ def test_normals_of_a_sheet_face_the_ray(backend: Backend) -> None:
 
 
 @pytest.mark.parametrize("far", [4.0, 1000.0, 1e6])
-def test_a_face_hides_what_is_behind_it_however_far_the_antenna(backend: Backend, far: float) -> None:
+def test_a_face_hides_what_is_behind_it_however_far_the_antenna(
+    backend: Backend, far: float
+) -> None:
     surfaces = mesh(backend)
     points = rows([0, 1, 0], [-0.5, 1, 0], [-0.5, 1, 0])
     antennas = rows([far, 1, 0], [far, 1, 0], [-far, 1, 0])
-    np.testing.assert_array_equal(surfaces.sees(antennas, points, np.array([0, 2, 2])), [True, False, True])
+    np.testing.assert_array_equal(
+        surfaces.sees(antennas, points, np.array([0, 2, 2])), [True, False, True]
+    )
 
 
 def test_no_rays_meet_nothing(backend: Backend) -> None:

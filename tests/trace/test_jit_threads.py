@@ -40,7 +40,9 @@ def test_a_kernel_serves_all_threads(backend: Backend) -> None:
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             dr.kernel_history_clear()
             np.testing.assert_array_equal(sphere.meets(rays(5000)), np.arange(5000) % 2 == 0)
-            kernels.extend(entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT)
+            kernels.extend(
+                entry for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT
+            )
 
     other = threading.Thread(target=trace)
     other.start()
@@ -105,7 +107,9 @@ print(drjit.thread_count())
     assert in_a_new_process(program, threads=2) == ["4"]
 
 
-def test_no_model_takes_threads_of_dr_jit_away(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_model_takes_threads_of_dr_jit_away(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # It can wait for ever for one that falls asleep in the same moment.
     use(backend)
     import drjit as dr
@@ -129,5 +133,7 @@ def test_physical_optics_is_the_same_with_any_number_of_threads_and_any_blocks(
     at_once = build_model("physical-optics", SMALL, body, **given).echoes(chirps).amplitude
     monkeypatch.setenv(THREADS_VARIABLE, "1")
     model = build_model("physical-optics", SMALL, body, **given)
-    by_blocks = [model.echoes(chirps[first : first + 5]).amplitude for first in range(0, len(chirps), 5)]
+    by_blocks = [
+        model.echoes(chirps[first : first + 5]).amplitude for first in range(0, len(chirps), 5)
+    ]
     np.testing.assert_array_equal(at_once, np.concatenate(by_blocks, axis=1))

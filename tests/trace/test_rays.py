@@ -24,7 +24,11 @@ def test_any_number_of_rays_from_anywhere_in_memory_is_one_kernel(backend: Backe
             with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
                 dr.kernel_history_clear()
                 np.testing.assert_array_equal(sphere.meets(rays), rays[3] < 0)
-                hashes |= {entry["hash"] for entry in dr.kernel_history() if entry["type"] == dr.KernelType.JIT}
+                hashes |= {
+                    entry["hash"]
+                    for entry in dr.kernel_history()
+                    if entry["type"] == dr.KernelType.JIT
+                }
     assert len(hashes) == 1
 
 
@@ -32,7 +36,11 @@ def test_rays_begin_lead_and_end_where_they_are_told(backend: Backend) -> None:
     if backend.kind == "scalar":
         pytest.skip("the scalar backend takes rays one by one")
     mi = use(backend)
-    starts, ways, reach = np.arange(15.0).reshape(5, 3), -np.arange(15.0).reshape(5, 3), np.arange(5.0)
+    starts, ways, reach = (
+        np.arange(15.0).reshape(5, 3),
+        -np.arange(15.0).reshape(5, 3),
+        np.arange(5.0),
+    )
     ray = rays_of(mi, starts, ways, reach)
     np.testing.assert_array_equal(ray.o.numpy().T, starts)
     np.testing.assert_array_equal(ray.d.numpy().T, ways)

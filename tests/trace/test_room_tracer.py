@@ -19,14 +19,23 @@ CORNER, SIZE = np.array([0.5, -0.4, 0.2]), np.array([0.6, 0.9, 0.7])
 def box(tmp_path: Path) -> Scene:
     trimesh.creation.box(SIZE).export(tmp_path / "box.ply")
     place = tuple(float(value) for value in CORNER + SIZE / 2)
-    piece = Furniture(name="box", mesh=tmp_path / "box.ply", material=material("wood"), position_m=place, metres_per_unit=1.0)
+    piece = Furniture(
+        name="box",
+        mesh=tmp_path / "box.ply",
+        material=material("wood"),
+        position_m=place,
+        metres_per_unit=1.0,
+    )
     return Scene(furniture=(piece,))
 
 
 def in_box(origins: Array, targets: Array) -> tuple[Array, Array]:
     """Shares of each leg at which it enters and leaves the slabs of the box; it is in the box where the first is less."""
     with np.errstate(divide="ignore"):
-        low, high = (CORNER - origins) / (targets - origins), (CORNER + SIZE - origins) / (targets - origins)
+        low, high = (
+            (CORNER - origins) / (targets - origins),
+            (CORNER + SIZE - origins) / (targets - origins),
+        )
     return np.minimum(low, high).max(axis=1), np.maximum(low, high).min(axis=1)
 
 

@@ -16,7 +16,11 @@ Array = NDArray[np.float64]
 
 def crowd(seed: int, parts: int = 6) -> tuple[Array, Array, Array]:
     rng = np.random.default_rng(seed)
-    return rng.uniform(-0.6, 0.6, (parts, 3)), Rotation.random(parts, rng=rng).as_matrix(), rng.uniform(0.05, 0.3, (parts, 3))
+    return (
+        rng.uniform(-0.6, 0.6, (parts, 3)),
+        Rotation.random(parts, rng=rng).as_matrix(),
+        rng.uniform(0.05, 0.3, (parts, 3)),
+    )
 
 
 @settings(max_examples=30)
@@ -74,9 +78,13 @@ def test_a_target_on_no_part_is_hidden_by_any(backend: Backend) -> None:
     tracer = BodyTracer(use(backend), np.full((2, 3), 0.1))
     tracer.pose(np.array([[1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]), np.tile(np.eye(3), (2, 1, 1)))
     origins = np.zeros((5, 3))
-    targets = np.array([[0.89, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [2.0, 2 * 0.1016, 0], [2.0, 2 * 0.0994, 0]])
+    targets = np.array(
+        [[0.89, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [2.0, 2 * 0.1016, 0], [2.0, 2 * 0.0994, 0]]
+    )
     own = np.full(5, -1)
-    np.testing.assert_array_equal(tracer.sees(origins, targets, own), [True, False, False, True, False])
+    np.testing.assert_array_equal(
+        tracer.sees(origins, targets, own), [True, False, False, True, False]
+    )
     np.testing.assert_array_equal(tracer.sees(origins, targets, np.zeros(5, dtype=np.int64)), True)
 
 

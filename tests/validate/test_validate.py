@@ -54,7 +54,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return place
 
 
-def test_good_rows_pass_and_are_kept(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_good_rows_pass_and_are_kept(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["validate", "--json", str(tmp_path / "v.json")]) == 0
     said = capsys.readouterr()
     assert "passed: 1 of 1 judged figures within their limits, 1 reported; 1 scripts" in said.out
@@ -68,14 +70,30 @@ def test_good_rows_pass_and_are_kept(folder: Path, tmp_path: Path, capsys: pytes
     assert found["scripts"][0]["keys"] == ["sphere", "colour"]
 
 
-def test_quick_and_figures_reach_the_script(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["validate", "--quick", "--json", str(tmp_path / "v.json"), "--figure", str(tmp_path / "new" / "figures")]) == 0
+def test_quick_and_figures_reach_the_script(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert (
+        main(
+            [
+                "validate",
+                "--quick",
+                "--json",
+                str(tmp_path / "v.json"),
+                "--figure",
+                str(tmp_path / "new" / "figures"),
+            ]
+        )
+        == 0
+    )
     assert json.loads((tmp_path / "v.json").read_text())["rows"][0]["error"] == 0.5
     assert (tmp_path / "new" / "figures" / "balls.png").stat().st_size > 1000
     assert "balls" in capsys.readouterr().out
 
 
-def test_a_row_outside_its_limit_fails(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_row_outside_its_limit_fails(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (folder / "floors.py").write_text(BAD)
     assert main(["validate", "--json", str(tmp_path / "v.json")]) == 1
     said = capsys.readouterr().out
@@ -91,11 +109,19 @@ def test_a_row_outside_its_limit_fails(folder: Path, tmp_path: Path, capsys: pyt
 def test_a_script_that_breaks_fails(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "zz.py").write_text(BROKEN)
     assert main(["validate"]) == 1
-    assert "FAILED  zz ended with status 1 and left no rows: RuntimeError: the judge is ill" in capsys.readouterr().out
+    assert (
+        "FAILED  zz ended with status 1 and left no rows: RuntimeError: the judge is ill"
+        in capsys.readouterr().out
+    )
 
 
-@pytest.mark.parametrize(("only", "keys"), [("sphere", ["sphere"]), ("colour", ["colour"]), ("balls", ["sphere", "colour"])])
-def test_only_takes_a_key_or_a_script(folder: Path, tmp_path: Path, only: str, keys: list[str]) -> None:
+@pytest.mark.parametrize(
+    ("only", "keys"),
+    [("sphere", ["sphere"]), ("colour", ["colour"]), ("balls", ["sphere", "colour"])],
+)
+def test_only_takes_a_key_or_a_script(
+    folder: Path, tmp_path: Path, only: str, keys: list[str]
+) -> None:
     (folder / "floors.py").write_text(BAD)
     assert main(["validate", "--only", only, "--json", str(tmp_path / "v.json")]) == 0
     assert [row["key"] for row in json.loads((tmp_path / "v.json").read_text())["rows"]] == keys
@@ -104,18 +130,25 @@ def test_only_takes_a_key_or_a_script(folder: Path, tmp_path: Path, only: str, k
 def test_an_unknown_claim_is_refused(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "--only", "moon"]) == 2
     said = capsys.readouterr()
-    assert said.err == "rtradar: --only moon: no such claim; allowed keys: colour, sphere; or a script: balls\n"
+    assert (
+        said.err
+        == "rtradar: --only moon: no such claim; allowed keys: colour, sphere; or a script: balls\n"
+    )
     assert said.out == ""
 
 
-def test_a_file_that_cannot_be_written_is_refused_before_the_work(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["validate", "--json", "/nowhere/v.json"]) == 2
     said = capsys.readouterr()
     assert said.err.count("\n") == 1
     assert said.out == ""
 
 
-def test_the_table_of_a_readme_is_replaced(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_table_of_a_readme_is_replaced(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     readme = tmp_path / "README.md"
     readme.write_text(f"before\n{validate.BEGIN}\nold\n{validate.END}\nafter\n")
     assert main(["validate", "--readme", str(readme)]) == 0
@@ -132,13 +165,25 @@ def test_the_table_of_a_readme_is_replaced(folder: Path, tmp_path: Path, capsys:
 
 def outcome(name: str, *rows: dict[str, object]) -> validate.Outcome:
     """Of a script with these rows, that passed and have a limit of 2 m unless they say otherwise."""
-    usual = {"key": name, "claim": "a case", "quantity": "length", "unit": "m", "error": 1.0, "tolerance": 2.0, "passed": True}
-    return validate.Outcome(validate.Claim(Path(f"{name}.py"), (name,)), [usual | row for row in rows], 1.0, 1.0, "")
+    usual = {
+        "key": name,
+        "claim": "a case",
+        "quantity": "length",
+        "unit": "m",
+        "error": 1.0,
+        "tolerance": 2.0,
+        "passed": True,
+    }
+    return validate.Outcome(
+        validate.Claim(Path(f"{name}.py"), (name,)), [usual | row for row in rows], 1.0, 1.0, ""
+    )
 
 
 def test_rows_that_say_the_same_are_one_line_with_the_worst_of_them() -> None:
     says = {"says": "lengths |far| and near", "cases": 10}
-    table = validate.markdown([outcome("path", says, says | {"error": 1.5}, says | {"tolerance": 3.0})])
+    table = validate.markdown(
+        [outcome("path", says, says | {"error": 1.5}, says | {"tolerance": 3.0})]
+    )
     assert table.splitlines()[2:4] == [
         "| `path` | lengths \\|far\\| and near | 1.5 m | 2 m | 20 | `path.py` |",
         "| `path` | lengths \\|far\\| and near | 1 m | 3 m | 10 | `path.py` |",
@@ -154,15 +199,24 @@ def test_a_failure_stands_out_in_the_table() -> None:
 
 def test_the_main_claims_come_first_in_the_table() -> None:
     table = validate.markdown([outcome(name, {}) for name in ("angle", "cfar", "path", "sphere")])
-    assert [line.split("`")[1] for line in table.splitlines()[2:6]] == ["sphere", "path", "cfar", "angle"]
+    assert [line.split("`")[1] for line in table.splitlines()[2:6]] == [
+        "sphere",
+        "path",
+        "cfar",
+        "angle",
+    ]
 
 
 def test_a_script_that_did_not_finish_is_told_below_the_table() -> None:
     claim = validate.Claim(Path("path.py"), ("path",))
-    assert "`path.py` left no rows." in validate.markdown([validate.Outcome(claim, [], 1.0, 1.0, "left no rows")])
+    assert "`path.py` left no rows." in validate.markdown(
+        [validate.Outcome(claim, [], 1.0, 1.0, "left no rows")]
+    )
 
 
-@pytest.mark.parametrize("content", ["no markers", f"{validate.END} {validate.BEGIN}", validate.BEGIN])
+@pytest.mark.parametrize(
+    "content", ["no markers", f"{validate.END} {validate.BEGIN}", validate.BEGIN]
+)
 def test_a_readme_without_its_place_is_refused(content: str, folder: Path, tmp_path: Path) -> None:
     (tmp_path / "README.md").write_text(content)
     with pytest.raises(InputError, match="must hold"):

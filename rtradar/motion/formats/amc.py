@@ -71,7 +71,9 @@ def _posed(
         data = values.get(bone.name, np.zeros((frames, 0)))
         turns = [k for k, name in enumerate(bone.dof) if name[0] == "r"]
         if bone.name == "root":
-            root_positions = data[:, [bone.dof.index(name) for name in ("tx", "ty", "tz")]] * skeleton.unit_m
+            root_positions = (
+                data[:, [bone.dof.index(name) for name in ("tx", "ty", "tz")]] * skeleton.unit_m
+            )
             columns = [bone.dof.index("r" + letter) for letter in bone.axis_order]
             local = Rotation.from_euler(bone.axis_order, data[:, columns] * to_radians)
         elif turns:
@@ -83,7 +85,9 @@ def _posed(
     return root_positions, np.stack([rotation.as_quat() for rotation in world.values()], axis=1)
 
 
-def _read_frames(path: Path, skeleton: Skeleton) -> Generator[tuple[dict[str, NDArray[np.float64]], bool]]:
+def _read_frames(
+    path: Path, skeleton: Skeleton
+) -> Generator[tuple[dict[str, NDArray[np.float64]], bool]]:
     """Values (frame, degree of freedom) of each bone that has some, a few frames at a time, and whether they are in degrees."""
     widths = {bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}
     table: dict[str, list[list[float]]] = {name: [] for name in widths}
@@ -97,7 +101,11 @@ def _read_frames(path: Path, skeleton: Skeleton) -> Generator[tuple[dict[str, ND
         missing = [name for name in widths if name not in seen]
         if missing:
             some = ", ".join(missing[:3]) + (" ..." if len(missing) > 3 else "")
-            raise fail(path, line, f"frame {frame} lacks {len(missing)} bones ({some}); the file may be cut off")
+            raise fail(
+                path,
+                line,
+                f"frame {frame} lacks {len(missing)} bones ({some}); the file may be cut off",
+            )
         check_size(path, len(skeleton.bones), n_frames)
 
     def taken() -> dict[str, NDArray[np.float64]]:
@@ -114,29 +122,45 @@ def _read_frames(path: Path, skeleton: Skeleton) -> Generator[tuple[dict[str, ND
             if words[0].startswith(":"):
                 if words[0].upper() in (":DEGREES", ":RADIANS"):
                     if frame is not None and degrees != (words[0].upper() == ":DEGREES"):
-                        raise fail(path, number, f"{words[0]} after the first frame; it must stand before it")
+                        raise fail(
+                            path,
+                            number,
+                            f"{words[0]} after the first frame; it must stand before it",
+                        )
                     degrees = words[0].upper() == ":DEGREES"
             elif len(words) == 1 and _FRAME_NUMBER.fullmatch(words[0]):
                 if frame is not None:
                     finish(number - 1)
                     if int(words[0]) != frame + 1:
-                        raise fail(path, number, f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive")
+                        raise fail(
+                            path,
+                            number,
+                            f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive",
+                        )
                     if n_frames % FRAMES_AT_ONCE == 0:
                         yield taken(), degrees
                 frame, seen, n_frames = int(words[0]), set(), n_frames + 1
             elif frame is None:
-                raise fail(path, number, f"{words[0][:40]!r} before the first frame number; this is not an AMC file")
+                raise fail(
+                    path,
+                    number,
+                    f"{words[0][:40]!r} before the first frame number; this is not an AMC file",
+                )
             else:
                 name = words[0]
                 if name not in known:
                     raise fail(
-                        path, number, f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject"
+                        path,
+                        number,
+                        f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject",
                     )
                 if name in seen:
                     raise fail(path, number, f"bone {name!r} is there twice in frame {frame}")
                 if len(words) - 1 != widths.get(name, 0):
                     raise fail(
-                        path, number, f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}"
+                        path,
+                        number,
+                        f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}",
                     )
                 seen.add(name)
                 if name in table:

@@ -82,7 +82,11 @@ def load_skeleton(path: Path) -> Skeleton:
                 elif key == "length":
                     (units["length"],) = numbers(words[1:2], path, number)
                     if not units["length"] > 1e-6:
-                        raise fail(path, number, f"length unit {units['length']}; it must be positive, and above 1e-6")
+                        raise fail(
+                            path,
+                            number,
+                            f"length unit {units['length']}; it must be positive, and above 1e-6",
+                        )
             elif section == ":root":
                 _root_line(bones["root"], key, words, path, number)
             elif section == ":bonedata":
@@ -102,9 +106,13 @@ def load_skeleton(path: Path) -> Skeleton:
                 elif inside:
                     _hierarchy_line(words, bones, path, number)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
-        raise InputError(f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut off")
+        raise InputError(
+            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut off"
+        )
     if not bones["root"].dof:
-        raise InputError(f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of the AMC")
+        raise InputError(
+            f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of the AMC"
+        )
     if inside:
         raise fail(path, number, "the hierarchy does not end; the file may be cut off")
     check_size(path, len(bones))
@@ -119,21 +127,33 @@ def _root_line(root: Bone, key: str, words: list[str], path: Path, line: int) ->
     if key == "order":
         root.dof = tuple(word.lower() for word in words[1:])
         if sorted(root.dof) != ["rx", "ry", "rz", "tx", "ty", "tz"]:
-            raise fail(path, line, f"root order {' '.join(words[1:])}; it must hold TX TY TZ RX RY RZ, in any order")
+            raise fail(
+                path,
+                line,
+                f"root order {' '.join(words[1:])}; it must hold TX TY TZ RX RY RZ, in any order",
+            )
     elif key == "axis":
         root.axis_order = _order(words[-1], path, line)
     elif key == "orientation":
         root.axis_rad = np.array(_triple(words[1:], path, line))
     elif key == "position" and any(_triple(words[1:], path, line)):
-        raise fail(path, line, "a root position other than 0 0 0 is not supported; move it into the AMC")
+        raise fail(
+            path, line, "a root position other than 0 0 0 is not supported; move it into the AMC"
+        )
 
 
-def _bone_line(bone: Bone, key: str, words: list[str], bones: dict[str, Bone], path: Path, line: int) -> None:
+def _bone_line(
+    bone: Bone, key: str, words: list[str], bones: dict[str, Bone], path: Path, line: int
+) -> None:
     if key == "name":
         if len(words) != 2:
             raise fail(path, line, "a bone needs one name")
         if bone.name:
-            raise fail(path, line, f"bone {bone.name!r} gets a second name; every bone needs its own begin ... end")
+            raise fail(
+                path,
+                line,
+                f"bone {bone.name!r} gets a second name; every bone needs its own begin ... end",
+            )
         bone.name = words[1]
         if bone.name in bones:
             raise fail(path, line, f"bone {bone.name!r} is there twice; names must differ")
@@ -143,21 +163,31 @@ def _bone_line(bone: Bone, key: str, words: list[str], bones: dict[str, Bone], p
     elif key == "length":
         (bone.length,) = numbers(words[1:2], path, line) or (0.0,)
         if bone.length < 0:
-            raise fail(path, line, f"bone {bone.name!r} has length {bone.length}; it must not be negative")
+            raise fail(
+                path, line, f"bone {bone.name!r} has length {bone.length}; it must not be negative"
+            )
     elif key == "axis":
         bone.axis_rad = np.array(_triple(words[1:4], path, line))
         bone.axis_order = _order(words[4] if len(words) > 4 else "xyz", path, line)
     elif key == "dof":
         bone.dof = tuple(word.lower() for word in words[1:])
         if not set(bone.dof) <= {"rx", "ry", "rz"}:
-            raise fail(path, line, f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported (rigid bones)")
+            raise fail(
+                path,
+                line,
+                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported (rigid bones)",
+            )
 
 
 def _check_bone(bone: Bone, path: Path, line: int) -> None:
     if not bone.name:
         raise fail(path, line, "a bone without a name ends here")
     if bone.name in ASF_JOINTS.values() and not bone.length * np.abs(bone.direction).max() > 0:
-        raise fail(path, bone.line, f"bone {bone.name!r} has no length; a body part hangs on it, give its length and direction")
+        raise fail(
+            path,
+            bone.line,
+            f"bone {bone.name!r} has no length; a body part hangs on it, give its length and direction",
+        )
 
 
 def _triple(words: list[str], path: Path, line: int) -> list[float]:
@@ -189,6 +219,10 @@ def _parents_first(bones: dict[str, Bone], path: Path) -> tuple[Bone, ...]:
         ready = [bone for bone in bones.values() if bone.name not in done and bone.parent in done]
         if not ready:
             loose = next(bone for bone in bones.values() if bone.name not in done)
-            raise fail(path, loose.line, f"bone {loose.name!r} does not hang on the root; list it in :hierarchy")
+            raise fail(
+                path,
+                loose.line,
+                f"bone {loose.name!r} does not hang on the root; list it in :hierarchy",
+            )
         done |= {bone.name: bone for bone in ready}
     return tuple(done.values())

@@ -24,7 +24,13 @@ from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import rotate
 from rtradar.system.row_files import FileBackedRows, column, in_blocks
 
-UNITS_M = {"metre": 1.0, "CMU unit (0.45 inch)": 0.0254 / 0.45, "inch": 0.0254, "centimetre": 0.01, "millimetre": 0.001}
+UNITS_M = {
+    "metre": 1.0,
+    "CMU unit (0.45 inch)": 0.0254 / 0.45,
+    "inch": 0.0254,
+    "centimetre": 0.01,
+    "millimetre": 0.001,
+}
 """Length units that BVH files use; the format itself has none."""
 
 _REACH_M = (0.7, 1.5)
@@ -86,14 +92,18 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
         stretch = spreads[k] * scale
         if stretch > _STRETCH_M:
             raise fail(
-                path, joints[j].line, f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid"
+                path,
+                joints[j].line,
+                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid",
             )
     carriers = [kept[0]] + [joints[j].parent for j in kept[1:]]
     roots, rotations = FileBackedRows(), FileBackedRows()
     for (frames,) in in_blocks(values):
         quaternions = _quaternions(joints, frames)
         places = np.zeros((len(frames), 3))
-        for ancestor in _chain(joints, top):  # from the file's root down to the joint that carries the body
+        for ancestor in _chain(
+            joints, top
+        ):  # from the file's root down to the joint that carries the body
             parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
             places = places + (own if parent < 0 else rotate(quaternions[:, parent], own))
         roots.append(to_world(places * scale))
@@ -164,8 +174,15 @@ def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> list[_Joint
 def _channel_names(words: list[str], path: Path, line: int) -> tuple[str, ...]:
     names = tuple(word.lower() for word in words[2:])
     allowed = {axis + kind for axis in "xyz" for kind in ("position", "rotation")}
-    if len(words) < 2 or words[1] != str(len(names)) or not set(names) <= allowed or len(set(names)) != len(names):
-        raise fail(path, line, "CHANNELS needs a count and as many different Xposition ... Zrotation")
+    if (
+        len(words) < 2
+        or words[1] != str(len(names))
+        or not set(names) <= allowed
+        or len(set(names)) != len(names)
+    ):
+        raise fail(
+            path, line, "CHANNELS needs a count and as many different Xposition ... Zrotation"
+        )
     return names
 
 
@@ -186,18 +203,26 @@ def _read_header(lines: Iterator[tuple[int, str]], path: Path) -> tuple[int, flo
         elif [word.lower() for word in words[:2]] == ["frame", "time:"]:
             time = numbers(words[2:3], path, number)
             if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
-                raise fail(path, number, f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}")
+                raise fail(
+                    path,
+                    number,
+                    f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}",
+                )
             interval = time[0]
         else:
             raise fail(path, number, "Frames: and Frame Time: must stand before the values")
         if frames is not None and interval is not None:
             rate_hz = 1 / interval
             # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
-            return frames, (round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz)
+            return frames, (
+                round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz
+            )
     raise fail(path, number, "no Frames: or Frame Time:; the file may be cut off")
 
 
-def _read_frames(lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_Joint], path: Path) -> NDArray[np.float64]:
+def _read_frames(
+    lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_Joint], path: Path
+) -> NDArray[np.float64]:
     """Values (frame, channel)."""
     width, read = joints[-1].column + len(joints[-1].channels), 0
     values, rows = FileBackedRows(), list[list[float]]()
@@ -207,7 +232,11 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_
             continue
         row = numbers(words, path, number)
         if len(row) != width:
-            raise fail(path, number, f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels")
+            raise fail(
+                path,
+                number,
+                f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels",
+            )
         rows.append(row)
         read += 1
         check_size(path, len(joints), read)
@@ -215,7 +244,9 @@ def _read_frames(lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_
             values.append(np.array(rows))
             rows.clear()
     if read != n_frames:
-        raise InputError(f"{path}: {read} frames where the header promises {n_frames}; the file may be cut off")
+        raise InputError(
+            f"{path}: {read} frames where the header promises {n_frames}; the file may be cut off"
+        )
     values.append(np.array(rows).reshape(-1, width))
     return values.rows()
 
@@ -226,7 +257,9 @@ def _places(joint: _Joint, values: NDArray[np.float64]) -> NDArray[np.float64]:
     if not moved:
         return joint.offset[None]
     places = np.tile(joint.offset, (len(values), 1))
-    places[:, ["xyz".index(joint.channels[k][0]) for k in moved]] = column(values, [joint.column + k for k in moved])
+    places[:, ["xyz".index(joint.channels[k][0]) for k in moved]] = column(
+        values, [joint.column + k for k in moved]
+    )
     return places
 
 
@@ -237,7 +270,11 @@ def _quaternions(joints: list[_Joint], values: NDArray[np.float64]) -> NDArray[n
         turns = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
         order = "".join(joint.channels[k][0].upper() for k in turns)
         angles = values[:, [joint.column + k for k in turns]]
-        local = Rotation.from_euler(order, angles, degrees=True) if order else Rotation.identity(len(values))
+        local = (
+            Rotation.from_euler(order, angles, degrees=True)
+            if order
+            else Rotation.identity(len(values))
+        )
         world.append(local if joint.parent < 0 else world[joint.parent] * local)
     return np.stack([rotation.as_quat() for rotation in world], axis=1)
 
@@ -258,7 +295,9 @@ def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
             return carrier
         top = children[0]
         # A joint that holds its place in its parent to a millionth of its distance is a bone, not a carrier.
-        if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (1 + np.abs(joints[top].offset).max()):
+        if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (
+            1 + np.abs(joints[top].offset).max()
+        ):
             carrier = top
 
 

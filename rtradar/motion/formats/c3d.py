@@ -103,28 +103,43 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
         Where the file cannot be read, is damaged or cut off, or a marker is not in it.
     """
     try:
-        with _Bounded(open_regular(path).detach()) as handle, warnings.catch_warnings(record=True) as caught:
+        with (
+            _Bounded(open_regular(path).detach()) as handle,
+            warnings.catch_warnings(record=True) as caught,
+        ):
             warnings.simplefilter("always")
             labels, points, rate_hz, first, unit, upward = _read(handle)
     except OSError as error:
-        raise InputError(f"{path}: cannot read this C3D file ({error.strerror or error}); check the path") from None
+        raise InputError(
+            f"{path}: cannot read this C3D file ({error.strerror or error}); check the path"
+        ) from None
     except MemoryError:
         raise
     except Exception as error:  # the reader fails in many ways on bytes that are no C3D file
         reason = " ".join(str(error).split())[:100]
-        raise InputError(f"{path}: not a C3D file, or a damaged one ({reason}); export it again") from None
+        raise InputError(
+            f"{path}: not a C3D file, or a damaged one ({reason}); export it again"
+        ) from None
     if any("end of file" in str(warning.message) for warning in caught):
-        raise InputError(f"{path}: ends after {len(points)} frames where its header promises more; the file is cut off")
+        raise InputError(
+            f"{path}: ends after {len(points)} frames where its header promises more; the file is cut off"
+        )
     if not len(points):
         raise InputError(f"{path}: no frame of markers in this C3D file; export it again")
     if not 1.0 <= rate_hz <= 100_000.0:
-        raise InputError(f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the file")
+        raise InputError(
+            f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the file"
+        )
     if upward not in ("", "+Z", "+Y"):
-        raise InputError(f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the recording")
+        raise InputError(
+            f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the recording"
+        )
     scale = unit_m if unit_m is not None else UNITS_M.get(unit.lower())
     if scale is None or not 0 < scale < np.inf:
         said = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {unit[:20]!r}"
-        raise InputError(f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, positive)")
+        raise InputError(
+            f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, positive)"
+        )
     chosen = points[:, [_column(path, labels, name) for name in names]]
     # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
     hidden = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
@@ -153,7 +168,9 @@ def bridged(seen: Markers) -> NDArray[np.float64]:
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             where = f"{seen.path}: marker {name} is not seen in frames {seen.first_frame + begin} to {seen.first_frame + end - 1}"
             if begin == 0 or end == len(positions):
-                raise InputError(f"{where}, at an end of the recording; cut these frames off, or fill the gap")
+                raise InputError(
+                    f"{where}, at an end of the recording; cut these frames off, or fill the gap"
+                )
             if end - begin > LONGEST_GAP_S * seen.rate_hz:
                 raise InputError(
                     f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s are bridged, fill this one"
@@ -166,7 +183,9 @@ class _Bounded(io.BufferedReader):
     """A file that gives no more than it has: for what a damaged one promises, Python would first take the memory."""
 
     def read(self, size: int | None = -1, /) -> bytes:
-        return super().read(size if size is None or size < 0 else min(size, os.fstat(self.fileno()).st_size))
+        return super().read(
+            size if size is None or size < 0 else min(size, os.fstat(self.fileno()).st_size)
+        )
 
 
 def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, str, str]:
@@ -184,11 +203,22 @@ def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, s
     labels = [str(label) for label in reader.point_labels]
     frames = [points for _, points, _ in reader.read_frames(copy=True)]
     points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
-    return labels, points, float(reader.point_rate), int(reader.first_frame), text("POINT:UNITS"), text("POINT:Y_SCREEN").upper()
+    return (
+        labels,
+        points,
+        float(reader.point_rate),
+        int(reader.first_frame),
+        text("POINT:UNITS"),
+        text("POINT:Y_SCREEN").upper(),
+    )
 
 
 def _column(path: Path, labels: list[str], name: str) -> int:
-    found = [k for k, label in enumerate(labels) if re.sub(r"^.*:", "", label.strip(" \0")).upper() == name]
+    found = [
+        k
+        for k, label in enumerate(labels)
+        if re.sub(r"^.*:", "", label.strip(" \0")).upper() == name
+    ]
     if not found:
         some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
         raise InputError(
@@ -196,18 +226,26 @@ def _column(path: Path, labels: list[str], name: str) -> int:
             "understood, rename or add it"
         )
     if len(found) > 1:
-        raise InputError(f"{path}: marker {name} is there {len(found)} times; keep one person's markers")
+        raise InputError(
+            f"{path}: marker {name} is there {len(found)} times; keep one person's markers"
+        )
     return found[0]
 
 
 def _check_size(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
-    shank = float(np.median([np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"]))
+    shank = float(
+        np.median(
+            [np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"]
+        )
+    )
     if not _SHANK_M[0] <= shank <= _SHANK_M[1]:
         raise InputError(
             f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's {_SHANK_M[0]} to {_SHANK_M[1]} m; "
             "check POINT:UNITS and the markers' names"
         )
-    above = float(np.median(markers["LFHD"][:, 2] - (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2))
+    above = float(
+        np.median(markers["LFHD"][:, 2] - (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2)
+    )
     if above < _STANDS_M and not seen.says_up:
         raise InputError(
             f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to tell what is up, give one who "

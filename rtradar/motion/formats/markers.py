@@ -77,7 +77,14 @@ CENTRES: Mapping[str, Centre] = {
 
 _SIDED = ("SHO", "ELB", "WRA", "WRB", "FIN", "KNE", "ANK", "TOE")
 
-NEEDED: tuple[str, ...] = (*_HEAD, *_NECK, "T10", "STRN", *_WAIST, *(side + name for side in "LR" for name in _SIDED))
+NEEDED: tuple[str, ...] = (
+    *_HEAD,
+    *_NECK,
+    "T10",
+    "STRN",
+    *_WAIST,
+    *(side + name for side in "LR" for name in _SIDED),
+)
 """The markers that must be there."""
 
 _STRAIGHT = 0.15
@@ -101,7 +108,9 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
         Rotations; the columns point forward, left and up.
     """
     frames = _segments(markers)
-    shanks = [np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"]
+    shanks = [
+        np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"
+    ]
     size = float(np.median(shanks)) / SHANK_M
     centres = []
     for node in NODES:
@@ -111,7 +120,10 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
         frame = frames.get(centre.segment, frames.get(f"{side} {centre.segment}"))
         assert frame is not None  # every segment of the table is made
         offset = size * np.array([forward, -left if node.startswith("r_") else left, up])
-        centres.append(_middle(markers, *(marker.replace("@", side) for marker in centre.markers)) + frame @ offset)
+        centres.append(
+            _middle(markers, *(marker.replace("@", side) for marker in centre.markers))
+            + frame @ offset
+        )
     return np.stack(centres, axis=1), frames["pelvis"], frames["thorax"]
 
 
@@ -121,17 +133,30 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
     def middle(*names: str) -> Array:
         return _middle(markers, *names)
 
-    thorax = _axes(up=middle("C7", "CLAV") - middle("T10", "STRN"), forward=middle("CLAV", "STRN") - middle("C7", "T10"))
+    thorax = _axes(
+        up=middle("C7", "CLAV") - middle("T10", "STRN"),
+        forward=middle("CLAV", "STRN") - middle("C7", "T10"),
+    )
     frames = {
         "thorax": thorax,
-        "pelvis": _level(middle("LFWT", "LBWT") - middle("RFWT", "RBWT"), middle("LFWT", "RFWT") - middle("LBWT", "RBWT")),
-        "head": _level(middle("LFHD", "LBHD") - middle("RFHD", "RBHD"), middle("LFHD", "RFHD") - middle("LBHD", "RBHD")),
+        "pelvis": _level(
+            middle("LFWT", "LBWT") - middle("RFWT", "RBWT"),
+            middle("LFWT", "RFWT") - middle("LBWT", "RBWT"),
+        ),
+        "head": _level(
+            middle("LFHD", "LBHD") - middle("RFHD", "RBHD"),
+            middle("LFHD", "RFHD") - middle("LBHD", "RBHD"),
+        ),
     }
     for side, sign in (("L", 1.0), ("R", -1.0)):
-        shoulder, elbow, knee, ankle = (markers[side + name] for name in ("SHO", "ELB", "KNE", "ANK"))
+        shoulder, elbow, knee, ankle = (
+            markers[side + name] for name in ("SHO", "ELB", "KNE", "ANK")
+        )
         wrist = middle(f"{side}WRA", f"{side}WRB")
         frames[f"{side} shank"] = _axes(up=knee - ankle, forward=markers[f"{side}TOE"] - ankle)
-        frames[f"{side} upper arm"] = _axes(up=shoulder - elbow, forward=_bend(shoulder, elbow, wrist, thorax, sign))
+        frames[f"{side} upper arm"] = _axes(
+            up=shoulder - elbow, forward=_bend(shoulder, elbow, wrist, thorax, sign)
+        )
         frames[f"{side} forearm"] = _axes(up=elbow - wrist, forward=markers[f"{side}WRA"] - wrist)
     return frames
 

@@ -12,12 +12,27 @@ from rtradar.motion.quaternions import rotate, sign_continuous
 from rtradar.motion.retarget import MINIMUM_PART_M, multiply
 from rtradar.motion.skeleton_names import NODE_PARENT, NODES
 
-_ON_THE_PELVIS = ("l_hip", "r_hip", "l_knee", "r_knee", "l_ankle", "r_ankle", "l_toe", "r_toe", "lowerback", "upperback")
+_ON_THE_PELVIS = (
+    "l_hip",
+    "r_hip",
+    "l_knee",
+    "r_knee",
+    "l_ankle",
+    "r_ankle",
+    "l_toe",
+    "r_toe",
+    "lowerback",
+    "upperback",
+)
 """Nodes whose bones turn with the pelvis where they do not bend; the others turn with the chest."""
 
 
 def rigid_motion(
-    name: str, centres: NDArray[np.float64], pelvis: NDArray[np.float64], thorax: NDArray[np.float64], rate_hz: float
+    name: str,
+    centres: NDArray[np.float64],
+    pelvis: NDArray[np.float64],
+    thorax: NDArray[np.float64],
+    rate_hz: float,
 ) -> Motion:
     """Bones of constant length that point as the joints do.
 
@@ -50,8 +65,13 @@ def rigid_motion(
             f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; every body part needs at least "
             f"{MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers about it"
         )
-    held = {key: sign_continuous(Rotation.from_matrix(axes).as_quat()) for key, axes in (("pelvis", pelvis), ("thorax", thorax))}
-    carriers = np.stack([held["pelvis" if node in _ON_THE_PELVIS else "thorax"] for node in NODES[1:]], axis=1)
+    held = {
+        key: sign_continuous(Rotation.from_matrix(axes).as_quat())
+        for key, axes in (("pelvis", pelvis), ("thorax", thorax))
+    }
+    carriers = np.stack(
+        [held["pelvis" if node in _ON_THE_PELVIS else "thorax"] for node in NODES[1:]], axis=1
+    )
     directions = rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
     rotations = multiply(carriers, _followed(directions))
     lengths = np.median(spans, axis=0)
@@ -61,7 +81,10 @@ def rigid_motion(
         parents=(-1, *parents),
         offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
         root_positions=centres[:, 0],
-        rotations=np.concatenate([held["pelvis"][:, None], rotations / np.linalg.norm(rotations, axis=2, keepdims=True)], axis=1),
+        rotations=np.concatenate(
+            [held["pelvis"][:, None], rotations / np.linalg.norm(rotations, axis=2, keepdims=True)],
+            axis=1,
+        ),
         rate_hz=rate_hz,
     )
 
@@ -69,11 +92,15 @@ def rigid_motion(
 def _followed(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Turns (frame, bone, 4) that take unit directions (frame, bone, 3) of the first frame to those of each, step by step."""
     before, after = directions[:-1], directions[1:]
-    steps = np.concatenate([np.cross(before, after), 1 + np.sum(before * after, axis=2, keepdims=True)], axis=2)
+    steps = np.concatenate(
+        [np.cross(before, after), 1 + np.sum(before * after, axis=2, keepdims=True)], axis=2
+    )
     norms = np.linalg.norm(steps, axis=2, keepdims=True)
     # A bone that points the other way in the next frame has no shortest turn: half a turn about any line across it will do.
     across = np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=2)])
-    half = np.concatenate([across / np.linalg.norm(across, axis=2, keepdims=True), np.zeros_like(norms)], axis=2)
+    half = np.concatenate(
+        [across / np.linalg.norm(across, axis=2, keepdims=True), np.zeros_like(norms)], axis=2
+    )
     steps = np.where(norms > 1e-6, steps / np.maximum(norms, 1e-6), half)
     turns = np.empty((*directions.shape[:2], 4))
     turns[0] = [0.0, 0.0, 0.0, 1.0]

@@ -55,13 +55,22 @@ def read_lines(path: Path, kind: str) -> Generator[str]:
             file.seek(len(codecs.BOM_UTF8) if start.startswith(codecs.BOM_UTF8) else 0)
             # On a terminal; a bar starts a thread, which small files are not worth.
             silent = None if size > _LONG_BYTES else True
-            with tqdm(total=size, desc=f"reading {path.name}", unit="B", unit_scale=True, leave=False, disable=silent) as bar:
+            with tqdm(
+                total=size,
+                desc=f"reading {path.name}",
+                unit="B",
+                unit_scale=True,
+                leave=False,
+                disable=silent,
+            ) as bar:
                 blank, behind = True, 0
                 while line := file.readline(_MOST_CHARACTERS + 1):
                     if "\0" in line:
                         raise InputError(f"{path}: binary data; expected {kind} text")
                     if len(line) > _MOST_CHARACTERS:
-                        raise InputError(f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text")
+                        raise InputError(
+                            f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text"
+                        )
                     blank = blank and not line.strip()
                     behind += len(line)
                     if behind > _CHARACTERS_A_STEP:
@@ -69,7 +78,9 @@ def read_lines(path: Path, kind: str) -> Generator[str]:
                         behind = 0
                     yield line
     except OSError as error:
-        raise InputError(f"{path}: cannot read this {kind} file ({error.strerror}); check the path") from None
+        raise InputError(
+            f"{path}: cannot read this {kind} file ({error.strerror}); check the path"
+        ) from None
     if blank:
         raise InputError(f"{path}: empty; expected {kind} text")
 
@@ -77,7 +88,9 @@ def read_lines(path: Path, kind: str) -> Generator[str]:
 def check_size(path: Path, joints: int, frames: int = 1) -> None:
     """Refuse what would take more room than a person's motion does: 1000 joints, or a hundred million poses of one."""
     if joints > _MOST_JOINTS:
-        raise InputError(f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others out")
+        raise InputError(
+            f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others out"
+        )
     if joints * frames > _MOST_POSES:
         raise InputError(
             f"{path}: {frames} frames of {joints} joints; frames times joints may be {_MOST_POSES}: cut it into shorter ones"
@@ -97,11 +110,19 @@ def numbers(words: list[str], path: Path, line: int) -> list[float]:
         wrong = next(word for word in words if not _is_float(word))
         raise fail(path, line, f"{wrong[:40]!r} is not a number") from None
     if not all(map(math.isfinite, values)):
-        wrong = next(word for word, value in zip(words, values, strict=True) if not math.isfinite(value))
+        wrong = next(
+            word for word, value in zip(words, values, strict=True) if not math.isfinite(value)
+        )
         raise fail(path, line, f"{wrong[:40]!r}: values must be finite; repair or cut this frame")
     if any(abs(value) > _LARGEST for value in values):
-        wrong = next(word for word, value in zip(words, values, strict=True) if abs(value) > _LARGEST)
-        raise fail(path, line, f"{wrong[:40]!r}: values may be {_LARGEST:g} at most; repair or cut this frame")
+        wrong = next(
+            word for word, value in zip(words, values, strict=True) if abs(value) > _LARGEST
+        )
+        raise fail(
+            path,
+            line,
+            f"{wrong[:40]!r}: values may be {_LARGEST:g} at most; repair or cut this frame",
+        )
     return values
 
 

@@ -105,10 +105,20 @@ def synthetic_motion(
     for name, value in given.items():
         low, high = _RANGES[name]
         if not (math.isfinite(value) and low <= value <= high) or value == 0:
-            raise InputError(f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}")
-    traits = draw_traits(np.random.default_rng(stream(*own)), height_m=height_m, side=side[0], tempo=tempo, amplitude=amplitude)
+            raise InputError(
+                f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}"
+            )
+    traits = draw_traits(
+        np.random.default_rng(stream(*own)),
+        height_m=height_m,
+        side=side[0],
+        tempo=tempo,
+        amplitude=amplitude,
+    )
     if take:
-        traits = dataclasses.replace(traits, phase=float(np.random.default_rng(stream(*own, int(take))).uniform()))
+        traits = dataclasses.replace(
+            traits, phase=float(np.random.default_rng(stream(*own, int(take))).uniform())
+        )
     # Asked for twice: how far down all must come is not known before the last, and too many would have to be kept.
     poses_at = ACTIVITIES[activity](duration_s, traits)
     times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz

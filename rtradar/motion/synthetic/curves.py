@@ -29,17 +29,29 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
     under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
     share = smooth((t - at[under_way]) / np.diff(at)[under_way])
-    return np.asarray(reached[under_way] + moves[under_way] * share.reshape(-1, *(1,) * (keys.ndim - 1)))
+    return np.asarray(
+        reached[under_way] + moves[under_way] * share.reshape(-1, *(1,) * (keys.ndim - 1))
+    )
 
 
-def hermite(t: Array, interval: tuple[float, float], begin: Sequence[ArrayLike], end: Sequence[ArrayLike]) -> Array:
+def hermite(
+    t: Array, interval: tuple[float, float], begin: Sequence[ArrayLike], end: Sequence[ArrayLike]
+) -> Array:
     """Quintic that has these positions, velocities and accelerations (each scalar or (3,)) at both ends of an interval."""
     span = interval[1] - interval[0]
-    (p0, v0, a0), (p1, v1, a1) = ([np.asarray(value, dtype=np.float64) for value in state] for state in (begin, end))
+    (p0, v0, a0), (p1, v1, a1) = (
+        [np.asarray(value, dtype=np.float64) for value in state] for state in (begin, end)
+    )
     u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
-    p, v, a = p1 - p0 - (v0 + a0 * span / 2) * span, (v1 - v0 - a0 * span) * span, (a1 - a0) * span**2
+    p, v, a = (
+        p1 - p0 - (v0 + a0 * span / 2) * span,
+        (v1 - v0 - a0 * span) * span,
+        (a1 - a0) * span**2,
+    )
     cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2
-    return p0 + v0 * span * u + a0 * span**2 / 2 * u**2 + u**3 * (cubic + u * (quartic + u * quintic))
+    return (
+        p0 + v0 * span * u + a0 * span**2 / 2 * u**2 + u**3 * (cubic + u * (quartic + u * quintic))
+    )
 
 
 def state(function: object, t: float) -> tuple[Array, Array, Array]:

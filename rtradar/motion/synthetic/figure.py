@@ -111,7 +111,9 @@ def offsets(height_m: float) -> dict[str, Array]:
     return {node: height_m * np.array(bones[node]) for node in NODES}
 
 
-def bend(reach: Array, first: float, second: float, hinge: Array, forward: float) -> tuple[Rotation, Rotation]:
+def bend(
+    reach: Array, first: float, second: float, hinge: Array, forward: float
+) -> tuple[Rotation, Rotation]:
     """Two-link inverse kinematics: rotations of two bones that hang down at rest and shall reach a point.
 
     Parameters
@@ -142,7 +144,9 @@ def _hanging(direction: Array, hinge: Array) -> Rotation:
     return Rotation.from_matrix(np.stack([np.cross(hinge, -direction), hinge, -direction], axis=2))
 
 
-def swing_arm(thorax: Rotation, side: str, *, forward: Array, outward: Array, elbow: Array, wrist: float = 0.1) -> Arm:
+def swing_arm(
+    thorax: Rotation, side: str, *, forward: Array, outward: Array, elbow: Array, wrist: float = 0.1
+) -> Arm:
     """An arm by its angles [rad]: raised forward, outward, and bent at elbow and wrist."""
     upper = thorax * turn("x", SIDES[side] * outward) * turn("y", -forward)
     fore = upper * turn("y", -elbow)
@@ -187,10 +191,14 @@ def rotations(pose: Pose, height_m: float) -> Array:
     turned: dict[str, Rotation] = {"root": pose.pelvis, "thorax": pose.thorax, "head": pose.head}
     for node, share in (("lowerback", 1 / 3), ("upperback", 2 / 3)):
         turned[node] = pose.pelvis * Rotation.from_rotvec(share * bent.as_rotvec())
-    turned["neck"] = pose.thorax * Rotation.from_rotvec(0.5 * (pose.thorax.inv() * pose.head).as_rotvec())
+    turned["neck"] = pose.thorax * Rotation.from_rotvec(
+        0.5 * (pose.thorax.inv() * pose.head).as_rotvec()
+    )
     for side, sign in SIDES.items():
         hip = pose.root + pose.pelvis.apply(bones[f"{side}_hip"])
-        thigh, shank = bend(pose.ankles[side] - hip, THIGH * height_m, SHANK * height_m, pose.left, 1.0)
+        thigh, shank = bend(
+            pose.ankles[side] - hip, THIGH * height_m, SHANK * height_m, pose.left, 1.0
+        )
         arm = pose.arms[side]
         turned |= {
             f"{side}_hip": pose.pelvis,

@@ -12,7 +12,18 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from rtradar.motion.synthetic.curves import bump, hermite, keyed, state
-from rtradar.motion.synthetic.figure import ANKLE, HEEL_X, ROOT, SIDES, Array, Pose, PosesAt, roll_about_toe, swing_arm, turn
+from rtradar.motion.synthetic.figure import (
+    ANKLE,
+    HEEL_X,
+    ROOT,
+    SIDES,
+    Array,
+    Pose,
+    PosesAt,
+    roll_about_toe,
+    swing_arm,
+    turn,
+)
 from rtradar.motion.synthetic.traits import Traits
 
 HALF_TRACK_M = 1.5
@@ -83,7 +94,11 @@ def _rolled(pitch: Array, height_m: float) -> Array:
         ],
         axis=1,
     )
-    return np.array([0.0, 0.0, ANKLE * height_m]) + about_heel + roll_about_toe(np.maximum(pitch, 0.0), height_m)
+    return (
+        np.array([0.0, 0.0, ANKLE * height_m])
+        + about_heel
+        + roll_about_toe(np.maximum(pitch, 0.0), height_m)
+    )
 
 
 def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Array, Array]]:
@@ -98,13 +113,20 @@ def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Arr
             (step.time, -math.radians(18) * traits.amplitude * step.vigour),
             (step.time + 0.10 * cycle, 0.0),
             (step.time + (STANCE - 0.20) * cycle, 0.0),
-            (step.time + (STANCE + 0.09) * cycle, math.radians(60) * min(max(following, 0.25), 1.1)),
+            (
+                step.time + (STANCE + 0.09) * cycle,
+                math.radians(60) * min(max(following, 0.25), 1.1),
+            ),
         ]
 
-    pitch = partial(keyed, times=np.array([key[0] for key in keys]), values=np.array([key[1] for key in keys]))
+    pitch = partial(
+        keyed, times=np.array([key[0] for key in keys]), values=np.array([key[1] for key in keys])
+    )
     yaw = partial(
         keyed,
-        times=np.array([time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:]),
+        times=np.array(
+            [time for step in own for time in (step.time - (1 - STANCE) * cycle, step.time)][1:]
+        ),
         values=np.array([step.heading for step in own for _ in (0, 1)][:-1]),
     )
     landings = np.array([step.time for step in own])
@@ -116,8 +138,16 @@ def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Arr
             lift = step.time + STANCE * cycle
 
             def standing(at: Array, step: Step = step) -> Array:
-                across = sign * traits.track_m * np.array([-math.sin(step.heading), math.cos(step.heading), 0.0])
-                return np.array([*step.middle, 0.0]) + across + turn("z", step.heading).apply(_rolled(pitch(at), height))
+                across = (
+                    sign
+                    * traits.track_m
+                    * np.array([-math.sin(step.heading), math.cos(step.heading), 0.0])
+                )
+                return (
+                    np.array([*step.middle, 0.0])
+                    + across
+                    + turn("z", step.heading).apply(_rolled(pitch(at), height))
+                )
 
             def landing(at: Array, after: Step = after) -> Array:
                 return standing(at, after)
@@ -125,7 +155,9 @@ def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Arr
             stands = (t >= step.time) & (t < lift)
             ankle[stands] = standing(t[stands])
             swings = (t >= lift) & (t < after.time)
-            path = hermite(t[swings], (lift, after.time), state(standing, lift), state(landing, after.time))
+            path = hermite(
+                t[swings], (lift, after.time), state(standing, lift), state(landing, after.time)
+            )
             clearance = traits.clearance_m * bump((t[swings] - lift) / (after.time - lift))
             ankle[swings] = path + clearance[:, None] * np.array([0.0, 0.0, 1.0])
         return ankle, pitch(t), yaw(t)
@@ -167,11 +199,19 @@ def _walk(traits: Traits, course: _Course, t: Array) -> Pose:
     path, heading, vigour = course.path(t), course.heading(t), course.vigour(t)
     phase = 2 * np.pi * (t - course.first_left_s) / traits.cycle_s  # 0 where the left foot lands
     bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
-    root = np.concatenate([path, (height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob)))[:, None]], axis=1)
+    root = np.concatenate(
+        [path, (height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob)))[:, None]], axis=1
+    )
     pelvis_yaw = -math.radians(5) * vigour * np.cos(phase)
     thorax_yaw = math.radians(6) * vigour * np.cos(phase)
-    pelvis = turn("z", heading + pelvis_yaw) * turn("x", math.radians(3) * vigour * np.sin(phase)) * turn("y", math.radians(3))
-    thorax = turn("z", heading + thorax_yaw) * turn("y", math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase))
+    pelvis = (
+        turn("z", heading + pelvis_yaw)
+        * turn("x", math.radians(3) * vigour * np.sin(phase))
+        * turn("y", math.radians(3))
+    )
+    thorax = turn("z", heading + thorax_yaw) * turn(
+        "y", math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase)
+    )
     ankles, feet, arms = {}, {}, {}
     for side, sign in SIDES.items():
         ankle, pitch, yaw = course.feet[side](t)

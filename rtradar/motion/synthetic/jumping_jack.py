@@ -58,12 +58,23 @@ def _sets(traits: Traits, until_s: float) -> list[list[_Flight]]:
     sets: list[list[_Flight]] = []
     while begin < until_s:
         first = begin + 0.8 * hop
-        sets.append([_Flight(first + k * hop, first + k * hop + flight, float(k % 2 == 0)) for k in range(2 * SET)])
+        sets.append(
+            [
+                _Flight(first + k * hop, first + k * hop + flight, float(k % 2 == 0))
+                for k in range(2 * SET)
+            ]
+        )
         begin = sets[-1][-1].end + 0.8 * hop + REST_S / traits.tempo
     return sets
 
 
-def _height(t: Array, sets: list[list[_Flight]], prepare_s: float, standing: float, levels: tuple[float, float]) -> Array:
+def _height(
+    t: Array,
+    sets: list[list[_Flight]],
+    prepare_s: float,
+    standing: float,
+    levels: tuple[float, float],
+) -> Array:
     """Height of the root (n,): standing, thrown, free, caught."""
     z = np.full(len(t), standing)
     for hops in sets:
@@ -79,7 +90,11 @@ def _height(t: Array, sets: list[list[_Flight]], prepare_s: float, standing: flo
             fly = (t >= hop.begin) & (t < hop.end)
             since = t[fly] - hop.begin
             z[fly] = level + up * since - GRAVITY_MPS2 * since**2 / 2
-            state, contact, level = (arrive, up - GRAVITY_MPS2 * span, -GRAVITY_MPS2), hop.end, arrive
+            state, contact, level = (
+                (arrive, up - GRAVITY_MPS2 * span, -GRAVITY_MPS2),
+                hop.end,
+                arrive,
+            )
         last = (t >= contact) & (t < contact + prepare_s)
         z[last] = hermite(t[last], (contact, contact + prepare_s), state, (standing, 0.0, 0.0))
     return z
@@ -94,7 +109,9 @@ def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = traits.height_m, traits.amplitude
     hop_s = HOP_S / traits.tempo
     # Who jumps has stood still before the first hop of a set, and does after the last: further sets do not matter.
-    sets = [hops for hops in all_sets if hops[0].begin - hop_s < t[-1] and hops[-1].end + hop_s > t[0]]
+    sets = [
+        hops for hops in all_sets if hops[0].begin - hop_s < t[-1] and hops[-1].end + hop_s > t[0]
+    ]
     hops = [hop for hops in sets for hop in hops]
 
     def between(values: tuple[float, float], lead: float, lag: float) -> Array:
@@ -102,7 +119,9 @@ def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
         if not hops:
             return np.full(len(t), values[0])
         times = [time for hop in hops for time in (hop.begin - lead, hop.end + lag)]
-        return keyed(t, times, [values[0], *(values[int(hop.apart)] for hop in hops for _ in (0, 1))][:-1])
+        return keyed(
+            t, times, [values[0], *(values[int(hop.apart)] for hop in hops for _ in (0, 1))][:-1]
+        )
 
     close, wide = 0.9 * HIP_Y * height, (HIP_Y + 0.10 * amplitude) * height
     # The feet move sideways while they are well off the floor.
@@ -119,10 +138,15 @@ def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
     rolled[:, 2] += height * (ANKLE + 0.010 * lift)
 
     span = hop_s - contact
-    heel = roll_about_toe(math.radians(34) * bump(np.array([roll_s / (span + 2 * roll_s)])), height)[0]
+    heel = roll_about_toe(
+        math.radians(34) * bump(np.array([roll_s / (span + 2 * roll_s)])), height
+    )[0]
     leg = 0.97 * (THIGH + SHANK) * height
     low, high = (
-        ANKLE * height + heel[2] + (ROOT - HIP) * height + math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
+        ANKLE * height
+        + heel[2]
+        + (ROOT - HIP) * height
+        + math.sqrt(leg**2 - (track - HIP_Y * height) ** 2 - heel[0] ** 2)
         for track in (wide, close)
     )
     z = _height(t, sets, 0.75 * hop_s, height * (ROOT - 0.008), (high, low))

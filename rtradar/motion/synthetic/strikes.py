@@ -55,7 +55,9 @@ def _kick(traits: Traits, t: Array) -> Pose:
     clock = repeated(t, traits, KICK_PERIOD_S, 0.25)
     # A low kick needs nearly as high a knee, or the foot would scrape the floor.
     rise = 0.45 + 0.55 * traits.amplitude * traits.uneven[kicker]
-    thigh = _degrees(clock, [0.12, 0.50, 0.75, 1.00, 1.30], [0.0, 94 * rise, 112 * rise, 76 * rise, 0.0])
+    thigh = _degrees(
+        clock, [0.12, 0.50, 0.75, 1.00, 1.30], [0.0, 94 * rise, 112 * rise, 76 * rise, 0.0]
+    )
     knee = _degrees(clock, [0.06, 0.36, 0.42, 0.76, 1.06, 1.30], [8.0, 96.0, 96.0, 16.0, 88.0, 8.0])
     air = keyed(clock, [0.14, 0.36, 1.04, 1.30], [0.0, 1.0, 1.0, 0.0])
     strike = keyed(clock, [0.30, 0.75, 0.80, 1.26], [0.0, 1.0, 1.0, 0.0])
@@ -71,8 +73,12 @@ def _kick(traits: Traits, t: Array) -> Pose:
         ],
         axis=1,
     )
-    pelvis = turn("z", SIDES[other] * math.radians(14) * strike) * turn("y", -math.radians(13) * strike)
-    thorax = turn("z", -SIDES[other] * math.radians(10) * strike) * turn("y", math.radians(4) - math.radians(18) * strike)
+    pelvis = turn("z", SIDES[other] * math.radians(14) * strike) * turn(
+        "y", -math.radians(13) * strike
+    )
+    thorax = turn("z", -SIDES[other] * math.radians(10) * strike) * turn(
+        "y", math.radians(4) - math.radians(18) * strike
+    )
 
     ground = {
         kicker: np.array([-0.06 * height, SIDES[kicker] * track, ANKLE * height]),
@@ -141,15 +147,25 @@ def _punch(traits: Traits, t: Array) -> Pose:
     back = SIDES[hand]  # yaw that takes the striking shoulder back
     idle = np.sin(2 * np.pi * (0.9 * traits.tempo * t + traits.phase))
     root = np.stack(
-        [height * 0.03 * strength * hips, 0.002 * height * idle, height * (ROOT - 0.035 - 0.008 * hips + 0.003 * idle)], axis=1
+        [
+            height * 0.03 * strength * hips,
+            0.002 * height * idle,
+            height * (ROOT - 0.035 - 0.008 * hips + 0.003 * idle),
+        ],
+        axis=1,
     )
     pelvis = turn("z", back * np.radians(22 - 30 * strength * hips)) * turn("y", math.radians(4))
-    thorax = turn("z", back * np.radians(28 - 52 * strength * chest)) * turn("y", np.radians(6 + 5 * chest))
+    thorax = turn("z", back * np.radians(28 - 52 * strength * chest)) * turn(
+        "y", np.radians(6 + 5 * chest)
+    )
 
     track = 1.3 * HIP_Y * height
     feet_x = {other: 0.11 * height, hand: -0.11 * height}
     yaw = {other: back * math.radians(8), hand: back * math.radians(40)}
-    ankles = {side: np.tile([feet_x[side], SIDES[side] * track, ANKLE * height], (len(t), 1)) for side in SIDES}
+    ankles = {
+        side: np.tile([feet_x[side], SIDES[side] * track, ANKLE * height], (len(t), 1))
+        for side in SIDES
+    }
     feet = {side: turn("z", np.full(len(t), yaw[side])) for side in SIDES}
 
     length = (UPPER_ARM + FOREARM) * height

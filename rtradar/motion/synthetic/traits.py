@@ -64,7 +64,9 @@ class Traits:
         return math.radians(20) * self.amplitude
 
 
-def draw_traits(rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float) -> Traits:
+def draw_traits(
+    rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float
+) -> Traits:
     """A subject: 3 % of spread (normal, cut at two sigma) on tempo, amplitude and each side, any phase."""
     spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
     return Traits(

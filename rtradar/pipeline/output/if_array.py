@@ -13,10 +13,21 @@ def if_array(path: Path, capture: Capture) -> Any:
     import zarr
 
     radar = capture.radar
-    together = radar.n_tx if radar.multiplexing == "ddm" else 1  # one receiver gets the sum of all Tx
+    together = (
+        radar.n_tx if radar.multiplexing == "ddm" else 1
+    )  # one receiver gets the sum of all Tx
     shape = (capture.n_chirps // together, radar.n_rx, radar.samples_per_chirp)
     chunks = (capture.block // together, *shape[1:])
-    array = zarr.create_array(path, shape=shape, chunks=chunks, dtype="complex64", dimension_names=("chirp", "rx", "sample"))
-    told = {name: getattr(radar, name) for name in ("multiplexing", "chirp_duration_s", "sample_rate_hz")}
+    array = zarr.create_array(
+        path,
+        shape=shape,
+        chunks=chunks,
+        dtype="complex64",
+        dimension_names=("chirp", "rx", "sample"),
+    )
+    told = {
+        name: getattr(radar, name)
+        for name in ("multiplexing", "chirp_duration_s", "sample_rate_hz")
+    }
     array.attrs.update({"units": "m", **told})
     return array

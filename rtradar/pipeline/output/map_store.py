@@ -30,18 +30,58 @@ _AXES = {
 _GROWING = ("time", "slow_time", "spectrogram_time")
 
 _MAPS = {
-    "range_doppler": (("time", "range", "velocity"), np.float32, "m2", "power summed over all channels"),
+    "range_doppler": (
+        ("time", "range", "velocity"),
+        np.float32,
+        "m2",
+        "power summed over all channels",
+    ),
     "detections": (("time", "range", "velocity"), np.uint8, "1", "1 where a target is detected"),
-    "range_time": (("slow_time", "range"), np.float32, "m2", "power averaged over channels and a few cycles"),
-    "spectrogram": (("spectrogram_time", "spectrogram_velocity"), np.float32, "m2", "power of one channel summed over range"),
-    "range_azimuth": (("time", "range", "azimuth"), np.float32, "m2", "power summed over detected cells"),
-    "range_elevation": (("time", "range", "elevation"), np.float32, "m2", "power summed over detected cells"),
+    "range_time": (
+        ("slow_time", "range"),
+        np.float32,
+        "m2",
+        "power averaged over channels and a few cycles",
+    ),
+    "spectrogram": (
+        ("spectrogram_time", "spectrogram_velocity"),
+        np.float32,
+        "m2",
+        "power of one channel summed over range",
+    ),
+    "range_azimuth": (
+        ("time", "range", "azimuth"),
+        np.float32,
+        "m2",
+        "power summed over detected cells",
+    ),
+    "range_elevation": (
+        ("time", "range", "elevation"),
+        np.float32,
+        "m2",
+        "power summed over detected cells",
+    ),
 }
 
 _SINGLE = {
-    "range_doppler_received": (("range", "velocity"), np.float32, "m2", "range_doppler of one window before clutter was removed"),
-    "detections_received": (("range", "velocity"), np.uint8, "1", "1 where a target is detected in range_doppler_received"),
-    "range_azimuth_received": (("range", "azimuth"), np.float32, "m2", "range_azimuth of that window before clutter was removed"),
+    "range_doppler_received": (
+        ("range", "velocity"),
+        np.float32,
+        "m2",
+        "range_doppler of one window before clutter was removed",
+    ),
+    "detections_received": (
+        ("range", "velocity"),
+        np.uint8,
+        "1",
+        "1 where a target is detected in range_doppler_received",
+    ),
+    "range_azimuth_received": (
+        ("range", "azimuth"),
+        np.float32,
+        "m2",
+        "range_azimuth of that window before clutter was removed",
+    ),
 }
 
 _STEPS_A_CHUNK = 64
@@ -95,7 +135,11 @@ class MapStore:
                 continue
             shape = tuple(len(fixed[axis_name]) for axis_name in axes[1:])
             steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
-            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True} if name in _SPARSE else {}
+            packed = (
+                {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+                if name in _SPARSE
+                else {}
+            )
             data = self._file.create_dataset(
                 name,
                 shape=(0, *shape),
@@ -107,7 +151,9 @@ class MapStore:
                 **packed,
             )
             data.attrs["units"], data.attrs["long_name"] = unit, meaning
-            data.attrs["clutter_removal"] = "none" if clutter_removal is None else clutter_removal[axes[0]]
+            data.attrs["clutter_removal"] = (
+                "none" if clutter_removal is None else clutter_removal[axes[0]]
+            )
             for number, axis_name in enumerate(axes):
                 data.dims[number].attach_scale(self._file[axis_name])
 
@@ -125,7 +171,9 @@ class MapStore:
         for name, values in maps.items():
             axes, kind, unit, meaning = _SINGLE[name]
             data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind))
-            data.attrs.update({"units": unit, "long_name": meaning, "clutter_removal": "none", "time_s": time})
+            data.attrs.update(
+                {"units": unit, "long_name": meaning, "clutter_removal": "none", "time_s": time}
+            )
             for number, axis_name in enumerate(axes):
                 data.dims[number].attach_scale(self._file[axis_name])
 

@@ -55,5 +55,7 @@ def comparison_files(levels: Sequence[str]) -> OutputFiles:
     """
     any_level = one_of(levels)
     return OutputFiles(
-        "compare.json", rf"{one_of(_COMPARISON)}|({any_level})/({_RUN_FILES})", rf"({any_level})(/({_RUN_FOLDERS}))?"
+        "compare.json",
+        rf"{one_of(_COMPARISON)}|({any_level})/({_RUN_FILES})",
+        rf"({any_level})(/({_RUN_FOLDERS}))?",
     )

@@ -16,7 +16,17 @@ from rtradar.pipeline.cloud_maker import Clouds
 from rtradar.pipeline.timing import Stages, peak_memory_mb
 from rtradar.scatter import Accountable
 
-_VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch")
+_VERSIONS = (
+    "rtradar",
+    "mitsuba",
+    "drjit",
+    "numpy",
+    "scipy",
+    "numba",
+    "scikit-image",
+    "trimesh",
+    "torch",
+)
 
 
 def cost(stages: Stages, wall_s: float, warmup_s: float, capture_s: float) -> dict[str, Any]:
@@ -32,7 +42,11 @@ def cost(stages: Stages, wall_s: float, warmup_s: float, capture_s: float) -> di
 
 
 def summary_of(
-    capture: Capture, clouds: Clouds, parameters: Mapping[str, Any], seed: int, spent: Mapping[str, Any]
+    capture: Capture,
+    clouds: Clouds,
+    parameters: Mapping[str, Any],
+    seed: int,
+    spent: Mapping[str, Any],
 ) -> dict[str, Any]:
     """The summary of a run with these ``parameters``, which has ``spent`` so much, as of `cost`."""
     with_watts = capture.radar.transmit_power_dbm is not None and parameters["spreading"]
@@ -71,14 +85,23 @@ def plain(value: object) -> Any:
 def _watts(capture: Capture) -> dict[str, float]:
     """Powers per IF sample in watts, as received at the antenna's port: the radar equation's."""
     scale = capture.radar.watts_per_m2
-    return {"watts_per_m2": scale, "echo_power_w": capture.survey.power * scale, "noise_power_w": capture.noise.power * scale}
+    return {
+        "watts_per_m2": scale,
+        "echo_power_w": capture.survey.power * scale,
+        "noise_power_w": capture.noise.power * scale,
+    }
 
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:
     of_room = capture.inside.limits if capture.inside else ()
-    limits: list[dict[str, Any]] = [dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)]
+    limits: list[dict[str, Any]] = [
+        dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)
+    ]
     if not capture.survey.visible:
-        limits += [{"name": "nobody_visible", "share": 0.0, "message": message} for message in capture.warned]
+        limits += [
+            {"name": "nobody_visible", "share": 0.0, "message": message}
+            for message in capture.warned
+        ]
     return limits
 
 

@@ -17,7 +17,9 @@ from rtradar.scene import Scene
 _TRACK_POINTS = 400
 
 
-def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, inside: Indoors, title: str) -> dict[str, Path]:
+def draw_room_pictures(
+    folder: Path, radar: Radar, body: Body, scene: Scene, inside: Indoors, title: str
+) -> dict[str, Path]:
     """Draw them from ``maps.h5`` in this folder, into the same folder.
 
     Parameters
@@ -47,11 +49,18 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
                 "As received": (received[:], maps["detections_received"][:].astype(bool)),
                 after: (maps["range_doppler"][window], maps["detections"][window].astype(bool)),
             }
-            azimuth_map = maps["range_azimuth_received"][:] if "range_azimuth_received" in maps else None
+            azimuth_map = (
+                maps["range_azimuth_received"][:] if "range_azimuth_received" in maps else None
+            )
         else:
             window = busiest_window(maps)
             time = float(maps["time"][window])
-            panels = {"As received": (maps["range_doppler"][window], maps["detections"][window].astype(bool))}
+            panels = {
+                "As received": (
+                    maps["range_doppler"][window],
+                    maps["detections"][window].astype(bool),
+                )
+            }
             azimuth_map = maps["range_azimuth"][window] if "range_azimuth" in maps else None
         azimuth = maps["azimuth"][:] if "azimuth" in maps else None
     found = ghosts(inside.model, radar, time)
@@ -66,7 +75,13 @@ def draw_room_pictures(folder: Path, radar: Radar, body: Body, scene: Scene, ins
         drawn["Range-azimuth with walls and ghosts"] = folder / "range_azimuth_walls.png"
         places = [(ghost.path, ghost.range_m, ghost.azimuth_rad) for ghost in found]
         draw_range_azimuth_with_walls(
-            drawn["Range-azimuth with walls and ghosts"], azimuth_map, azimuth, scene, radar, places, moment
+            drawn["Range-azimuth with walls and ghosts"],
+            azimuth_map,
+            azimuth,
+            scene,
+            radar,
+            places,
+            moment,
         )
     times = np.linspace(0, body.duration_s, _TRACK_POINTS)
     track = body.motion.at(times)[0][:, 0, :2]

@@ -27,7 +27,9 @@ _COLUMNS = 600
 _SPATIAL_DOTS = 20_000
 
 
-def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str, *, spreading: bool = True) -> dict[str, Path]:
+def draw_pictures(
+    folder: Path, radar: Radar, clouds: Clouds, title: str, *, spreading: bool = True
+) -> dict[str, Path]:
     """Draw what ``maps.h5`` in this folder holds, and the clouds, into the same folder.
 
     Parameters
@@ -54,7 +56,9 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str, *, spr
     with h5py.File(folder / "maps.h5") as maps:
         power, times = thinned(maps, "range_time", "slow_time")
         what = title + removed(maps["range_time"])
-        draw_range_time(to("Range over time", "range_time.png"), power, times, radar, what, spreading=spreading)
+        draw_range_time(
+            to("Range over time", "range_time.png"), power, times, radar, what, spreading=spreading
+        )
         if len(maps["spectrogram_time"]):
             power, times = thinned(maps, "spectrogram", "spectrogram_time")
             velocity, what = maps["spectrogram_velocity"][:], title + removed(maps["spectrogram"])
@@ -66,16 +70,24 @@ def draw_pictures(folder: Path, radar: Radar, clouds: Clouds, title: str, *, spr
         power, mask = maps["range_doppler"][window], maps["detections"][window].astype(bool)
         file = to("Range-Doppler map and detections", "range_doppler.png")
         draw_range_doppler(file, power, mask, radar, moment, spreading=spreading)
-        angles = {angle: (maps[f"range_{angle}"][window], maps[angle][:]) for angle in ("azimuth", "elevation") if angle in maps}
+        angles = {
+            angle: (maps[f"range_{angle}"][window], maps[angle][:])
+            for angle in ("azimuth", "elevation")
+            if angle in maps
+        }
     if angles:
         panels = " and ".join(f"range-{angle}" for angle in angles).capitalize()
         draw_range_angle(to(panels, "range_angle.png"), angles, radar, moment, spreading=spreading)
-    draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title + cleaned)
+    draw_rdt_cloud(
+        to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, title + cleaned
+    )
     if angles:
         shown = clouds.spatial.strongest()
         every = math.ceil(max(len(shown.points), 1) / _SPATIAL_DOTS)
         points, velocity = shown.points[::every], shown.velocity[::every]
-        draw_spatial_cloud(to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title + cleaned)
+        draw_spatial_cloud(
+            to("Spatial cloud", "cloud_xyz.png"), points, velocity, radar, title + cleaned
+        )
     return drawn
 
 

@@ -89,8 +89,15 @@ def view(
     check_whole(Path(folder))
     linked = load_linked(Path(folder))
     times = linked.moments.times
-    if time_s is not None and not times[0] - linked.radar.frame_duration_s <= time_s <= times[-1] + linked.radar.frame_duration_s:
-        raise InputError(f"time_s = {time_s}; the capture has windows from {times[0]:.3f} to {times[-1]:.3f} s (--time)")
+    if (
+        time_s is not None
+        and not times[0] - linked.radar.frame_duration_s
+        <= time_s
+        <= times[-1] + linked.radar.frame_duration_s
+    ):
+        raise InputError(
+            f"time_s = {time_s}; the capture has windows from {times[0]:.3f} to {times[-1]:.3f} s (--time)"
+        )
     told: dict[str, Any] = {
         "windows": len(times),
         "echoes": len(linked.moments.echo_part),
@@ -103,7 +110,11 @@ def view(
     if still is not None:
         step = linked.moments.nearest(float(times.mean()) if time_s is None else time_s)
         draw_still(still, linked, step, colour=colour)
-        told["still"] = {"path": str(still), "bytes": Path(still).stat().st_size, "time_s": float(times[step])}
+        told["still"] = {
+            "path": str(still),
+            "bytes": Path(still).stat().st_size,
+            "time_s": float(times[step]),
+        }
     return told
 
 
@@ -116,13 +127,17 @@ def load_linked(folder: Path) -> Linked:
         Where one of them is missing or damaged, or they are not of one run.
     """
     if not os.path.isfile(folder / "summary.json"):
-        raise InputError(f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named")
+        raise InputError(
+            f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named"
+        )
     summary, radar = _summary(folder / "summary.json")
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
     moments = load_moments(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
-    spatial = _archive(folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",))
+    spatial = _archive(
+        folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",)
+    )
     path = folder / "maps.h5"
     try:
         with open_regular(path) as raw, h5py.File(raw) as file:
@@ -136,13 +151,20 @@ def load_linked(folder: Path) -> Linked:
     except InputError:
         raise
     except _DAMAGE as error:
-        why = error.strerror if isinstance(error, FileNotFoundError) else "is damaged, or of another kind"
+        why = (
+            error.strerror
+            if isinstance(error, FileNotFoundError)
+            else "is damaged, or of another kind"
+        )
         raise InputError(f"'{path}': {why}; {_MEND}") from None
     try:
         cloud = SpatialCloud(**spatial)
     except (InputError, TypeError) as error:
         raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
-    fidelity, scene = _line(summary.get("fidelity", "")), _line(parameters.get("scene", "free-space"))
+    fidelity, scene = (
+        _line(summary.get("fidelity", "")),
+        _line(parameters.get("scene", "free-space")),
+    )
     removal = _line(parameters.get("clutter_removal", "none"))
     cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
     return Linked(
@@ -174,7 +196,9 @@ def _line(value: Any) -> str:
     return printable(str(value)[:_MOST_LETTERS])
 
 
-def _archive(path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()) -> dict[str, NDArray[Any]]:
+def _archive(
+    path: Path, names: tuple[str, ...], may_be_nan: tuple[str, ...] = ()
+) -> dict[str, NDArray[Any]]:
     try:
         arrays = read_arrays(path)
         for name in names:
@@ -214,7 +238,9 @@ def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDArray[np.uint8]:
-    return np.asarray(np.clip(np.rint((level_db - low_db) / step_db), 0, MOST_LEVEL), dtype=np.uint8)
+    return np.asarray(
+        np.clip(np.rint((level_db - low_db) / step_db), 0, MOST_LEVEL), dtype=np.uint8
+    )
 
 
 def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
@@ -230,7 +256,10 @@ def _range_doppler(maps: Any, moments: Moments, radar: Radar, spreading: bool) -
     scale = np.asarray(unit.scale) / radar.n_channels
     windows = moments.window.tolist()
     top = max(float((power[window] * scale).max()) for window in windows)
-    noise = [float(np.median(power[window] * scale)) for window in windows[:: math.ceil(len(windows) / _SAMPLED)]]
+    noise = [
+        float(np.median(power[window] * scale))
+        for window in windows[:: math.ceil(len(windows) / _SAMPLED)]
+    ]
     scaled = FieldUnit(unit.name, 1.0)
     low_db, step_db = _scale(*scaled.level(_powers(np.array([top, np.median(noise)]))).tolist())
     rows, columns = math.ceil(len(distance) / _MOST_ROWS), math.ceil(len(velocity) / _MOST_COLUMNS)
@@ -244,7 +273,12 @@ def _range_doppler(maps: Any, moments: Moments, radar: Radar, spreading: bool) -
         return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
 
     return Levels(
-        level=np.stack([_levels(scaled.level(_powers(pooled(power[window] * scale))), low_db, step_db) for window in windows]),
+        level=np.stack(
+            [
+                _levels(scaled.level(_powers(pooled(power[window] * scale))), low_db, step_db)
+                for window in windows
+            ]
+        ),
         low_db=low_db,
         step_db=step_db,
         label=unit.label("mean of channels"),
@@ -267,17 +301,28 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
     low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
     level, across = _levels(level_db, low_db, step_db)[None], (float(times[0]), step_s)
-    return Levels(level=level, low_db=low_db, step_db=step_db, label=unit.label("one channel"), across=across, up=up)
+    return Levels(
+        level=level,
+        low_db=low_db,
+        step_db=step_db,
+        label=unit.label("one channel"),
+        across=across,
+        up=up,
+    )
 
 
-def _at_points(maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool) -> NDArray[np.float64]:
+def _at_points(
+    maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool
+) -> NDArray[np.float64]:
     """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB]."""
     if not len(points):
         return np.zeros(0)
     nearest = []
     for axis, column in zip(_MAPS["range_doppler"], points.T, strict=True):
         values = maps[axis][:]
-        nearest.append(np.searchsorted((values[1:] + values[:-1]) / 2, column))  # which is in the middle goes to the lower
+        nearest.append(
+            np.searchsorted((values[1:] + values[:-1]) / 2, column)
+        )  # which is in the middle goes to the lower
     found = np.zeros(len(points))
     for window in np.unique(nearest[0]).tolist():
         own = nearest[0] == window

@@ -46,7 +46,14 @@ class _Looked(NamedTuple):
     power_m2: NDArray[np.float64]
 
 
-def moments(model: EchoModel, radar: Radar, body: Body, scene: Scene, windows: NDArray[np.int64], n_chirps: int) -> Moments:
+def moments(
+    model: EchoModel,
+    radar: Radar,
+    body: Body,
+    scene: Scene,
+    windows: NDArray[np.int64],
+    n_chirps: int,
+) -> Moments:
     """Look at the middle of windows.
 
     Parameters
@@ -67,12 +74,18 @@ def moments(model: EchoModel, radar: Radar, body: Body, scene: Scene, windows: N
     Moments
         Of evenly chosen windows; as large for any length of the capture.
     """
-    hop_s = radar.frame_hop_s if len(windows) < 2 else float(np.diff(windows).mean()) * radar.cycle_duration_s
+    hop_s = (
+        radar.frame_hop_s
+        if len(windows) < 2
+        else float(np.diff(windows).mean()) * radar.cycle_duration_s
+    )
     every = max(math.ceil(len(windows) / MOST_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
     window = np.arange(0, len(windows), every)
     times = np.minimum(radar.window_times(windows[window]), body.duration_s)
     paths = model.paths if isinstance(model, Multipath) else (WallPath((), ()),)
-    keys, looked = _look(model, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx)
+    keys, looked = _look(
+        model, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx
+    )
     chosen = _strongest(keys, looked.power_m2)
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
@@ -102,12 +115,19 @@ def moments(model: EchoModel, radar: Radar, body: Body, scene: Scene, windows: N
 # -- echoes ------------------------------------------------------------------------------------------------------------
 
 
-def _look(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> tuple[list[Key], _Looked]:
+def _look(
+    model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int
+) -> tuple[list[Key], _Looked]:
     """Echoes about some cycles, with one column for each key that ever comes."""
-    looked = [_look_at(model, radar, cycles[first : first + _AT_ONCE], n_cycles) for first in range(0, len(cycles), _AT_ONCE)]
+    looked = [
+        _look_at(model, radar, cycles[first : first + _AT_ONCE], n_cycles)
+        for first in range(0, len(cycles), _AT_ONCE)
+    ]
     keys = list(dict.fromkeys(key for one in looked for key in one.keys))
     place = {key: column for column, key in enumerate(keys)}
-    tables = {name: np.zeros((len(cycles), len(keys))) for name in ("range_m", "velocity_mps", "power_m2")}
+    tables = {
+        name: np.zeros((len(cycles), len(keys))) for name in ("range_m", "velocity_mps", "power_m2")
+    }
     for number, one in enumerate(looked):
         columns = [place[key] for key in one.keys]
         for name, table in tables.items():
@@ -121,7 +141,9 @@ def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles
     chirps, where = np.unique((ends * radar.n_tx + middle).astype(np.int64), return_inverse=True)
     where = where.reshape(ends.shape)
     echoes = model.echoes(chirps)
-    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[where]  # (cycle, before and after, rx, echo)
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[
+        where
+    ]  # (cycle, before and after, rx, echo)
     length = echoes.length[where]
     # By the power at both ends: where a receiver sees an echo at one end only, its length jumps to one of no meaning.
     weight = power.min(axis=1)
@@ -131,15 +153,28 @@ def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles
     before, after = (weight * length[:, 0]).sum(axis=1), (weight * length[:, 1]).sum(axis=1)
     apart_s = np.diff(ends, axis=1) * radar.cycle_duration_s
     rate = np.divide(after - before, apart_s, out=np.zeros_like(before), where=apart_s > 0)
-    owned = list(zip(_path_of_echoes(model, len(echoes.part)), echoes.part.tolist(), echoes.bounces.tolist(), strict=True))
+    owned = list(
+        zip(
+            _path_of_echoes(model, len(echoes.part)),
+            echoes.part.tolist(),
+            echoes.bounces.tolist(),
+            strict=True,
+        )
+    )
     keys = list(dict.fromkeys(owned))
-    column = np.array([keys.index(key) for key in owned], dtype=np.int64) if len(keys) < len(owned) else np.arange(len(owned))
+    column = (
+        np.array([keys.index(key) for key in owned], dtype=np.int64)
+        if len(keys) < len(owned)
+        else np.arange(len(owned))
+    )
     shape = (len(cycles), len(keys))
     total = np.zeros(shape)
     np.add.at(total.T, column, power.T)
     share = np.where(total[:, column] > 0, power, 1.0)
     sums = np.zeros((3, *shape))
-    for table, values in zip(sums, (share, share * (before + after) / 4, share * rate / 2), strict=True):
+    for table, values in zip(
+        sums, (share, share * (before + after) / 4, share * rate / 2), strict=True
+    ):
         np.add.at(table.T, column, values.T)
     return _Looked(keys, sums[1] / sums[0], sums[2] / sums[0], total)
 
@@ -164,7 +199,11 @@ def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
 
 
 def _corners(
-    radar: Radar, body: Body, paths: tuple[WallPath, ...], keys: list[Key], times: NDArray[np.float64]
+    radar: Radar,
+    body: Body,
+    paths: tuple[WallPath, ...],
+    keys: list[Key],
+    times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Places of reflection (step, echo, corner, 3), from and to the middle of the array; NaN where not known.
 
@@ -176,8 +215,12 @@ def _corners(
     out = np.full((len(times), len(keys), most, 3), np.nan)
     for number in {path for path, _, _ in keys}:
         path = paths[number]
-        _, _, point = mirror(images(path.out, centre), images(path.back, centre)[:, None], *poses, points=True)
-        there, back = (corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in (path.out, path.back))
+        _, _, point = mirror(
+            images(path.out, centre), images(path.back, centre)[:, None], *poses, points=True
+        )
+        there, back = (
+            corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in (path.out, path.back)
+        )
         course = np.stack([*there, *reversed(back[:-1])], axis=2)
         for echo, (other, part, bounces) in enumerate(keys):
             if other == number and bounces == path.order + 1:
@@ -187,7 +230,11 @@ def _corners(
 
 def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
     """Vertices (vertex, 3), faces (face, 3) and the piece of each vertex (vertex,)."""
-    vertices, faces, piece = [np.zeros((0, 3))], [np.zeros((0, 3), dtype=np.int64)], [np.zeros(0, dtype=np.int64)]
+    vertices, faces, piece = (
+        [np.zeros((0, 3))],
+        [np.zeros((0, 3), dtype=np.int64)],
+        [np.zeros(0, dtype=np.int64)],
+    )
     for number, one in enumerate(scene.furniture):
         triangles = one.triangles()
         if len(triangles.faces) > MOST_FACES:

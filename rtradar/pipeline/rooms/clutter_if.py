@@ -21,13 +21,15 @@ _Samples = NDArray[np.complex128]
 
 
 @compiled(parallel=True)
-def _fade(kept, changed, share, tx, out):  # type: ignore[no-untyped-def]
+def _fade(kept, changed, share, tx, out):
     """Add to ``out (chirp, rx, sample)`` what is kept of the room, and the share of its change that has come."""
     for chirp in prange(len(out)):
         own, more, part = kept[tx[chirp]], changed[tx[chirp]], share[chirp]
         for receiver in range(out.shape[1]):
             for sample in range(out.shape[2]):
-                out[chirp, receiver, sample] += own[receiver, sample] + part * more[receiver, sample]
+                out[chirp, receiver, sample] += (
+                    own[receiver, sample] + part * more[receiver, sample]
+                )
 
 
 class _Crowd(NamedTuple):
@@ -45,7 +47,10 @@ class _Crowd(NamedTuple):
 def _crowds(objects: Sequence[Echoes]) -> list[_Crowd]:
     crowds = []
     counts = [len(own.part) for own in objects]
-    kinds = [(number,) if counts[number] == 1 else tuple(own.frequency) for number, own in enumerate(objects)]
+    kinds = [
+        (number,) if counts[number] == 1 else tuple(own.frequency)
+        for number, own in enumerate(objects)
+    ]
     for kind in dict.fromkeys(kinds):
         member = np.array([other == kind for other in kinds])
         numbers = np.flatnonzero(member).tolist()
@@ -58,7 +63,9 @@ def _crowds(objects: Sequence[Echoes]) -> list[_Crowd]:
             part=np.concatenate([own.part for own in chosen]),
             bounces=np.concatenate([own.bounces for own in chosen]),
         )
-        first = np.cumsum([0, *(count * inside for count, inside in zip(counts, member, strict=True))])[:-1]
+        first = np.cumsum(
+            [0, *(count * inside for count, inside in zip(counts, member, strict=True))]
+        )[:-1]
         crowds.append(_Crowd(together, member, first))
     return crowds
 
@@ -79,14 +86,22 @@ class RoomIf:
         Mitsuba's backend.
     """
 
-    def __init__(self, clutter: Clutter, body: Body | None = None, *, variant: str = "auto") -> None:
+    def __init__(
+        self, clutter: Clutter, body: Body | None = None, *, variant: str = "auto"
+    ) -> None:
         self._radar = clutter.radar
         radar = self._radar
         self._crowds = _crowds(tuple(clutter.cycle()))
-        self._whole: _Samples = np.zeros((radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex128)
+        self._whole: _Samples = np.zeros(
+            (radar.n_tx, radar.n_rx, radar.samples_per_chirp), dtype=np.complex128
+        )
         for crowd in self._crowds:
             self._whole += self._synthesized(crowd.echoes)
-        self._shadow = ClutterShadow(clutter, body, variant=variant) if body is not None and clutter.objects else None
+        self._shadow = (
+            ClutterShadow(clutter, body, variant=variant)
+            if body is not None and clutter.objects
+            else None
+        )
         self._lost: dict[int, _Samples] = {}
         self._mirrored: dict[int, NDArray[np.complex64]] = {}
 
@@ -122,8 +137,17 @@ class RoomIf:
             share = smooth(chirps[inside] - anchor * step, step)
             before = self._hidden(anchor)
             after = self._hidden(anchor + 1) if (share > 0).any() else before
-            kept, changed = ((first - second).astype(np.complex64) for first, second in ((self._whole, before), (before, after)))
-            _fade(kept, changed, share.astype(np.float32), tx[inside], samples[inside[0] : inside[-1] + 1])
+            kept, changed = (
+                (first - second).astype(np.complex64)
+                for first, second in ((self._whole, before), (before, after))
+            )
+            _fade(
+                kept,
+                changed,
+                share.astype(np.float32),
+                tx[inside],
+                samples[inside[0] : inside[-1] + 1],
+            )
 
     def _hidden(self, anchor: int) -> _Samples:
         """IF of one cycle of what the body hides at an anchor, (tx, rx, sample)."""
@@ -136,7 +160,9 @@ class RoomIf:
             if anchor - 1 in self._lost and len(now.echo):
                 lost, then = self._lost[anchor - 1], self._shadow.hidden(anchor - 1)
             lost = self._changed(lost, then, now)
-            self._lost = {key: value for key, value in self._lost.items() if key == anchor - 1} | {anchor: lost}
+            self._lost = {key: value for key, value in self._lost.items() if key == anchor - 1} | {
+                anchor: lost
+            }
         return self._lost[anchor]
 
     def _changed(self, lost: _Samples, then: Hidden, now: Hidden) -> _Samples:
@@ -179,4 +205,8 @@ class RoomIf:
         return self._mirrored[number]
 
     def _synthesized(self, echoes: Echoes) -> NDArray[np.complex64]:
-        return np.asarray(synthesize(echoes, self._radar, self._radar.chirp_times(self._radar.n_tx), dtype=np.complex64))
+        return np.asarray(
+            synthesize(
+                echoes, self._radar, self._radar.chirp_times(self._radar.n_tx), dtype=np.complex64
+            )
+        )

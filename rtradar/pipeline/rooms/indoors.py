@@ -93,7 +93,9 @@ def indoors(
         "paths": [path.row() for path in paths],
         "clutter": {
             "power_m2": still,
-            "signal_to_clutter_db": float(10 * np.log10(person_power_m2 / still)) if still > 0 else None,
+            "signal_to_clutter_db": float(10 * np.log10(person_power_m2 / still))
+            if still > 0
+            else None,
             "kept": [asdict(item) for item in clutter.kept],
             "dropped": [asdict(item) for item in clutter.dropped],
         },
@@ -130,11 +132,22 @@ def ghosts(model: Multipath, radar: Radar, time_s: float) -> list[Ghost]:
     azimuth = _azimuth(echoes.length[0, : radar.rx_y], radar)
     found = []
     for path in dict.fromkeys(model.path_names):
-        own = np.array([name == path for name in model.path_names]) & (echoes.bounces > 1) & (power > 0)
+        own = (
+            np.array([name == path for name in model.path_names])
+            & (echoes.bounces > 1)
+            & (power > 0)
+        )
         if own.any():
             weight = power[own] / power[own].sum()
-            range_m, velocity = float(weight @ length.mean(axis=0)[own]) / 2, float(weight @ rate[own]) / 2
-            found.append(Ghost(path, range_m, velocity, float(weight @ azimuth[own]), float(power[own].sum())))
+            range_m, velocity = (
+                float(weight @ length.mean(axis=0)[own]) / 2,
+                float(weight @ rate[own]) / 2,
+            )
+            found.append(
+                Ghost(
+                    path, range_m, velocity, float(weight @ azimuth[own]), float(power[own].sum())
+                )
+            )
     return found
 
 

@@ -34,7 +34,9 @@ class Inside:
 
     def __init__(self, scene: Scene, part_names: tuple[str, ...]) -> None:
         self._scene, self._names = scene, part_names
-        self._solids = [(piece.name, mesh) for piece in scene.furniture if (mesh := piece.triangles()).closed]
+        self._solids = [
+            (piece.name, mesh) for piece in scene.furniture if (mesh := piece.triangles()).closed
+        ]
         things = len(scene.walls) + len(self._solids)
         self._first_s = np.full((things, len(part_names)), np.inf)
         self._power = np.zeros((things, len(part_names)))
@@ -62,7 +64,9 @@ class Inside:
             pelvis = [part for part, name in enumerate(self._names) if name in _PELVIS]
             found = [part for part in pelvis if np.isfinite(self._first_s[number, part])]
             if found:
-                raise self._refused(number, min(found, key=lambda part: float(self._first_s[number, part])))
+                raise self._refused(
+                    number, min(found, key=lambda part: float(self._first_s[number, part]))
+                )
         at = np.arange(-self._instant % _FURNITURE_STEP, len(times), _FURNITURE_STEP)
         self._instant += len(times)
         for number, (_, mesh) in enumerate(self._solids, start=len(self._scene.walls)):
@@ -105,10 +109,14 @@ class Inside:
             ("inside_furniture", "parts inside furniture", range(walls, len(self._first_s))),
         ):
             told = [
-                self._told(number, int(part)) for number in chosen for part in np.flatnonzero(np.isfinite(self._first_s[number]))
+                self._told(number, int(part))
+                for number in chosen
+                for part in np.flatnonzero(np.isfinite(self._first_s[number]))
             ]
             if told:
-                message = f"echo power from {what}, taken as if it were not there: {', '.join(told)}"
+                message = (
+                    f"echo power from {what}, taken as if it were not there: {', '.join(told)}"
+                )
                 limits.append((name, float(self._power[chosen].sum()), message))
         return limits
 

@@ -53,9 +53,17 @@ def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
         Where the radar has no y-line.
     """
     if spectra.y is None:
-        raise InputError(f"range_azimuth: radar '{radar.name}' has no line of at least 2 channels along y; give it one")
-    w = np.zeros(len(spectra.range_m)) if spectra.z is None else spectra.sines[spectra.z.argmax(axis=1)]
-    return _laid_out(spectra, spectra.y, np.sqrt(1 - w**2)[:, None] * np.sin(angle_grid(radar)), radar)
+        raise InputError(
+            f"range_azimuth: radar '{radar.name}' has no line of at least 2 channels along y; give it one"
+        )
+    w = (
+        np.zeros(len(spectra.range_m))
+        if spectra.z is None
+        else spectra.sines[spectra.z.argmax(axis=1)]
+    )
+    return _laid_out(
+        spectra, spectra.y, np.sqrt(1 - w**2)[:, None] * np.sin(angle_grid(radar)), radar
+    )
 
 
 def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
@@ -78,21 +86,32 @@ def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
         Where the radar has no z-line.
     """
     if spectra.z is None:
-        raise InputError(f"range_elevation: radar '{radar.name}' has no line of at least 2 channels along z; give it one")
+        raise InputError(
+            f"range_elevation: radar '{radar.name}' has no line of at least 2 channels along z; give it one"
+        )
     sines = np.broadcast_to(np.sin(angle_grid(radar)), spectra.z.shape)
     return _laid_out(spectra, spectra.z, sines, radar)
 
 
-def _laid_out(spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[np.float64], radar: Radar) -> NDArray[np.float64]:
+def _laid_out(
+    spectra: AngleSpectra, power: NDArray[np.float32], sines: NDArray[np.float64], radar: Radar
+) -> NDArray[np.float64]:
     """Power of each cell (cell, sine) read at its own sines (cell, angle), summed by range bin."""
     total = np.zeros((radar.samples_per_chirp, sines.shape[1]))
     bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
-    _add_up(power, np.ascontiguousarray(sines), spectra.sines[0], spectra.sines[1] - spectra.sines[0], bins, total)
+    _add_up(
+        power,
+        np.ascontiguousarray(sines),
+        spectra.sines[0],
+        spectra.sines[1] - spectra.sines[0],
+        bins,
+        total,
+    )
     return total
 
 
 @compiled()
-def _add_up(power, sines, first, step, bins, total):  # type: ignore[no-untyped-def]
+def _add_up(power, sines, first, step, bins, total):
     """Add power (cell, sine), read at sines (cell, angle) between points of the uniform grid, to total (bin, angle)."""
     last = power.shape[1] - 2
     for cell in range(len(power)):
@@ -100,4 +119,6 @@ def _add_up(power, sines, first, step, bins, total):  # type: ignore[no-untyped-
             place = (sines[cell, angle] - first) / step
             left = min(max(math.floor(place), 0), last)
             share = place - left
-            total[bins[cell], angle] += (1 - share) * power[cell, left] + share * power[cell, left + 1]
+            total[bins[cell], angle] += (1 - share) * power[cell, left] + share * power[
+                cell, left + 1
+            ]

@@ -26,10 +26,18 @@ def refine(
     last = len(sines) - 1
     tiny = np.finfo(np.float32).tiny
     left, middle, right = (
-        np.log(np.maximum(np.take_along_axis(power, np.clip(index + step, 0, last), axis=1), tiny).astype(np.float64))
+        np.log(
+            np.maximum(
+                np.take_along_axis(power, np.clip(index + step, 0, last), axis=1), tiny
+            ).astype(np.float64)
+        )
         for step in (-1, 0, 1)
     )
     bend = left - 2 * middle + right
     inside = (bend < 0) & (index > 0) & (index < last)
-    shift = np.where(inside, np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5), 0.0)
-    return sines[index] + shift * (sines[1] - sines[0]), np.exp(middle - 0.25 * (left - right) * shift)
+    shift = np.where(
+        inside, np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5), 0.0
+    )
+    return sines[index] + shift * (sines[1] - sines[0]), np.exp(
+        middle - 0.25 * (left - right) * shift
+    )

@@ -54,13 +54,19 @@ def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
     """
     index = np.empty((len(power), MOST_PEAKS), dtype=np.int64)
     count = np.empty(len(power), dtype=np.int64)
-    _highest(power, np.float32(10 ** (-BELOW_HIGHEST_DB / 10)), np.float32(10 ** (ABOVE_MEDIAN_DB / 10)), index, count)
+    _highest(
+        power,
+        np.float32(10 ** (-BELOW_HIGHEST_DB / 10)),
+        np.float32(10 ** (ABOVE_MEDIAN_DB / 10)),
+        index,
+        count,
+    )
     real = np.arange(MOST_PEAKS) < count[:, None]
     return Peaks(*refine(sines, power, index), real)
 
 
 @compiled()
-def _highest(power, below, above, index, count):  # type: ignore[no-untyped-def]
+def _highest(power, below, above, index, count):
     """Fill index (cell, peak) with the maxima, the strongest first and again where there are no more, and count (cell,)."""
     sines, peaks = power.shape[1], index.shape[1]
     for cell in range(len(power)):
@@ -73,7 +79,10 @@ def _highest(power, below, above, index, count):  # type: ignore[no-untyped-def]
         best[:] = top
         for sine in range(sines):
             value = own[sine]
-            rises, falls = sine == 0 or value > own[sine - 1], sine == sines - 1 or value >= own[sine + 1]
+            rises, falls = (
+                sine == 0 or value > own[sine - 1],
+                sine == sines - 1 or value >= own[sine + 1],
+            )
             if not (value > 0 and value >= highest * below and rises and falls):
                 continue
             # That far above the median: as far above half of the spectrum. Only what is not the highest is asked about.

@@ -26,7 +26,14 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
 from rtradar.process.angles.parabola import refine
-from rtradar.process.angles.steering import Taper, range_walk, sine_grid, steering, steering_everywhere, virtual_lines
+from rtradar.process.angles.steering import (
+    Taper,
+    range_walk,
+    sine_grid,
+    steering,
+    steering_everywhere,
+    virtual_lines,
+)
 from rtradar.process.cells import cell_spectra
 from rtradar.process.spectra import range_spectrum
 from rtradar.radar import Radar
@@ -101,16 +108,25 @@ def angle_spectra(
     lines = virtual_lines(radar)
     ranges, rates = np.asarray(range_m, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
     expected = (2 * range_walk(radar) + 1, radar.n_channels)
-    if cells.ndim != 3 or cells.shape[1:] != expected or ranges.shape != cells.shape[:1] or rates.shape != cells.shape[:1]:
+    if (
+        cells.ndim != 3
+        or cells.shape[1:] != expected
+        or ranges.shape != cells.shape[:1]
+        or rates.shape != cells.shape[:1]
+    ):
         raise InputError(
             f"angle: values, range_m and velocity have shapes {cells.shape}, {ranges.shape} and {rates.shape}; radar "
             f"'{radar.name}' needs (cell, {expected[0]}, {expected[1]}), (cell,) and (cell,)"
         )
     if not (np.isfinite(cells).all() and np.isfinite(ranges).all() and np.isfinite(rates).all()):
-        raise InputError("angle: values, range_m or velocity hold NaN or infinity; all must be finite")
+        raise InputError(
+            "angle: values, range_m or velocity hold NaN or infinity; all must be finite"
+        )
     bins = np.rint(ranges / radar.range_bin_m).astype(np.int64)
     if len(bins) and not 0 <= bins.min() <= bins.max() < radar.samples_per_chirp:
-        raise InputError(f"angle: range_m must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin")
+        raise InputError(
+            f"angle: range_m must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin"
+        )
     # What a moving echo gains between the Tx of one cycle, and any echo on the way there and back by its Tx's own carrier.
     turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
     turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
@@ -129,15 +145,28 @@ def angle_spectra(
         else:
             used, place = np.unique(bins, return_inverse=True)
             known = steering(radar, axis, used, taper)
-        given = samples, still, place, line.channels, known.weights, known.runs, known.starts, result
+        given = (
+            samples,
+            still,
+            place,
+            line.channels,
+            known.weights,
+            known.runs,
+            known.starts,
+            result,
+        )
         begins = range(0, len(samples), _CELLS_A_THREAD)
-        in_threads(lambda begin: _power(begin, min(begin + _CELLS_A_THREAD, len(samples)), *given), begins)
+        in_threads(
+            lambda begin: _power(begin, min(begin + _CELLS_A_THREAD, len(samples)), *given), begins
+        )
         return result
 
     return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)
 
 
-def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bool = True) -> tuple[float, float]:
+def angle(
+    x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bool = True
+) -> tuple[float, float]:
     """Direction of the strongest echo in one range-Doppler cell.
 
     Parameters
@@ -173,10 +202,14 @@ def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bo
         raise InputError("angle: x holds NaN or infinity; every IF sample must be finite")
     n_cycles = len(spectra) // radar.n_tx
     if n_cycles < 1:
-        raise InputError(f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, one for each Tx")
+        raise InputError(
+            f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, one for each Tx"
+        )
     row = _nearest(range_m / radar.range_bin_m, 0, radar.samples_per_chirp - 1)
     if row is None:
-        raise InputError(f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin")
+        raise InputError(
+            f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin"
+        )
     step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
     column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
     if column is None:
@@ -185,9 +218,13 @@ def angle(x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bo
         )
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
     values = cell_spectra(cube, radar, [row], [(column + n_cycles // 2) % n_cycles])
-    found = angle_spectra(values, radar, [row * radar.range_bin_m], [column * step], focus=focus, taper="uniform")
+    found = angle_spectra(
+        values, radar, [row * radar.range_bin_m], [column * step], focus=focus, taper="uniform"
+    )
     u, w = (_peak(found.sines, power) for power in (found.y, found.z))
-    azimuth = math.nan if found.y is None else math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
+    azimuth = (
+        math.nan if found.y is None else math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
+    )
     return azimuth, math.nan if found.z is None else math.asin(w)
 
 
@@ -232,7 +269,7 @@ _CELLS_A_THREAD = 64
 
 # By hand: for products of this size the threads of BLAS wait for each other longer than they work.
 @compiled(fastmath=True)
-def _power(begin, end, values, still, place, channels, weights, runs, starts, power):  # type: ignore[no-untyped-def]
+def _power(begin, end, values, still, place, channels, weights, runs, starts, power):
     """Fill power (cell, sine) of the cells from begin to end.
 
     From values (cell, offset, channel) turned by still (cell, channel), weights by place.
@@ -251,6 +288,8 @@ def _power(begin, end, values, still, place, channels, weights, runs, starts, po
             run_real, run_imaginary = real[first:last], imaginary[first:last]
             for i in range(last - first):
                 run_real[i] += value.real * run_weights[i].real - value.imag * run_weights[i].imag
-                run_imaginary[i] += value.real * run_weights[i].imag + value.imag * run_weights[i].real
+                run_imaginary[i] += (
+                    value.real * run_weights[i].imag + value.imag * run_weights[i].real
+                )
         for sine in range(n_sines):
             power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2

@@ -66,7 +66,10 @@ class Line:
         u = np.asarray(sines, dtype=np.float64)[..., None]
         if range_m is None:
             return np.asarray(-(self.tx_m + self.rx_m) * u)
-        there, back = (np.sqrt(range_m**2 - 2 * range_m * place * u + place**2) for place in (self.tx_m, self.rx_m))
+        there, back = (
+            np.sqrt(range_m**2 - 2 * range_m * place * u + place**2)
+            for place in (self.tx_m, self.rx_m)
+        )
         return np.asarray(there + back - 2 * range_m)
 
 
@@ -121,7 +124,10 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
 
 
 def _line(radar: Radar, axis: int) -> Line | None:
-    on_line = [np.arange(n) < along_y for n, along_y in ((radar.n_tx, radar.tx_y), (len(radar.rx), radar.rx_y))]
+    on_line = [
+        np.arange(n) < along_y
+        for n, along_y in ((radar.n_tx, radar.tx_y), (len(radar.rx), radar.rx_y))
+    ]
     tx_there, rx_there = on_line if axis == 1 else [~there for there in on_line]
     tx, slot = np.nonzero(tx_there[:, None] & rx_there[radar.rx_of_tx])
     if len(tx) < 2:
@@ -141,7 +147,11 @@ def sine_grid(radar: Radar) -> NDArray[np.float64]:
         Where the radar has no line at all, or one so long that there would be no end of sines.
     """
     largest = np.sin(np.radians(radar.max_angle_deg))
-    apertures = [np.ptp(line.tx_m + line.rx_m) / radar.wavelength_m for line in virtual_lines(radar) if line is not None]
+    apertures = [
+        np.ptp(line.tx_m + line.rx_m) / radar.wavelength_m
+        for line in virtual_lines(radar)
+        if line is not None
+    ]
     half = int(np.ceil(_OVERSAMPLING * largest * max(apertures))) + 1
     elements = max(len(line.channels) for line in virtual_lines(radar) if line is not None)
     if (2 * half + 1) * elements * radar.samples_per_chirp > _MOST_WEIGHTS:
@@ -179,7 +189,9 @@ def _taper(radar: Radar, axis: int, taper: Taper) -> NDArray[np.float64]:
 def range_walk(radar: Radar) -> int:
     """Range bins on either side of a cell in which the elements see an echo of that cell from the side."""
     largest = float(sine_grid(radar)[-1])
-    ways = [np.abs(line.tx_m + line.rx_m).max() for line in virtual_lines(radar) if line is not None]
+    ways = [
+        np.abs(line.tx_m + line.rx_m).max() for line in virtual_lines(radar) if line is not None
+    ]
     return int(np.ceil(max(ways) * largest / 2 / radar.range_bin_m))
 
 
@@ -203,7 +215,9 @@ class Steering:
     starts: NDArray[np.int64]
 
 
-def steering(radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, taper: Taper) -> Steering:
+def steering(
+    radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, taper: Taper
+) -> Steering:
     """Phases and range bins of a line for points at some ranges.
 
     Parameters
@@ -219,15 +233,22 @@ def steering(radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, tape
     """
     line = virtual_lines(radar)[axis - 1]
     if line is None:
-        raise InputError(f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one")
+        raise InputError(
+            f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one"
+        )
     reach, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
-    weights = np.empty((1 if range_bins is None else len(range_bins), len(line.channels), len(sines)), dtype=np.complex64)
+    weights = np.empty(
+        (1 if range_bins is None else len(range_bins), len(line.channels), len(sines)),
+        dtype=np.complex64,
+    )
     carrier = radar.centre_frequency_hz + radar.tx_offset_hz[line.channels // radar.n_rx]
     runs = []
     for place in range(len(weights)):
         range_m = None if range_bins is None else radar.range_bin_m * int(range_bins[place])
         excess = line.excess_m(sines, range_m)
-        steps = np.zeros(excess.shape) if range_m is None else np.rint(excess / (2 * radar.range_bin_m))
+        steps = (
+            np.zeros(excess.shape) if range_m is None else np.rint(excess / (2 * radar.range_bin_m))
+        )
         offsets = np.clip(steps, -reach, reach).astype(np.int64)
         # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
         turns = excess * (carrier / SPEED_OF_LIGHT_MPS) - offsets / 2
@@ -250,4 +271,6 @@ def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
     fresh[:, 1:] = np.diff(offsets, axis=1) != 0
     element, first = np.nonzero(fresh)
     last = np.append(first[1:], 0)
-    return np.stack([element, offsets[element, first], first, np.where(last == 0, n_sines, last)], axis=1)
+    return np.stack(
+        [element, offsets[element, first], first, np.where(last == 0, n_sines, last)], axis=1
+    )

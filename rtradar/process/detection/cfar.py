@@ -14,7 +14,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
-from rtradar.process.detection.cfar_thresholds import ca_scale, check_looks, check_pfa, check_quantile, order_rank, os_scale
+from rtradar.process.detection.cfar_thresholds import (
+    ca_scale,
+    check_looks,
+    check_pfa,
+    check_quantile,
+    order_rank,
+    os_scale,
+)
 from rtradar.system.threads import in_threads
 
 _ROWS_A_THREAD = 64
@@ -63,11 +70,18 @@ def os_cfar(
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     check_quantile(quantile)
     scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
-    return _by_rows(_os_kernel, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train)
+    return _by_rows(
+        _os_kernel, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train
+    )
 
 
 def ca_cfar(
-    power: ArrayLike, guard: int = 2, train: int = 4, pfa: float = 1e-6, looks: int = 1, scale: float | None = None
+    power: ArrayLike,
+    guard: int = 2,
+    train: int = 4,
+    pfa: float = 1e-6,
+    looks: int = 1,
+    scale: float | None = None,
 ) -> NDArray[np.bool_]:
     """Cell-averaging CFAR: a cell is detected where it exceeds the multiplier times the mean of its training cells.
 
@@ -88,7 +102,9 @@ def ca_cfar(
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     scales = _ca_law(cells.shape, guard, train, pfa, looks, scale)
-    return _by_rows(_ca_kernel, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train)
+    return _by_rows(
+        _ca_kernel, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train
+    )
 
 
 # What depends on the shape of the map alone is the same for all maps of a capture, and takes as long as the map itself.
@@ -97,19 +113,30 @@ _remembered = lru_cache(maxsize=4)
 
 @_remembered
 def _os_law(
-    shape: tuple[int, int], guard: int, train: int, quantile: float, pfa: float, looks: int, scale: float | None
+    shape: tuple[int, int],
+    guard: int,
+    train: int,
+    quantile: float,
+    pfa: float,
+    looks: int,
+    scale: float | None,
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Multiplier and rank of each cell (range, velocity)."""
     counts = _training_counts(*shape, guard, guard + train)
-    scales = _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale)
+    scales = _by_count(
+        counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale
+    )
     return scales, _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
 
 
 @_remembered
-def _ca_law(shape: tuple[int, int], guard: int, train: int, pfa: float, looks: int, scale: float | None) -> NDArray[np.float64]:
+def _ca_law(
+    shape: tuple[int, int], guard: int, train: int, pfa: float, looks: int, scale: float | None
+) -> NDArray[np.float64]:
     """Multiplier of each cell (range, velocity)."""
     return _by_count(
-        _training_counts(*shape, guard, guard + train), lambda n: ca_scale(n, pfa, looks) if scale is None else scale
+        _training_counts(*shape, guard, guard + train),
+        lambda n: ca_scale(n, pfa, looks) if scale is None else scale,
     )
 
 
@@ -119,17 +146,25 @@ def _checked(
     """The map as C-contiguous float32 or float64, and the number of training cells of each cell."""
     cells = np.asarray(power)
     if cells.ndim != 2 or cells.dtype.kind not in "fiu":
-        raise InputError(f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real (range, velocity) map")
+        raise InputError(
+            f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real (range, velocity) map"
+        )
     for name, value, least in (("guard", guard, 0), ("train", train, 1)):
         if isinstance(value, bool) or value != int(value) or value < least:
-            raise InputError(f"CFAR: {name} = {value!r}; it must be a whole number of cells, at least {least}")
+            raise InputError(
+                f"CFAR: {name} = {value!r}; it must be a whole number of cells, at least {least}"
+            )
     check_pfa(pfa)
     check_looks(looks)
     if scale is not None and not 0 < scale < np.inf:
         raise InputError(f"CFAR: scale = {scale!r}; a multiplier must be positive and finite")
-    cells = np.ascontiguousarray(cells, dtype=np.float32 if cells.dtype == np.float32 else np.float64)
+    cells = np.ascontiguousarray(
+        cells, dtype=np.float32 if cells.dtype == np.float32 else np.float64
+    )
     if not (cells >= 0).all() or not np.isfinite(cells).all():
-        raise InputError("CFAR: power holds NaN, infinity or a negative value; give linear power, not decibels")
+        raise InputError(
+            "CFAR: power holds NaN, infinity or a negative value; give linear power, not decibels"
+        )
     counts = _training_counts(cells.shape[0], cells.shape[1], guard, guard + train)
     if counts.size and counts.min() == 0:
         raise InputError(
@@ -157,7 +192,9 @@ def _by_count(counts: NDArray[np.int32], of_count: Callable[[int], float]) -> ND
     return table[counts]
 
 
-def _by_rows(kernel: Callable[..., None], cells: NDArray[np.floating], *given: object) -> NDArray[np.bool_]:
+def _by_rows(
+    kernel: Callable[..., None], cells: NDArray[np.floating], *given: object
+) -> NDArray[np.bool_]:
     """Mask of a map, some rows to a thread."""
     mask = np.empty(cells.shape, dtype=np.bool_)
     in_threads(
@@ -168,7 +205,7 @@ def _by_rows(kernel: Callable[..., None], cells: NDArray[np.floating], *given: o
 
 
 @compiled()
-def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):  # type: ignore[no-untyped-def]
+def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):
     """Mask of the rows from begin to end: at least ``rank`` training cells lie below the threshold, the cell over its multiplier.
 
     Counting needs no sorting, and stops after the first rows that settle the question: for most cells, which hold noise, as
@@ -193,7 +230,10 @@ def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask)
                     below_first[j] += neighbours[j] < limits[j]
             seen_first += 2 * reach + 1
         for j in range(n_velocity):
-            if reach <= j < reach + inside and seen_first - below_first[j - reach] > counts[i, j] - ranks[i, j]:
+            if (
+                reach <= j < reach + inside
+                and seen_first - below_first[j - reach] > counts[i, j] - ranks[i, j]
+            ):
                 mask[i, j] = False
                 continue
             left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
@@ -221,7 +261,7 @@ def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask)
 
 
 @compiled()
-def _ca_kernel(begin, end, cells, sums_wanted, guard, reach, mask):  # type: ignore[no-untyped-def]
+def _ca_kernel(begin, end, cells, sums_wanted, guard, reach, mask):
     """Mask of the rows from begin to end: the training cells sum to less than the cell times their number over the multiplier.
 
     Summed afresh for each cell: running sums would drown the weak cells beside a strong one in its rounding.

@@ -168,10 +168,16 @@ def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
 
     def log_integrand(t: NDArray[np.float64]) -> NDArray[np.float64]:
         z = np.exp(t)
-        below, above, alarm = _log_lower(looks, z), _log_upper(looks, z), _log_upper(looks, alpha * z)
+        below, above, alarm = (
+            _log_lower(looks, z),
+            _log_upper(looks, z),
+            _log_upper(looks, alpha * z),
+        )
         return constant + looks * t - z + (rank - 1) * below + (n_train - rank) * above + alarm
 
-    constant = float(gammaln(n_train + 1) - gammaln(rank) - gammaln(n_train - rank + 1) - gammaln(looks))
+    constant = float(
+        gammaln(n_train + 1) - gammaln(rank) - gammaln(n_train - rank + 1) - gammaln(looks)
+    )
     t = np.linspace(*_support(log_integrand, looks), _NODES)
     values = log_integrand(t)
     peak = values.max()
@@ -194,7 +200,9 @@ def _log_upper(looks: int, z: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.where(small, leading, np.log(np.where(small, 1.0, value)))
 
 
-def _support(log_integrand: Callable[[NDArray[np.float64]], NDArray[np.float64]], looks: int) -> tuple[float, float]:
+def _support(
+    log_integrand: Callable[[NDArray[np.float64]], NDArray[np.float64]], looks: int
+) -> tuple[float, float]:
     """Where the integrand lies less than `_DEPTH` under its peak, found by narrowing a grid."""
     low, high = math.log(looks) - 60.0, math.log(looks) + 8.0
     for _ in range(4):

@@ -67,16 +67,26 @@ class ClutterMap:
     """
 
     def __init__(
-        self, radar: Radar, *, time_constant_s: float = 1.0, pfa: float = 1e-6, looks: int = 1, scale: float | None = None
+        self,
+        radar: Radar,
+        *,
+        time_constant_s: float = 1.0,
+        pfa: float = 1e-6,
+        looks: int = 1,
+        scale: float | None = None,
     ) -> None:
         check_pfa(pfa)
         check_looks(looks)
         if scale is not None and not 0 < scale < math.inf:
-            raise InputError(f"clutter map: scale = {scale!r}; a multiplier must be positive and finite")
+            raise InputError(
+                f"clutter map: scale = {scale!r}; a multiplier must be positive and finite"
+            )
         self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
         hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
         self._share = -math.expm1(-1 / hops)
-        self._memory = math.ceil(min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS))  # windows that the law looks at
+        self._memory = math.ceil(
+            min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS)
+        )  # windows that the law looks at
         self._apart = _windows_apart(radar)
         self._waiting: deque[NDArray[np.floating]] = deque()
         self._map = np.empty((0, 0))
@@ -107,15 +117,31 @@ class ClutterMap:
             raise InputError(
                 f"clutter map: power has shape {cells.shape}, type {cells.dtype}; it must be a real (range, velocity) map"
             )
-        known = self._map.shape if self._count else self._waiting[0].shape if self._waiting else cells.shape
+        known = (
+            self._map.shape
+            if self._count
+            else self._waiting[0].shape
+            if self._waiting
+            else cells.shape
+        )
         if cells.shape != known:
-            raise InputError(f"clutter map: power has shape {cells.shape}, the windows before it {known}; all must be alike")
+            raise InputError(
+                f"clutter map: power has shape {cells.shape}, the windows before it {known}; all must be alike"
+            )
         if not (cells >= 0).all() or not np.isfinite(cells).all():
-            raise InputError("clutter map: power holds NaN, infinity or a negative value; give linear power, not decibels")
-        found = cells > self._multiplier() * self._map if self._count else np.zeros(cells.shape, dtype=np.bool_)
+            raise InputError(
+                "clutter map: power holds NaN, infinity or a negative value; give linear power, not decibels"
+            )
+        found = (
+            cells > self._multiplier() * self._map
+            if self._count
+            else np.zeros(cells.shape, dtype=np.bool_)
+        )
         self._waiting.append(cells.copy())
         if len(self._waiting) == self._apart:
-            self._learn(self._waiting.popleft())  # it shares no chirp with the window that comes next
+            self._learn(
+                self._waiting.popleft()
+            )  # it shares no chirp with the window that comes next
         return found
 
     def _learn(self, cells: NDArray[np.floating]) -> None:
@@ -166,8 +192,15 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     check_pfa(pfa)
     check_looks(looks)
     spread = np.asarray(weights)
-    if spread.ndim != 1 or spread.dtype.kind not in "fiu" or not np.isfinite(spread).all() or not (spread >= 0).all():
-        raise InputError(f"clutter map: weights have shape {spread.shape}; they must be finite numbers (window,), at least 0")
+    if (
+        spread.ndim != 1
+        or spread.dtype.kind not in "fiu"
+        or not np.isfinite(spread).all()
+        or not (spread >= 0).all()
+    ):
+        raise InputError(
+            f"clutter map: weights have shape {spread.shape}; they must be finite numbers (window,), at least 0"
+        )
     total = float(spread.sum())
     if total <= 0:
         raise InputError("clutter map: weights sum to 0; the level needs at least one cell")
@@ -183,7 +216,9 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
 def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:
     """Logarithm of the false-alarm rate, as told at the head of this module."""
     r = alpha * spread / (1 + alpha * spread)
-    log_unit = -looks * float(np.log1p(alpha * spread).sum())  # c_0; the c_k are in units of it, or they would underflow
+    log_unit = -looks * float(
+        np.log1p(alpha * spread).sum()
+    )  # c_0; the c_k are in units of it, or they would underflow
     c, p, powers = np.zeros(looks), np.zeros(looks), np.ones_like(r)
     c[0] = 1.0
     for k in range(1, looks):
@@ -200,14 +235,18 @@ def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:
 def _scale_after(count: int, share: float, radar: Radar, pfa: float, looks: int) -> float:
     """Multiplier of a map that holds this many windows; the captures of one radar share these."""
     steps = np.maximum(share, 1 / np.arange(1.0, count + 1))
-    later = np.append(np.cumprod((1 - steps)[:0:-1])[::-1], 1.0)  # what the steps after it leave of each
+    later = np.append(
+        np.cumprod((1 - steps)[:0:-1])[::-1], 1.0
+    )  # what the steps after it leave of each
     root = np.sqrt(steps * later)
     band = np.zeros((min(_windows_apart(radar), count), count))
     band[0] = root**2
     if len(band) > 1:
         n = radar.cycles_per_frame
         starts = radar.window_starts((math.ceil(count * radar.hop_cycles) + n) * radar.n_tx)[:count]
-        shared = np.append(np.correlate(hann(n), hann(n), "full")[n - 1 :], 0.0) / (hann(n) ** 2).sum()
+        shared = (
+            np.append(np.correlate(hann(n), hann(n), "full")[n - 1 :], 0.0) / (hann(n) ** 2).sum()
+        )
         for lag in range(1, len(band)):
             apart = np.minimum(starts[lag:] - starts[:-lag], n)
             band[lag, :-lag] = shared[apart] * root[lag:] * root[:-lag]

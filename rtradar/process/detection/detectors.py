@@ -15,7 +15,10 @@ Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
 DETECTORS = Registry(
     "rtradar.detectors",
     "detector",
-    {"os-cfar": "rtradar.process.detection.cfar:os_cfar", "ca-cfar": "rtradar.process.detection.cfar:ca_cfar"},
+    {
+        "os-cfar": "rtradar.process.detection.cfar:os_cfar",
+        "ca-cfar": "rtradar.process.detection.cfar:ca_cfar",
+    },
 )
 """Functions of power (range, velocity), ``pfa`` and ``looks``, the number of channels summed in the power."""
 
@@ -52,7 +55,9 @@ def build_detector(name: str, *, pfa: float, looks: int) -> Detector:
         with DETECTORS.guarded(name):
             mask = np.asarray(find(power, pfa=pfa, looks=looks))
         if mask.dtype != np.bool_ or mask.shape != power.shape:
-            raise DETECTORS.refuse(name, f"gave {mask.dtype} of shape {mask.shape}, not bool of shape {power.shape}")
+            raise DETECTORS.refuse(
+                name, f"gave {mask.dtype} of shape {mask.shape}, not bool of shape {power.shape}"
+            )
         return mask
 
     return detect

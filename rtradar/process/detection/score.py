@@ -36,7 +36,9 @@ class DetectionScore:
     missed: int = 0
 
     def __add__(self, other: DetectionScore) -> DetectionScore:
-        return DetectionScore(self.hits + other.hits, self.false + other.false, self.missed + other.missed)
+        return DetectionScore(
+            self.hits + other.hits, self.false + other.false, self.missed + other.missed
+        )
 
     @property
     def precision(self) -> float:
@@ -93,9 +95,13 @@ def target_cells(power: ArrayLike, noise_power: float, margin_db: float) -> NDAr
         Where the noise power is not positive, or it or the margin not finite.
     """
     if not 0 < noise_power < math.inf:
-        raise InputError(f"target_cells: noise_power = {noise_power!r}; it must be positive and finite")
+        raise InputError(
+            f"target_cells: noise_power = {noise_power!r}; it must be positive and finite"
+        )
     if not math.isfinite(margin_db):
-        raise InputError(f"target_cells: margin_db = {margin_db!r}; it must be a finite number of decibels")
+        raise InputError(
+            f"target_cells: margin_db = {margin_db!r}; it must be a finite number of decibels"
+        )
     return np.asarray(np.asarray(power) > noise_power * 10 ** (margin_db / 10))
 
 

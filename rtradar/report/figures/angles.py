@@ -39,10 +39,22 @@ def draw_range_angle(
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
     unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
     for axes, (name, (power, angles)) in zip(panels, maps.items(), strict=True):
-        values = unit.level(power / HANN_BINS)  # what one echo gives is spread over as many velocities
+        values = unit.level(
+            power / HANN_BINS
+        )  # what one echo gives is spread over as many velocities
         extent = (*bin_edges(np.degrees(angles)), *bin_edges(radar.range_m))
-        low, high = colour_limits(values, 40)  # cells that were not detected are zero, and zero has no decibels
-        image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+        low, high = colour_limits(
+            values, 40
+        )  # cells that were not detected are zero, and zero has no decibels
+        image = axes.imshow(
+            values,
+            origin="lower",
+            aspect="auto",
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            extent=extent,
+        )
         axes.set(xlabel=angle_label(name, radar), title=f"Range-{name}")
         figure.colorbar(image, ax=axes, label=unit.label("detected cells"))
     panels[0].set_ylabel("Range [m]")
@@ -53,10 +65,16 @@ def draw_range_angle(
 def angle_label(name: str, radar: Radar) -> str:
     """Label of an axis of ``azimuth`` or ``elevation``: without a line along z, azimuth is the angle of a cone."""
     cone = name == "azimuth" and measured_angles(radar) == ("azimuth",)
-    return "Azimuth [°] (cone angle; elevation is not measured)" if cone else f"{name.capitalize()} [°]"
+    return (
+        "Azimuth [°] (cone angle; elevation is not measured)"
+        if cone
+        else f"{name.capitalize()} [°]"
+    )
 
 
-def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str) -> None:
+def draw_spatial_cloud(
+    path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str
+) -> None:
     """Points in the room from the side and from above, coloured by velocity; of an array on one line the view that it measures.
 
     Parameters
@@ -77,10 +95,21 @@ def draw_spatial_cloud(path: Path, points: NDArray[np.float64], velocity: NDArra
     largest = float(np.abs(velocity).max(initial=1e-9))
     x_label = "x [m]" if len(views) == 2 else "x [m], by the distance from the line of the array"
     for axes, up in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
-        dots = axes.scatter(points[:, 0], points[:, up], c=velocity, s=2, alpha=0.6, cmap="coolwarm", vmin=-largest, vmax=largest)
+        dots = axes.scatter(
+            points[:, 0],
+            points[:, up],
+            c=velocity,
+            s=2,
+            alpha=0.6,
+            cmap="coolwarm",
+            vmin=-largest,
+            vmax=largest,
+        )
         axes.plot(radar.position_m[0], radar.position_m[up], "k^", label="radar")
         view = "From the side" if up == 2 else "From above"
-        missing = "" if len(views) == 2 else f"; {'azimuth' if up == 2 else 'elevation'} is not measured"
+        missing = (
+            "" if len(views) == 2 else f"; {'azimuth' if up == 2 else 'elevation'} is not measured"
+        )
         axes.set(xlabel=x_label, ylabel=f"{'xyz'[up]} [m]", title=view + missing)
         axes.set_aspect("equal", adjustable="datalim")
         axes.grid(alpha=0.3)

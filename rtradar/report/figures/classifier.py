@@ -31,29 +31,58 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]], tit
     for place, shares in enumerate(percent, start=1):
         offsets = np.linspace(-0.12, 0.12, len(shares)) if len(shares) > 1 else np.zeros(1)
         axes.plot(place + offsets, shares, ".", color="C0", alpha=0.6)
-    axes.set_xticks(range(1, len(rows) + 1), [name.replace(", ", "\n", 1) for name, _ in rows], fontsize=7)
-    axes.set(ylabel="Test accuracy [%]", xlabel="Classifier", title=title, ylim=(min(0.0, *(min(one) for one in percent)), 102))
+    axes.set_xticks(
+        range(1, len(rows) + 1), [name.replace(", ", "\n", 1) for name, _ in rows], fontsize=7
+    )
+    axes.set(
+        ylabel="Test accuracy [%]",
+        xlabel="Classifier",
+        title=title,
+        ylim=(min(0.0, *(min(one) for one in percent)), 102),
+    )
     axes.grid(axis="y", alpha=0.3)
     save_figure(figure, path)
 
 
-def draw_confusion(path: Path, counts: NDArray[np.int64], classes: Sequence[str], title: str) -> None:
+def draw_confusion(
+    path: Path, counts: NDArray[np.int64], classes: Sequence[str], title: str
+) -> None:
     """Confusion matrix: numbers of clouds, colours by the share of what they show; ``counts (truth, answer)``."""
     shares = 100 * counts / np.maximum(1, counts.sum(axis=1, keepdims=True))
-    cells = [[f"{count}\n{share:.0f} %" for count, share in zip(*row, strict=True)] for row in zip(counts, shares, strict=True)]
-    _draw_matrix(path, shares, cells, classes, ("Answered", "Shown", "Share of the clouds that show it [%]"), title)
+    cells = [
+        [f"{count}\n{share:.0f} %" for count, share in zip(*row, strict=True)]
+        for row in zip(counts, shares, strict=True)
+    ]
+    _draw_matrix(
+        path,
+        shares,
+        cells,
+        classes,
+        ("Answered", "Shown", "Share of the clouds that show it [%]"),
+        title,
+    )
 
 
-def draw_transfer(path: Path, values: Sequence[str], mean: NDArray[np.float64], spread: NDArray[np.float64], title: str) -> None:
+def draw_transfer(
+    path: Path,
+    values: Sequence[str],
+    mean: NDArray[np.float64],
+    spread: NDArray[np.float64],
+    title: str,
+) -> None:
     """Accuracy for all pairs of a column's values, ``(trained_on, tested_on)``, NaN where there is none."""
     cells = [
         [
-            "" if np.isnan(share) else f"{100 * share:.0f}" + ("" if np.isnan(error) else f"\n±{100 * error:.0f}")
+            ""
+            if np.isnan(share)
+            else f"{100 * share:.0f}" + ("" if np.isnan(error) else f"\n±{100 * error:.0f}")
             for share, error in zip(*row, strict=True)
         ]
         for row in zip(mean, spread, strict=True)
     ]
-    _draw_matrix(path, 100 * mean, cells, values, ("Asked about", "Trained on", "Test accuracy [%]"), title)
+    _draw_matrix(
+        path, 100 * mean, cells, values, ("Asked about", "Trained on", "Test accuracy [%]"), title
+    )
 
 
 def draw_learning(path: Path, histories: Sequence[History], title: str) -> None:
@@ -69,14 +98,23 @@ def draw_learning(path: Path, histories: Sequence[History], title: str) -> None:
     """
     figure = new_figure(9, 3.8)
     for axes, name, label, factor in zip(
-        figure.subplots(1, 2), ("loss", "accuracy"), ("Negative log-likelihood [nat]", "Accuracy [%]"), (1, 100), strict=True
+        figure.subplots(1, 2),
+        ("loss", "accuracy"),
+        ("Negative log-likelihood [nat]", "Accuracy [%]"),
+        (1, 100),
+        strict=True,
     ):
         for side, colour in (("train", "C0"), ("test", "C1")):
             curves = [[factor * row[f"{side}_{name}"] for row in history] for history in histories]
             epochs = np.arange(1, min(map(len, curves)) + 1)
             for curve in curves:
                 axes.plot(epochs, curve[: len(epochs)], color=colour, linewidth=0.5, alpha=0.35)
-            axes.plot(epochs, np.mean([curve[: len(epochs)] for curve in curves], axis=0), color=colour, label=side)
+            axes.plot(
+                epochs,
+                np.mean([curve[: len(epochs)] for curve in curves], axis=0),
+                color=colour,
+                label=side,
+            )
         axes.set(xlabel="Epoch", ylabel=label)
         axes.grid(alpha=0.3)
         axes.legend()
@@ -99,7 +137,15 @@ def _draw_matrix(
     for row, line in enumerate(cells):
         for column, text in enumerate(line):
             dark = percent[row, column] > 55
-            axes.text(column, row, text, ha="center", va="center", color="white" if dark else "black", fontsize=8)
+            axes.text(
+                column,
+                row,
+                text,
+                ha="center",
+                va="center",
+                color="white" if dark else "black",
+                fontsize=8,
+            )
     axes.set_xticks(range(len(names)), names, rotation=30, ha="right")
     axes.set_yticks(range(len(names)), names)
     axes.set(xlabel=labels[0], ylabel=labels[1], title=title)

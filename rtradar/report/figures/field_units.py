@@ -80,7 +80,13 @@ class FieldUnit:
         return f"{_QUANTITIES[self.name]}{', ' if of else ''}{of} [{self.name}]"
 
 
-def field_unit(radar: Radar, *, spreading: bool = True, range_m: ArrayLike | None = None, strongest_m2: float = 1.0) -> FieldUnit:
+def field_unit(
+    radar: Radar,
+    *,
+    spreading: bool = True,
+    range_m: ArrayLike | None = None,
+    strongest_m2: float = 1.0,
+) -> FieldUnit:
     """The unit in which pictures of a run show powers, as told at the head of this module.
 
     Parameters
@@ -105,4 +111,6 @@ def field_unit(radar: Radar, *, spreading: bool = True, range_m: ArrayLike | Non
     if range_m is None:
         return FieldUnit("dB re maximum", 1 / max(strongest_m2, float(np.finfo(np.float32).tiny)))
     # The first bin begins at the antennas.
-    return FieldUnit("dBsm", np.maximum(np.asarray(range_m, dtype=np.float64), radar.range_bin_m / 2) ** 4)
+    return FieldUnit(
+        "dBsm", np.maximum(np.asarray(range_m, dtype=np.float64), radar.range_bin_m / 2) ** 4
+    )

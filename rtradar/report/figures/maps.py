@@ -30,7 +30,9 @@ def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
     figure.clear()
 
 
-def colour_limits(level_db: NDArray[np.float64], below_peak_db: float = 60.0) -> tuple[float, float]:
+def colour_limits(
+    level_db: NDArray[np.float64], below_peak_db: float = 60.0
+) -> tuple[float, float]:
     """Least and greatest level that colours show: 3 dB below the median, or ``below_peak_db`` below the peak; and the peak."""
     top = float(level_db.max())
     return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
@@ -86,7 +88,13 @@ def draw_range_time(
 
 
 def draw_range_doppler(
-    path: Path, power: NDArray[np.floating], mask: NDArray[np.bool_], radar: Radar, title: str, *, spreading: bool = True
+    path: Path,
+    power: NDArray[np.floating],
+    mask: NDArray[np.bool_],
+    radar: Radar,
+    title: str,
+    *,
+    spreading: bool = True,
 ) -> None:
     """Range-Doppler map beside itself with its detections.
 
@@ -110,10 +118,16 @@ def draw_range_doppler(
     low, high = colour_limits(values)
     velocity, distance = radar.velocity_mps(power.shape[1]), radar.range_m
     extent = (*bin_edges(velocity), *bin_edges(distance))
-    image = left.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
-    right.imshow(values, origin="lower", aspect="auto", cmap="Greys", vmin=low, vmax=high, extent=extent)
+    image = left.imshow(
+        values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
+    )
+    right.imshow(
+        values, origin="lower", aspect="auto", cmap="Greys", vmin=low, vmax=high, extent=extent
+    )
     rows, columns = np.nonzero(mask)
-    right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections")
+    right.scatter(
+        velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections"
+    )
     right.legend(loc="upper right")
     for axes, name in ((left, "Range-Doppler map"), (right, "Detections, over the map in grey")):
         axes.set(xlabel=VELOCITY_LABEL, title=name)
@@ -138,8 +152,15 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
     axes = figure.add_subplot(projection="3d")
     time, distance, velocity = points.T
     largest = float(np.abs(velocity).max(initial=1e-9))
-    dots = axes.scatter(time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest)
-    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{title}\n{len(points)} points")
+    dots = axes.scatter(
+        time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest
+    )
+    axes.set(
+        xlabel="Time [s]",
+        ylabel="Range [m]",
+        zlabel=VELOCITY_LABEL,
+        title=f"{title}\n{len(points)} points",
+    )
     axes.set_box_aspect((1.6, 1, 1))
     figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
     save_figure(figure, path)

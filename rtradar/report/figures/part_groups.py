@@ -24,6 +24,12 @@ def group_of_parts(parts: Sequence[str]) -> list[int]:
     found = []
     for part in parts:
         side, _, limb = part.partition(" ")
-        group = f"{side} {_LIMBS.get(limb, 'leg')}" if side in ("left", "right") else "torso" if "torso" in part else "head, neck"
+        group = (
+            f"{side} {_LIMBS.get(limb, 'leg')}"
+            if side in ("left", "right")
+            else "torso"
+            if "torso" in part
+            else "head, neck"
+        )
         found.append(names.index(group))
     return found

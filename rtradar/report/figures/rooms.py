@@ -54,7 +54,14 @@ def draw_plan(
         # Outside the room, where no furniture has its name.
         across = np.abs(last - first) < np.abs(last - first).max()
         outward = 9 * across * np.sign(middle - corners.mean(axis=0))
-        text = axes.annotate(name, tuple(middle), xytext=tuple(outward), textcoords="offset points", fontsize=7, color="dimgrey")
+        text = axes.annotate(
+            name,
+            tuple(middle),
+            xytext=tuple(outward),
+            textcoords="offset points",
+            fontsize=7,
+            color="dimgrey",
+        )
         text.set(ha="center", va="center")
     for piece in scene.furniture:
         triangles = piece.triangles()
@@ -64,8 +71,16 @@ def draw_plan(
         seen = ax * by - ay * bx
         covering = corners[seen > 0 if triangles.closed else seen != 0]
         axes.add_collection(PolyCollection(list(covering), color="tan", alpha=0.5, linewidth=0))
-        axes.annotate(piece.name, tuple(corners.reshape(-1, 2).mean(axis=0)), fontsize=7, color="saddlebrown", ha="center")
-    axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])  # more than ten paths
+        axes.annotate(
+            piece.name,
+            tuple(corners.reshape(-1, 2).mean(axis=0)),
+            fontsize=7,
+            color="saddlebrown",
+            ha="center",
+        )
+    axes.set_prop_cycle(
+        color=[colormaps["tab20"](number) for number in range(20)]
+    )  # more than ten paths
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
     axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
@@ -118,9 +133,19 @@ def draw_before_after(
     for axes, (name, (power, mask)) in zip(panels, maps.items(), strict=True):
         velocity = radar.velocity_mps(power.shape[1])
         extent = (*bin_edges(velocity), *bin_edges(radar.range_m))
-        image = axes.imshow(levels[name], origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+        image = axes.imshow(
+            levels[name],
+            origin="lower",
+            aspect="auto",
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            extent=extent,
+        )
         rows, columns = np.nonzero(mask)
-        axes.scatter(velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected")
+        axes.scatter(
+            velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected"
+        )
         axes.set(xlabel=VELOCITY_LABEL, title=f"{name}\n{len(rows)} detections")
         axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
         _mark(axes, ghosts, radar)
@@ -137,11 +162,21 @@ def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) 
     Names stand beside them toward the middle of the axes, far enough apart to be read.
     """
     label = "ghost over a wall, predicted"
-    inside = sorted((ghost for ghost in ghosts if ghost[1] < radar.max_range_m), key=lambda ghost: ghost[1])
+    inside = sorted(
+        (ghost for ghost in ghosts if ghost[1] < radar.max_range_m), key=lambda ghost: ghost[1]
+    )
     (left, right), gap = axes.get_xlim(), 0.035 * radar.max_range_m
     placed: list[tuple[float, float]] = []
     for name, distance, across in inside:
-        axes.plot(across, distance, "o", markerfacecolor="none", markeredgecolor="red", markersize=9, label=label)
+        axes.plot(
+            across,
+            distance,
+            "o",
+            markerfacecolor="none",
+            markeredgecolor="red",
+            markersize=9,
+            label=label,
+        )
         label = ""
         toward = 1 if across < (left + right) / 2 else -1
         beside, place = across + 0.08 * toward * (right - left), distance
@@ -158,7 +193,13 @@ def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) 
             ha="left" if toward > 0 else "right",
             va="center",
             bbox={"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1},
-            arrowprops={"arrowstyle": "-", "color": "red", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4},
+            arrowprops={
+                "arrowstyle": "-",
+                "color": "red",
+                "linewidth": 0.6,
+                "shrinkA": 0,
+                "shrinkB": 4,
+            },
         )
 
 
@@ -192,18 +233,33 @@ def draw_range_azimuth_with_walls(
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     values = unit.level(power / HANN_BINS)
     extent = (*bin_edges(np.degrees(azimuth)), *bin_edges(radar.range_m))
-    low, high = colour_limits(values, 50)  # cells that were not detected are zero, and zero has no decibels
-    image = axes.imshow(values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+    low, high = colour_limits(
+        values, 50
+    )  # cells that were not detected are zero, and zero has no decibels
+    image = axes.imshow(
+        values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
+    )
     place = np.asarray(radar.position_m)
     for first, last, name in walls_in_plan(scene):
         along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place[:2]
-        angle, distance = np.degrees(np.arctan2(along[:, 1], along[:, 0])), np.hypot(along[:, 0], along[:, 1])
+        angle, distance = (
+            np.degrees(np.arctan2(along[:, 1], along[:, 0])),
+            np.hypot(along[:, 0], along[:, 1]),
+        )
         axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
-        inside = np.flatnonzero((angle > extent[0]) & (angle < extent[1]) & (distance < radar.max_range_m))
+        inside = np.flatnonzero(
+            (angle > extent[0]) & (angle < extent[1]) & (distance < radar.max_range_m)
+        )
         if len(inside):
             near = inside[len(inside) // 6]  # beside the middle, where names of ghosts stand
             axes.annotate(name, (angle[near], distance[near]), fontsize=8, color="white")
-    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title, xlim=extent[:2], ylim=extent[2:])
+    axes.set(
+        xlabel=angle_label("azimuth", radar),
+        ylabel="Range [m]",
+        title=title,
+        xlim=extent[:2],
+        ylim=extent[2:],
+    )
     _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
     if axes.get_legend_handles_labels()[0]:
         axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")

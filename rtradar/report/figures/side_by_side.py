@@ -123,7 +123,14 @@ def draw_maps(
     extent = (*bin_edges(across[1]), *bin_edges(up[1]))
     for axes, (name, level) in zip(columns, maps.items(), strict=True):
         image = axes.imshow(
-            level, origin="lower", aspect="auto", interpolation="nearest", cmap="viridis", vmin=low, vmax=high, extent=extent
+            level,
+            origin="lower",
+            aspect="auto",
+            interpolation="nearest",
+            cmap="viridis",
+            vmin=low,
+            vmax=high,
+            extent=extent,
         )
         axes.set(xlabel=across[0], title=name)
     columns[0].set_ylabel(up[0])
@@ -149,7 +156,12 @@ def draw_rdt_clouds(path: Path, clouds: Mapping[str, NDArray[np.float64]], title
     for number, (name, points) in enumerate(clouds.items(), start=1):
         axes = figure.add_subplot(1, len(clouds), number, projection="3d")
         axes.scatter(*points.T, c=points[:, 2], s=3, cmap="coolwarm", vmin=-largest, vmax=largest)
-        axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"{name}: {len(points)} points")
+        axes.set(
+            xlabel="Time [s]",
+            ylabel="Range [m]",
+            zlabel=VELOCITY_LABEL,
+            title=f"{name}: {len(points)} points",
+        )
         if len(every):
             low, high = every.min(axis=0), every.max(axis=0)
             axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))

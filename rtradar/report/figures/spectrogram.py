@@ -45,7 +45,9 @@ def draw_spectrogram(
     values = unit.level(power / HANN_BINS)  # what one echo gives is spread over as many range bins
     low, high = colour_limits(values)
     extent = (*bin_edges(time), *bin_edges(velocity))
-    image = axes.imshow(values.T, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent)
+    image = axes.imshow(
+        values.T, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
+    )
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title=title)
     figure.colorbar(image, label=unit.label("one channel"))
     save_figure(figure, path)

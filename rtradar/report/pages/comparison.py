@@ -45,7 +45,11 @@ sample. Echo power is of one chirp every 10 ms, each from another Tx, which make
 
 
 def write_comparison(
-    path: Path, summary: Mapping[str, Any], rows: Sequence[Sequence[str]], pictures: Mapping[str, Path], unit: FieldUnit
+    path: Path,
+    summary: Mapping[str, Any],
+    rows: Sequence[Sequence[str]],
+    pictures: Mapping[str, Path],
+    unit: FieldUnit,
 ) -> None:
     """Write a comparison as a page with its table and its pictures.
 
@@ -75,10 +79,18 @@ def write_comparison(
         measures=table(rows[1:], rows[0]),
         pictures="\n".join(picture(title, file) for title, file in pictures.items()),
         stages=table(
-            [[stage, *(_figure(fidelities[name]["stages"].get(stage)) for name in names)] for stage in stages], ["", *names]
+            [
+                [stage, *(_figure(fidelities[name]["stages"].get(stage)) for name in names)]
+                for stage in stages
+            ],
+            ["", *names],
         ),
         parts=table(
-            [[part, *(_level(fidelities[name]["part_power_m2"][part], unit) for name in names)] for part in parts], ["", *names]
+            [
+                [part, *(_level(fidelities[name]["part_power_m2"][part], unit) for name in names)]
+                for part in parts
+            ],
+            ["", *names],
         ),
         unit=escape(unit.label()),
         parameters=mapping_table(parameters),

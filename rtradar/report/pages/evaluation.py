@@ -23,7 +23,12 @@ from rtradar.classify.scores import (
 )
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
-from rtradar.report.figures.classifier import draw_accuracies, draw_confusion, draw_learning, draw_transfer
+from rtradar.report.figures.classifier import (
+    draw_accuracies,
+    draw_confusion,
+    draw_learning,
+    draw_transfer,
+)
 from rtradar.system.checks import printable
 from rtradar.system.files import atomic_file
 from rtradar.system.output_folder import OutputFiles
@@ -37,7 +42,9 @@ EVALUATION_FILES = OutputFiles(
 """Those that an evaluation makes."""
 
 
-def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome]], out: Path) -> tuple[str, dict[str, Any]]:
+def write_evaluation(
+    studies: Sequence[Study], baselines: dict[str, list[Outcome]], out: Path
+) -> tuple[str, dict[str, Any]]:
     """Tables, pictures and numbers of some studies of the same clouds, and of baselines.
 
     Parameters
@@ -65,13 +72,19 @@ def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome
     classes = studies[0].plan["classes"]
     for study in studies:
         if study.plan["classes"] != classes:
-            raise InputError(f"'{study.folder}' knows other activities than '{studies[0].folder}'; evaluate them one by one")
+            raise InputError(
+                f"'{study.folder}' knows other activities than '{studies[0].folder}'; evaluate them one by one"
+            )
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)") from None
+        raise InputError(
+            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+        ) from None
     titles = _titles(studies)
-    groups: list[Group] = [(title, study.outcomes) for title, study in zip(titles, studies, strict=True)]
+    groups: list[Group] = [
+        (title, study.outcomes) for title, study in zip(titles, studies, strict=True)
+    ]
     groups += list(baselines.items())
     blocks = [accuracy_table(_rows(studies, titles, baselines))]
     for number, (title, study) in enumerate(zip(titles, studies, strict=True), start=1):
@@ -80,14 +93,23 @@ def write_evaluation(studies: Sequence[Study], baselines: dict[str, list[Outcome
             f"{title}: {_about(study)}\n{confusion_table(counts, classes, recordings_of(study.outcomes, len(classes)))}"
         )
         draw_confusion(out / f"confusion-{number}.png", counts, classes, title)
-        draw_learning(out / f"learning-{number}.png", [one.history for one in study.outcomes], title)
+        draw_learning(
+            out / f"learning-{number}.png", [one.history for one in study.outcomes], title
+        )
         if any(one.trained_on for one in study.outcomes):
             found = transfer(study.outcomes)
             blocks.append(transfer_table(*found))
             draw_transfer(out / f"transfer-{number}.png", *found, title)
-    draw_accuracies(out / "accuracy.png", [(title, accuracies(outcomes).tolist()) for title, outcomes in groups], "Test accuracy")
+    draw_accuracies(
+        out / "accuracy.png",
+        [(title, accuracies(outcomes).tolist()) for title, outcomes in groups],
+        "Test accuracy",
+    )
     table = "\n\n".join(blocks)
-    content = {"classes": classes, "groups": [_numbers(title, outcomes, len(classes)) for title, outcomes in groups]}
+    content = {
+        "classes": classes,
+        "groups": [_numbers(title, outcomes, len(classes)) for title, outcomes in groups],
+    }
     content["plans"] = [study.plan for study in studies]
     _write(out / "table.txt", table + "\n")
     _write_csv(out, groups)
@@ -100,7 +122,9 @@ def _titles(studies: Sequence[Study]) -> list[str]:
     """A name for each, unlike the others: the folder is added where recipe and points are not enough."""
     plain = [study.title for study in studies]
     return [
-        title if plain.count(title) == 1 else f"{title} ({printable(study.folder.name)}, {study.plan['split']})"
+        title
+        if plain.count(title) == 1
+        else f"{title} ({printable(study.folder.name)}, {study.plan['split']})"
         for title, study in zip(plain, studies, strict=True)
     ]
 
@@ -111,11 +135,21 @@ def _rows(
     rows: list[tuple[str, Sequence[float], str]] = []
     for title, study in zip(titles, studies, strict=True):
         done, planned = len(study.outcomes), len(study.plan["trainings"])
-        rows.append((title, accuracies(study.outcomes).tolist(), "" if done == planned else f"{done} of {planned} trained"))
+        rows.append(
+            (
+                title,
+                accuracies(study.outcomes).tolist(),
+                "" if done == planned else f"{done} of {planned} trained",
+            )
+        )
     rows += [(name, accuracies(outcomes).tolist(), "") for name, outcomes in baselines.items()]
     # The paper's own beside them, where what it did was done.
     sizes = {study.plan["recipe"]["points"] for study in studies if study.plan["split"] == "folds"}
-    rows += [(f"Table 4, {size} points", [share / 100 for share in TABLE_4[size]], "") for size in TABLE_4 if size in sizes]
+    rows += [
+        (f"Table 4, {size} points", [share / 100 for share in TABLE_4[size]], "")
+        for size in TABLE_4
+        if size in sizes
+    ]
     return rows
 
 
@@ -147,7 +181,11 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     }
     if any(one.trained_on for one in outcomes):
         values, mean, spread = transfer(outcomes)
-        content["transfer"] = {"values": values, "mean": _plain(mean.tolist()), "spread": _plain(spread.tolist())}
+        content["transfer"] = {
+            "values": values,
+            "mean": _plain(mean.tolist()),
+            "spread": _plain(spread.tolist()),
+        }
     return content
 
 
@@ -170,7 +208,15 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
         for title, outcomes in groups
         for one in outcomes
     ]
-    head = ["classifier", "training", "trained_on", "test_clouds", "test_recordings", "accuracy", "seconds"]
+    head = [
+        "classifier",
+        "training",
+        "trained_on",
+        "test_clouds",
+        "test_recordings",
+        "accuracy",
+        "seconds",
+    ]
     _write(out / "trainings.csv", _csv(head, trainings))
     names = ["rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy", "seconds"]
     history = [

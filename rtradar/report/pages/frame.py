@@ -91,7 +91,9 @@ def write_page(
     """
     # As bytes: the text that plotly's own function gives takes twice as many, for it has letters beyond Latin.
     library = files("plotly").joinpath("package_data/plotly.min.js").read_bytes()
-    script = ("(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n").encode()
+    script = (
+        "(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n"
+    ).encode()
     page = _PAGE.substitute(
         policy=_policy((library, script)),
         title=escape(f"{heading} - rtradar"),
@@ -127,7 +129,9 @@ def _asset(name: str) -> str:
 
 def _policy(scripts: Iterable[bytes]) -> str:
     """Content security policy: these scripts and no other, embedded pictures, and nothing from anywhere else."""
-    hashes = " ".join(f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts)
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts
+    )
     # Plotly writes style rules of its own, and makes pictures for download as blobs.
     sources = f"script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
     return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"

@@ -80,7 +80,9 @@ def write_report(
         path,
         kind="rtradar report",
         heading=str(parameters.get("motion", "Recording")),
-        subtitle=", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))),
+        subtitle=", ".join(
+            filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))
+        ),
         top=top,
         body=chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
         data=data,
@@ -102,7 +104,13 @@ def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
 
 
 def _clouds(data: Mapping[str, Any]) -> str:
-    views = [("rdt", "Range-Doppler-time cloud", "The surface about the detections of all windows, sampled.")]
+    views = [
+        (
+            "rdt",
+            "Range-Doppler-time cloud",
+            "The surface about the detections of all windows, sampled.",
+        )
+    ]
     if "spatial" in data:
         note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
         measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
@@ -113,9 +121,19 @@ def _clouds(data: Mapping[str, Any]) -> str:
     parts = []
     for name, title, note in views:
         cloud = data[name]
-        thinned = "" if cloud["shown"] == cloud["count"] else f" {cloud['shown']} of {cloud['count']} points are shown."
-        scene = f'<div class="scene" id="scene-{name}"></div>' if cloud["count"] else '<p class="empty">Nothing was detected.</p>'
-        parts.append(f'<section id="{name}"><h2>{title}</h2>{scene}<p class="note">{note}{thinned}</p></section>\n')
+        thinned = (
+            ""
+            if cloud["shown"] == cloud["count"]
+            else f" {cloud['shown']} of {cloud['count']} points are shown."
+        )
+        scene = (
+            f'<div class="scene" id="scene-{name}"></div>'
+            if cloud["count"]
+            else '<p class="empty">Nothing was detected.</p>'
+        )
+        parts.append(
+            f'<section id="{name}"><h2>{title}</h2>{scene}<p class="note">{note}{thinned}</p></section>\n'
+        )
     return f'<div class="clouds">{"".join(parts)}</div>\n'
 
 
@@ -138,15 +156,31 @@ def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
     sections = (
         ("Derived limits of the radar", limits_table(radar)),
         ("Time of each stage", stages_table(summary.get("stages", {}))),
-        ("How parts were modelled, of all parts and time", table((name, f"{value:.1%}") for name, value in ways.items())),
+        (
+            "How parts were modelled, of all parts and time",
+            table((name, f"{value:.1%}") for name, value in ways.items()),
+        ),
         ("Parameters", mapping_table(parameters)),
         ("Radar", mapping_table(settings)),
-        ("Capture", mapping_table({key: value for key, value in summary.items() if key not in own})),
-        ("Echo power by part", table((name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items())),
-        ("Versions", table((name, str(value)) for name, value in summary.get("versions", {}).items())),
+        (
+            "Capture",
+            mapping_table({key: value for key, value in summary.items() if key not in own}),
+        ),
+        (
+            "Echo power by part",
+            table(
+                (name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items()
+            ),
+        ),
+        (
+            "Versions",
+            table((name, str(value)) for name, value in summary.get("versions", {}).items()),
+        ),
     )
     return (
         '<div class="tables">'
-        + "".join(f"<section><h2>{t}</h2>{html}</section>\n" for t, html in sections if "<tr>" in html)
+        + "".join(
+            f"<section><h2>{t}</h2>{html}</section>\n" for t, html in sections if "<tr>" in html
+        )
         + "</div>\n"
     )

@@ -76,10 +76,16 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
     """HTML table of plain texts; the first column names the row, the others are right-aligned."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>' + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:]) + "</tr>"
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:])
+        + "</tr>"
         for row in rows
     )
-    return "<table>" + (f"<thead><tr>{top}</tr></thead>" if head else "") + f"<tbody>{body}</tbody></table>"
+    return (
+        "<table>"
+        + (f"<thead><tr>{top}</tr></thead>" if head else "")
+        + f"<tbody>{body}</tbody></table>"
+    )
 
 
 def mapping_table(values: Mapping[str, Any]) -> str:
@@ -87,7 +93,8 @@ def mapping_table(values: Mapping[str, Any]) -> str:
     return table(
         quantity(name, value)
         for name, value in values.items()
-        if not isinstance(value, Mapping) and not (isinstance(value, list) and value and isinstance(value[0], Mapping))
+        if not isinstance(value, Mapping)
+        and not (isinstance(value, list) and value and isinstance(value[0], Mapping))
     )
 
 
@@ -95,15 +102,31 @@ def limits_table(radar: Radar) -> str:
     """What the radar can measure: the paper's Table 2 for this radar, by the centre of its sweep."""
     rows = (
         ("r_max", "Maximum detectable range", f"{radar.max_range_m:.3f} m"),
-        ("r_dis", "Minimum distinguishable distance, one range bin", f"{100 * radar.range_bin_m:.3f} cm"),
+        (
+            "r_dis",
+            "Minimum distinguishable distance, one range bin",
+            f"{100 * radar.range_bin_m:.3f} cm",
+        ),
         ("v_max", "Maximum unambiguous velocity", f"±{radar.max_velocity_mps:.3f} m/s"),
-        ("v_dis", "Minimum distinguishable velocity, one Doppler bin", f"{radar.velocity_bin_mps:.4f} m/s"),
+        (
+            "v_dis",
+            "Minimum distinguishable velocity, one Doppler bin",
+            f"{radar.velocity_bin_mps:.4f} m/s",
+        ),
         ("A_range", "Unambiguous azimuth and elevation", f"±{radar.max_angle_deg:.1f}°"),
-        ("A_dis", "Beam width, -3 dB, uniform line, far field", f"{radar.angle_resolution_deg:.2f}°"),
+        (
+            "A_dis",
+            "Beam width, -3 dB, uniform line, far field",
+            f"{radar.angle_resolution_deg:.2f}°",
+        ),
         ("λ", "Wavelength at the centre of the sweep", f"{1000 * radar.wavelength_m:.3f} mm"),
         ("T_cycle", "One turn through all Tx", _text(radar.cycle_duration_s, "s")),
         ("N_cycle", "Cycles in one frame", str(radar.cycles_per_frame)),
-        ("N_virtual", "Virtual channels, Tx by Rx", f"{radar.n_tx} × {radar.n_rx} = {radar.n_channels}"),
+        (
+            "N_virtual",
+            "Virtual channels, Tx by Rx",
+            f"{radar.n_tx} × {radar.n_rx} = {radar.n_channels}",
+        ),
     )
     return table(rows, ("", "Limit", "Value"))
 
@@ -129,12 +152,18 @@ def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
         share = float(limit.get("share", 0.0))
         message = f"{share:.1%} of the {limit['message']}" if share > 0 else str(limit["message"])
         items.append(f"<li>{escape(message)} <code>{escape(str(limit['name']))}</code></li>")
-    return f'<aside class="box warn"><h2>Limits of this result</h2><ul>{"".join(items)}</ul></aside>'
+    return (
+        f'<aside class="box warn"><h2>Limits of this result</h2><ul>{"".join(items)}</ul></aside>'
+    )
 
 
 def tiles(values: Iterable[tuple[str, str]]) -> str:
     """Row of large figures, each (value, what it is)."""
-    return '<div class="tiles">' + "".join(f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in values) + "</div>"
+    return (
+        '<div class="tiles">'
+        + "".join(f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in values)
+        + "</div>"
+    )
 
 
 def picture(title: str, path: Path) -> str:
@@ -148,7 +177,9 @@ def picture(title: str, path: Path) -> str:
     try:
         data = path.read_bytes()
     except OSError as error:
-        raise InputError(f"report: picture '{path}': {error.strerror}; give the path of a PNG file") from None
+        raise InputError(
+            f"report: picture '{path}': {error.strerror}; give the path of a PNG file"
+        ) from None
     if data[:8] != _PNG or len(data) < 24:
         raise InputError(f"report: picture '{path}' is no PNG file; only PNG is embedded")
     width, height = struct.unpack(">II", data[16:24])

@@ -41,8 +41,13 @@ time.</p>
 
 
 def _controls(colour: str) -> str:
-    options = "".join(f'<option value="{name}"{" selected" if name == colour else ""}>{name}</option>' for name in COLOURS)
-    legend = "".join(f'<span><i style="background:{tint}"></i>{name}</span>' for name, tint in GROUPS.items())
+    options = "".join(
+        f'<option value="{name}"{" selected" if name == colour else ""}>{name}</option>'
+        for name in COLOURS
+    )
+    legend = "".join(
+        f'<span><i style="background:{tint}"></i>{name}</span>' for name, tint in GROUPS.items()
+    )
     return player(
         f'<label>Colour by <select id="colour">{options}</select></label>'
         '<label>Paths <select id="paths"><option value="all">all</option><option value="direct">direct</option>'
@@ -52,7 +57,9 @@ def _controls(colour: str) -> str:
     )
 
 
-def write_view(path: str | Path, linked: Linked, *, name: str = "view", colour: str = "part") -> None:
+def write_view(
+    path: str | Path, linked: Linked, *, name: str = "view", colour: str = "part"
+) -> None:
     """Write the page, in one file that opens without a network.
 
     Parameters
@@ -71,9 +78,17 @@ def write_view(path: str | Path, linked: Linked, *, name: str = "view", colour: 
         Where the file cannot be written.
     """
     scene = '<div class="scene" id="scene-{}"></div>'
-    cloud = scene.format("rdt") if len(linked.rdt_points) else '<p class="empty">Nothing was detected.</p>'
+    cloud = (
+        scene.format("rdt")
+        if len(linked.rdt_points)
+        else '<p class="empty">Nothing was detected.</p>'
+    )
     long_enough = linked.spectrogram.level.size > 0
-    spectrogram = scene.format("spectrogram") if long_enough else '<p class="empty">The capture is too short for one.</p>'
+    spectrogram = (
+        scene.format("spectrogram")
+        if long_enough
+        else '<p class="empty">The capture is too short for one.</p>'
+    )
     write_page(
         path,
         kind="rtradar view",
@@ -127,14 +142,23 @@ def linked_data(linked: Linked) -> dict[str, Any]:
         "max_velocity_mps": radar.max_velocity_mps,
         "map": linked.range_doppler.packed() | {"box": linked.shown_box()},
         "spectrogram": linked.spectrogram.packed(),
-        "rdt": shown | {"power_db": packed_floats(linked.rdt_power_db[::every]), "group": group[::every].tolist()},
+        "rdt": shown
+        | {
+            "power_db": packed_floats(linked.rdt_power_db[::every]),
+            "group": group[::every].tolist(),
+        },
         "spatial": spatial_data(linked.spatial),
     }
 
 
 def _with_room(ranges: list[list[float]], moments: Moments) -> list[list[float]]:
     """A box that holds walls and furniture, too, in half metres."""
-    places = np.concatenate([moments.walls.reshape(-1, 3), moments.furniture_vertices, np.array(ranges).T])
-    low, high = np.floor(2 * places.min(axis=0) - 1e-6) / 2, np.ceil(2 * places.max(axis=0) + 1e-6) / 2
+    places = np.concatenate(
+        [moments.walls.reshape(-1, 3), moments.furniture_vertices, np.array(ranges).T]
+    )
+    low, high = (
+        np.floor(2 * places.min(axis=0) - 1e-6) / 2,
+        np.ceil(2 * places.max(axis=0) + 1e-6) / 2,
+    )
     low[2] = 0.0 if low[2] > -0.6 else low[2]
     return [[float(a), float(b)] for a, b in zip(low, high, strict=True)]

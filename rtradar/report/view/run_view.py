@@ -85,14 +85,23 @@ class Linked:
         moments, levels = self.moments, self.range_doppler
         found = []
         for values, points, margin, (first, step), count in (
-            (self.shown_velocity(), self.rdt_points[:, 2], 1.0, levels.across, levels.level.shape[2]),
+            (
+                self.shown_velocity(),
+                self.rdt_points[:, 2],
+                1.0,
+                levels.across,
+                levels.level.shape[2],
+            ),
             (moments.range_m, self.rdt_points[:, 1], 0.5, levels.up, levels.level.shape[1]),
         ):
             least, most = first - step / 2, first + step * (count - 0.5)
             inside = np.concatenate([values[self.seen], points])
             inside = inside[(inside >= least) & (inside <= most)]
             if len(inside):
-                least, most = max(least, float(inside.min()) - margin), min(most, float(inside.max()) + margin)
+                least, most = (
+                    max(least, float(inside.min()) - margin),
+                    min(most, float(inside.max()) + margin),
+                )
             found.append((least, most))
         return found[0], found[1]
 
@@ -104,7 +113,11 @@ class Linked:
     def rdt_group(self) -> NDArray[np.int64]:
         """Group of parts of each point of the cloud (point,): that of the nearest echo of its moment, by bins."""
         moments, radar = self.moments, self.radar
-        steps = np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1) if len(self.rdt_points) else np.zeros(0, int)
+        steps = (
+            np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1)
+            if len(self.rdt_points)
+            else np.zeros(0, int)
+        )
         groups = np.array(group_of_parts(moments.part_names.tolist()))[moments.echo_part]
         seen, velocity = self.seen, self.shown_velocity()
         found = np.full(len(steps), len(GROUPS) - 1)

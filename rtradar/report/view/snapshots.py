@@ -114,14 +114,23 @@ class Moments:
             array = np.asarray(getattr(self, name))
             if kind == "U" and array.size == 0:
                 array = array.astype("U")  # an empty list has no kind
-            if array.dtype.kind != np.dtype(kind).kind or array.dtype in (np.float16, np.longdouble):
-                raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
+            if array.dtype.kind != np.dtype(kind).kind or array.dtype in (
+                np.float16,
+                np.longdouble,
+            ):
+                raise InputError(
+                    f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}"
+                )
             if array.ndim != len(axes):
-                raise InputError(f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})")
+                raise InputError(
+                    f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})"
+                )
             for axis, length in zip(axes, array.shape, strict=True):
                 wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
                 if length != wanted:
-                    raise InputError(f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}")
+                    raise InputError(
+                        f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}"
+                    )
             if kind != "U" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
                 raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
             if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
@@ -130,11 +139,15 @@ class Moments:
                 raise InputError(f"view: {name} holds what is no line of text")
             object.__setattr__(self, name, array if kind == "U" else array.astype(kind))
         if not sizes["step"] or not sizes["part"]:
-            raise InputError("view: there is no moment or no body part; at least one of each is needed")
+            raise InputError(
+                "view: there is no moment or no body part; at least one of each is needed"
+            )
         for name, axis in _POINTS_INTO.items():
             index = getattr(self, name)
             if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
-                raise InputError(f"view: {name} points at a {axis} that is not there; it must be from 0 to {sizes[axis] - 1}")
+                raise InputError(
+                    f"view: {name} points at a {axis} that is not there; it must be from 0 to {sizes[axis] - 1}"
+                )
         if (np.diff(self.times) <= 0).any() or (self.power_m2 < 0).any():
             raise InputError("view: times must ascend, and power_m2 must not be negative")
 
@@ -176,7 +189,9 @@ def load_moments(path: str | Path) -> Moments:
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; {mend}") from None
     except (OSError, ValueError, KeyError) as error:
-        raise InputError(f"'{path}' is damaged or no file of moments ({' '.join(str(error).split())}); {mend}") from None
+        raise InputError(
+            f"'{path}' is damaged or no file of moments ({' '.join(str(error).split())}); {mend}"
+        ) from None
     if found.pop("format").tolist() != _FORMAT:
         raise InputError(f"'{path}' is of another version of rtradar; {mend}")
     try:

@@ -40,15 +40,22 @@ def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "pa
     """
     figure = new_figure(15, 9.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
-    figure.suptitle(f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s", wrap=True)
+    figure.suptitle(
+        f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s", wrap=True
+    )
     paint = _Paint(linked, colour)
-    views = [figure.add_subplot(grid[row, column], projection=None if column else "3d") for row, column in np.ndindex(2, 2)]
+    views = [
+        figure.add_subplot(grid[row, column], projection=None if column else "3d")
+        for row, column in np.ndindex(2, 2)
+    ]
     _draw_body(views[0], linked, step, paint)
     _draw_map(figure, views[1], linked, step, paint)
     _draw_cloud(views[2], linked, step, paint)
     _draw_spectrogram(figure, views[3], linked, step)
     paint.legend(figure, views)
-    for artist in (one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)):
+    for artist in (
+        one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)
+    ):
         # A long box in 3D is wider than its axes, at whose edge the body would be cut; the layout knows the box already.
         artist.set_clip_on(False)
         artist.set_in_layout(False)
@@ -102,7 +109,9 @@ class _Paint:
         linked = self._linked
         if self.colour == "part":
             return self._rgba(linked.rdt_group().astype(np.float64))
-        return self._rgba(linked.rdt_power_db if self.colour == "power" else linked.rdt_points[:, 2])
+        return self._rgba(
+            linked.rdt_power_db if self.colour == "power" else linked.rdt_points[:, 2]
+        )
 
     def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         from matplotlib.colors import to_rgba
@@ -120,9 +129,17 @@ class _Paint:
             patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
             figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
             return
-        label = {"power": self._linked.power_unit.label("of an echo"), "velocity": VELOCITY_LABEL}[self.colour]
+        label = {"power": self._linked.power_unit.label("of an echo"), "velocity": VELOCITY_LABEL}[
+            self.colour
+        ]
         bar = figure.colorbar(
-            ScalarMappable(self.norm, self.map), ax=views, location="bottom", shrink=0.4, aspect=50, pad=0.02, label=label
+            ScalarMappable(self.norm, self.map),
+            ax=views,
+            location="bottom",
+            shrink=0.4,
+            aspect=50,
+            pad=0.02,
+            label=label,
         )
         bar.ax.tick_params(labelsize=8)
 
@@ -136,13 +153,17 @@ def _draw_body(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
     poses = moments.poses[step].astype(np.float64)
     for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
         corners = (centre + vertices @ np.array(semi_axes))[faces]
-        axes.add_collection3d(Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0))
+        axes.add_collection3d(
+            Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0)
+        )
     outlines = [np.concatenate([corners, corners[:1]]) for corners in moments.walls]
     if outlines:
         axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
     if len(moments.furniture_faces):
         triangles = moments.furniture_vertices[moments.furniture_faces].astype(np.float64)
-        axes.add_collection3d(Poly3DCollection(triangles, facecolors="#b08d57", alpha=0.18, linewidth=0))
+        axes.add_collection3d(
+            Poly3DCollection(triangles, facecolors="#b08d57", alpha=0.18, linewidth=0)
+        )
     place = np.array(radar.position_m)
     rgba = paint.echoes(step)
     for echo in np.flatnonzero(linked.seen[step]):
@@ -151,11 +172,22 @@ def _draw_body(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
         if len(corners):
             line = np.concatenate([[place], corners, [place]])
             direct = moments.direct[echo]
-            axes.plot(*line.T, color=rgba[echo], linewidth=1.2 if direct else 0.6, alpha=0.8 if direct else 0.35)
+            axes.plot(
+                *line.T,
+                color=rgba[echo],
+                linewidth=1.2 if direct else 0.6,
+                alpha=0.8 if direct else 0.35,
+            )
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
     everything = np.concatenate(
-        [moments.poses[:, :, 0].reshape(-1, 3), moments.walls.reshape(-1, 3), moments.furniture_vertices, radar.tx, radar.rx]
+        [
+            moments.poses[:, :, 0].reshape(-1, 3),
+            moments.walls.reshape(-1, 3),
+            moments.furniture_vertices,
+            radar.tx,
+            radar.rx,
+        ]
     )
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
@@ -186,11 +218,16 @@ def _draw_map(figure: Any, axes: Any, linked: Linked, step: int, paint: _Paint) 
     moments = linked.moments
     image = _image(axes, linked.range_doppler, step, "Greys")
     rgba, velocity = paint.echoes(step), linked.shown_velocity()[step]
-    for direct, style in ((False, {"marker": "D", "s": 14, "facecolors": "none"}), (True, {"marker": "o", "s": 40})):
+    for direct, style in (
+        (False, {"marker": "D", "s": 14, "facecolors": "none"}),
+        (True, {"marker": "o", "s": 40}),
+    ):
         own = np.flatnonzero(linked.seen[step] & (moments.direct == direct))
         edges = "white" if direct else rgba[own]
         given = style | ({"color": rgba[own]} if direct else {})
-        axes.scatter(velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given)
+        axes.scatter(
+            velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given
+        )
     across, up = linked.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
     axes.set_title("Range-Doppler map of this window, and where echoes are")
@@ -200,7 +237,10 @@ def _draw_map(figure: Any, axes: Any, linked: Linked, step: int, paint: _Paint) 
 def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
     points, time = linked.rdt_points, linked.moments.times[step]
     axes.set(
-        xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=f"Range-Doppler-time cloud: {len(points)} points"
+        xlabel="Time [s]",
+        ylabel="Range [m]",
+        zlabel=VELOCITY_LABEL,
+        title=f"Range-Doppler-time cloud: {len(points)} points",
     )
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
@@ -216,7 +256,14 @@ def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
 def _draw_spectrogram(figure: Any, axes: Any, linked: Linked, step: int) -> None:
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
     if not linked.spectrogram.level.size:
-        axes.text(0.5, 0.5, "The capture is too short for one.", ha="center", va="center", transform=axes.transAxes)
+        axes.text(
+            0.5,
+            0.5,
+            "The capture is too short for one.",
+            ha="center",
+            va="center",
+            transform=axes.transAxes,
+        )
         return
     image = _image(axes, linked.spectrogram, 0, "viridis")
     axes.axvline(linked.moments.times[step], color=_NOW, linewidth=1.5)

@@ -31,7 +31,11 @@ _MARGIN_M = 0.4
 
 
 def figure_data(
-    body: Body, radar: Radar, part_power_m2: Mapping[str, float] | None = None, *, spreading: bool = True
+    body: Body,
+    radar: Radar,
+    part_power_m2: Mapping[str, float] | None = None,
+    *,
+    spreading: bool = True,
 ) -> dict[str, Any]:
     """The recording as poses of ellipsoids, with the radar and the floor.
 
@@ -58,9 +62,15 @@ def figure_data(
     power = np.array([(part_power_m2 or {}).get(part, 0.0) for part in body.part_names])
     strongest = float(power.max())
     unit = field_unit(radar, spreading=spreading, strongest_m2=strongest)
-    levels = unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10))).round(2).tolist()
+    levels = (
+        unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10))).round(2).tolist()
+    )
     label = unit.label("mean of the part")
-    return figure | {"power_db": levels if strongest > 0 else None, "power_label": label, "power_unit": unit.name}
+    return figure | {
+        "power_db": levels if strongest > 0 else None,
+        "power_label": label,
+        "power_unit": unit.name,
+    }
 
 
 def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -106,7 +116,9 @@ def posed_figure(
         "tx": np.round(radar.tx, 4).tolist(),
         "rx": np.round(radar.rx, 4).tolist(),
         "ranges": _ranges(
-            (centres - reach).reshape(-1, 3), (centres + reach).reshape(-1, 3), np.concatenate([radar.tx, radar.rx])
+            (centres - reach).reshape(-1, 3),
+            (centres + reach).reshape(-1, 3),
+            np.concatenate([radar.tx, radar.rx]),
         ),
         "window_s": radar.frame_duration_s,
     }
@@ -132,7 +144,9 @@ def rdt_data(points: ArrayLike) -> dict[str, Any]:
     """
     places = np.asarray(points, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
-        raise InputError(f"report: rdt_points has shape {places.shape}; it must be (point, 3): time, range, velocity")
+        raise InputError(
+            f"report: rdt_points has shape {places.shape}; it must be (point, 3): time, range, velocity"
+        )
     if not np.isfinite(places).all():
         raise InputError("report: rdt_points holds NaN or infinity; every value must be finite")
     return _thinned(points=places)
@@ -152,12 +166,16 @@ def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
         and ``time`` (point,).
     """
     cloud = cloud.strongest()
-    return {"measured": cloud.measured.tolist()} | _thinned(points=cloud.points, velocity=cloud.velocity, time=cloud.time)
+    return {"measured": cloud.measured.tolist()} | _thinned(
+        points=cloud.points, velocity=cloud.velocity, time=cloud.time
+    )
 
 
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
     every = max(1, math.ceil(len(points) / MOST_POINTS))
-    packed = {name: packed_floats(array[::every]) for name, array in {"points": points, **values}.items()}
+    packed = {
+        name: packed_floats(array[::every]) for name, array in {"points": points, **values}.items()
+    }
     return {"count": len(points), "shown": len(points[::every]), **packed}
 
 
@@ -166,7 +184,9 @@ def packed_floats(array: NDArray[np.floating]) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
 
 
-def _ranges(low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
+def _ranges(
+    low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDArray[np.float64]
+) -> list[list[float]]:
     """Box about all poses, the radar and the floor, in half metres."""
     least = np.minimum(low.min(axis=0), antennas.min(axis=0))
     most = np.maximum(high.max(axis=0), antennas.max(axis=0))

@@ -13,9 +13,21 @@ from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, FURNITURE_NODES, MOST_NODES, RoomEchoes, sweep_nodes
+from rtradar.scatter.clutter.returns import (
+    FREQUENCY_ERROR,
+    FURNITURE_NODES,
+    MOST_NODES,
+    RoomEchoes,
+    sweep_nodes,
+)
 from rtradar.scatter.multipath.slab_series import room_series
-from rtradar.scatter.multipath.wall_interaction import Series, Wave, crossed, setting_out, through_walls
+from rtradar.scatter.multipath.wall_interaction import (
+    Series,
+    Wave,
+    crossed,
+    setting_out,
+    through_walls,
+)
 from rtradar.scatter.ray_tubes.footprints import across
 from rtradar.scene import Scene, Wall
 
@@ -91,7 +103,9 @@ def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
         ways = points - antennas[:, None]
         sent = across(-ways / np.linalg.norm(ways, axis=-1, keepdims=True), radar.polarization)
-        waves = through_walls(scene, series, 0, setting_out(sent, len(nodes)), antennas[:, None], points, nodes)
+        waves = through_walls(
+            scene, series, 0, setting_out(sent, len(nodes)), antennas[:, None], points, nodes
+        )
         return [(wave, np.asarray((wave.field * sent).sum(axis=-1).conj())) for wave in waves]
 
     alike: dict[tuple[tuple[int, int], ...], list[_Pair]] = {}
@@ -99,15 +113,26 @@ def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[
         passes = Counter[int]()
         for one in (*out.met, *back.met):
             passes[one.wall] += one.passes
-        alike.setdefault(tuple(sorted(passes.items())), []).append(_Pair(out, back, left_out, left_back))
+        alike.setdefault(tuple(sorted(passes.items())), []).append(
+            _Pair(out, back, left_out, left_back)
+        )
     # A bound of each echo, for most are not worth what they hold in memory.
     strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
-    sizes = np.array([sum(_most(pair.left_out) * _most(pair.left_back) for pair in pairs) * strength for pairs in alike.values()])
+    sizes = np.array(
+        [
+            sum(_most(pair.left_out) * _most(pair.left_back) for pair in pairs) * strength
+            for pairs in alike.values()
+        ]
+    )
     parts, off = [], 0.0
     for pairs, size, some in zip(alike.values(), sizes, _worth(sizes), strict=True):
         if some.any():
             parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
-            if any(not series[one.wall].held[1] for pair in pairs for one in (*pair.out.met, *pair.back.met)):
+            if any(
+                not series[one.wall].held[1]
+                for pair in pairs
+                for one in (*pair.out.met, *pair.back.met)
+            ):
                 off = max(off, float(size.max()))
     return parts, off
 
@@ -116,16 +141,22 @@ def _most(left: Field) -> Array:
     return np.asarray(np.abs(left).max(axis=(0, 1)))
 
 
-def _together(returns: RoomEchoes, pairs: list[_Pair], some: NDArray[np.bool_], kept: NDArray[np.int64]) -> RoomEchoes:
+def _together(
+    returns: RoomEchoes, pairs: list[_Pair], some: NDArray[np.bool_], kept: NDArray[np.int64]
+) -> RoomEchoes:
     """Some of the echoes by all pairs of waves, at their mean length; what each is longer is in its amplitude."""
-    longer = [pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some] for pair in pairs]
+    longer = [
+        pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some] for pair in pairs
+    ]
     left = [pair.left_out[:, :, None, some] * pair.left_back[:, kept][..., some] for pair in pairs]
     weights = [np.abs(one[len(one) // 2]) for one in left]
     total = np.sum(weights, axis=0)
     weighted = np.sum([weight * own for weight, own in zip(weights, longer, strict=True)], axis=0)
     mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
     wavenumber = 2 * np.pi * returns.frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
-    factor = sum(one * np.exp(1j * wavenumber * (own - mean)) for one, own in zip(left, longer, strict=True))
+    factor = sum(
+        one * np.exp(1j * wavenumber * (own - mean)) for one, own in zip(left, longer, strict=True)
+    )
     return replace(returns, length=returns.length + mean, amplitude=returns.amplitude * factor)
 
 

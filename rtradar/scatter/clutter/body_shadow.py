@@ -96,7 +96,10 @@ class ClutterShadow:
             np.concatenate([np.repeat(self._antennas, len(near), axis=0), starts.reshape(-1, 3)]),
             np.concatenate([np.tile(self._points[near], (nodes, 1)), ends.reshape(-1, 3)]),
         )
-        of_nodes, of_zones = met[: nodes * len(near)].reshape(nodes, -1), met[nodes * len(near) :].reshape(-1, SHADOW_RAYS)
+        of_nodes, of_zones = (
+            met[: nodes * len(near)].reshape(nodes, -1),
+            met[nodes * len(near) :].reshape(-1, SHADOW_RAYS),
+        )
         self._kept[anchor] = self._together(near, of_nodes, zone, of_zones.mean(axis=1))
         if len(self._kept) > _KEPT_ANCHORS:
             self._kept.popitem(last=False)
@@ -108,7 +111,9 @@ class ClutterShadow:
         anchors, tx = chirps // self.step, self._radar.tx_of_chirp(chirps)
         share = smooth(chirps - anchors * self.step, self.step)
         out = np.ones((len(chirps), self._radar.n_rx, int(self.starts[-1])))
-        for index, (anchor, line, after) in enumerate(zip(anchors.tolist(), tx.tolist(), share.tolist(), strict=True)):
+        for index, (anchor, line, after) in enumerate(
+            zip(anchors.tolist(), tx.tolist(), share.tolist(), strict=True)
+        ):
             for place, weight in ((anchor, 1 - after), (anchor + 1, after)):
                 if weight > 0:
                     lost = self.hidden(place)
@@ -130,7 +135,9 @@ class ClutterShadow:
         ways = ways / size[:, None]
         along = np.clip(((middle - legs.starts) * ways).sum(axis=1), 0.0, size)
         past = legs.before + along
-        radius = np.sqrt(self._radar.wavelength_m * past * np.maximum(legs.length - past, 0.0) / legs.length)
+        radius = np.sqrt(
+            self._radar.wavelength_m * past * np.maximum(legs.length - past, 0.0) / legs.length
+        )
         gap = np.linalg.norm(legs.starts + along[:, None] * ways - middle, axis=1)
         near = np.flatnonzero(gap < ball + radius)
         side = np.cross(ways[near], np.eye(3)[np.abs(ways[near]).argmin(axis=1)])
@@ -139,7 +146,13 @@ class ClutterShadow:
         shifts = np.einsum("rk,lki->lri", _disc(SHADOW_RAYS), axes)
         return legs.starts[near, None] + shifts, legs.ends[near, None] + shifts, near
 
-    def _together(self, near: NDArray[np.int64], of_nodes: NDArray[np.bool_], zone: NDArray[np.int64], of_zone: Array) -> Hidden:
+    def _together(
+        self,
+        near: NDArray[np.int64],
+        of_nodes: NDArray[np.bool_],
+        zone: NDArray[np.int64],
+        of_zone: Array,
+    ) -> Hidden:
         radar = self._radar
         near, of_nodes = near[of_nodes.any(axis=0)], of_nodes[:, of_nodes.any(axis=0)]
         of_tx, of_rx = self._tx_weights @ of_nodes, self._rx_weights @ of_nodes
@@ -147,7 +160,10 @@ class ClutterShadow:
         mirrored, own = np.unique(self._legs.echo[zone], return_inverse=True)
         share = np.zeros((radar.n_channels, len(mirrored)))
         np.maximum.at(share, (self._legs.channel[zone], own), of_zone)
-        shares = np.maximum(of_tx[:, None], of_rx[radar.rx_of_tx]), share.reshape(radar.n_tx, radar.n_rx, -1)
+        shares = (
+            np.maximum(of_tx[:, None], of_rx[radar.rx_of_tx]),
+            share.reshape(radar.n_tx, radar.n_rx, -1),
+        )
         echoes = np.concatenate([self._of_point[near], mirrored])
         order = np.argsort(echoes)
         return Hidden(echoes[order], np.concatenate(shares, axis=-1)[..., order])
@@ -159,9 +175,16 @@ class ClutterShadow:
 
 def _shared_points(clutter: Clutter, starts: NDArray[np.int64]) -> tuple[Array, NDArray[np.int64]]:
     """Points (point, 3) of echoes whose points all antennas share, and the number of each echo."""
-    shared = [(own, first) for own, first in zip(clutter.objects, starts[:-1], strict=True) if own.points.shape[0] == 1]
+    shared = [
+        (own, first)
+        for own, first in zip(clutter.objects, starts[:-1], strict=True)
+        if own.points.shape[0] == 1
+    ]
     points = [np.empty((0, 3)), *(own.points[0, 0, :, 0] for own, _ in shared)]
-    numbers = [np.empty(0, dtype=np.int64), *(np.arange(own.n_echoes) + first for own, first in shared)]
+    numbers = [
+        np.empty(0, dtype=np.int64),
+        *(np.arange(own.n_echoes) + first for own, first in shared),
+    ]
     return np.concatenate(points), np.concatenate(numbers)
 
 
@@ -182,7 +205,14 @@ class _Legs(NamedTuple):
     @classmethod
     def of(cls, clutter: Clutter, starts: NDArray[np.int64]) -> _Legs:
         radar = clutter.radar
-        found = [cls(np.empty((0, 3)), np.empty((0, 3)), *(np.empty(0),) * 2, *(np.empty(0, dtype=np.int64),) * 2)]
+        found = [
+            cls(
+                np.empty((0, 3)),
+                np.empty((0, 3)),
+                *(np.empty(0),) * 2,
+                *(np.empty(0, dtype=np.int64),) * 2,
+            )
+        ]
         for own, first in zip(clutter.objects, starts[:-1], strict=True):
             if own.points.shape[0] == 1:
                 continue
@@ -207,7 +237,9 @@ def _disc(count: int) -> Array:
     """Points (point, 2) spread evenly over the unit disc, as the seeds of a sunflower."""
     index = np.arange(count)
     angle = np.pi * (3 - np.sqrt(5)) * index
-    return np.sqrt((index + 0.5) / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
+    return np.sqrt((index + 0.5) / count)[:, None] * np.stack(
+        [np.cos(angle), np.sin(angle)], axis=-1
+    )
 
 
 def smooth(chirps: NDArray[np.int64], step: int) -> Array:

@@ -41,7 +41,9 @@ MOST_POINTS = 40_000
 """Of one face of a wall; a larger one gets wider cells."""
 
 
-def rough_returns(radar: Radar, scene: Scene, tracer: RoomTracer, seed: int) -> Iterator[RoomEchoes]:
+def rough_returns(
+    radar: Radar, scene: Scene, tracer: RoomTracer, seed: int
+) -> Iterator[RoomEchoes]:
     """Diffuse returns of every face of a rough wall that antennas stand before.
 
     Parameters
@@ -61,15 +63,21 @@ def rough_returns(radar: Radar, scene: Scene, tracer: RoomTracer, seed: int) -> 
         if wall.roughness_m == 0:
             continue
         for back in (False, True):
-            if (height(wall, radar.tx, back=back) > 0).any() and (height(wall, radar.rx, back=back) > 0).any():
+            if (height(wall, radar.tx, back=back) > 0).any() and (
+                height(wall, radar.rx, back=back) > 0
+            ).any():
                 rng = np.random.default_rng(stream(seed, number, int(back)))
-                points, area, phase = _points(wall, back, min(CELL_BINS * radar.range_bin_m, CELL_M), rng)
+                points, area, phase = _points(
+                    wall, back, min(CELL_BINS * radar.range_bin_m, CELL_M), rng
+                )
                 echoes = _echoes(wall, back, points, area, phase, radar, scene, tracer)
                 if echoes.n_echoes:
                     yield echoes
 
 
-def _points(wall: Wall, back: bool, cell_m: float, rng: np.random.Generator) -> tuple[Array, float, Array]:
+def _points(
+    wall: Wall, back: bool, cell_m: float, rng: np.random.Generator
+) -> tuple[Array, float, Array]:
     """Points (point, 3) of a jittered grid on a face, the area of each cell [m^2] and the phases (point,)."""
     edges = np.array(wall.edge_u_m), np.array(wall.edge_v_m)
     cell_m = max(cell_m, np.sqrt(wall.area_m2 / MOST_POINTS))
@@ -82,7 +90,14 @@ def _points(wall: Wall, back: bool, cell_m: float, rng: np.random.Generator) -> 
 
 
 def _echoes(
-    wall: Wall, back: bool, points: Array, area: float, phase: Array, radar: Radar, scene: Scene, tracer: RoomTracer
+    wall: Wall,
+    back: bool,
+    points: Array,
+    area: float,
+    phase: Array,
+    radar: Radar,
+    scene: Scene,
+    tracer: RoomTracer,
 ) -> RoomEchoes:
     frequency = np.array([radar.centre_frequency_hz])
     smooth = replace(wall, roughness_m=0.0)
@@ -95,7 +110,9 @@ def _echoes(
         ways /= distance[..., None]
         sent = across(-ways, radar.polarization).astype(np.complex128)
         field = reflect(smooth, sent, ways, frequency)[0]
-        strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * ~tracer.blocked(antennas[:, None], points)
+        strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * ~tracer.blocked(
+            antennas[:, None], points
+        )
         return distance, np.maximum(-(ways @ normal), 0.0), strength
 
     kept = radar.rx_of_tx

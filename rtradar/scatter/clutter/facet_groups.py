@@ -34,7 +34,9 @@ class FacetGroups:
         self._sides = np.linalg.svd(way[None])[2][1:]
         cells = self._cells(middles)
         self._least, self._count = cells.min(axis=0), np.ptp(cells, axis=0) + 1
-        self._keys, own, counts = np.unique(self._key(cells), return_inverse=True, return_counts=True)
+        self._keys, own, counts = np.unique(
+            self._key(cells), return_inverse=True, return_counts=True
+        )
         sums = np.stack([np.bincount(own, weights=middles[:, axis]) for axis in range(3)], axis=-1)
         self.centres = sums / counts[:, None]
 
@@ -45,8 +47,13 @@ class FacetGroups:
     def _cells(self, points: Array) -> NDArray[np.int64]:
         # Axis by axis, so that a point is rounded alike in any company.
         x, y, z = (points[:, axis] - self._origin[axis] for axis in range(3))
-        across = [(x * side[0] + y * side[1] + z * side[2]) / (_WIDTH_BINS * self._bin) for side in self._sides]
-        return np.floor(np.stack([np.sqrt(x * x + y * y + z * z) / (self._bin / 2), *across], axis=-1)).astype(np.int64)
+        across = [
+            (x * side[0] + y * side[1] + z * side[2]) / (_WIDTH_BINS * self._bin)
+            for side in self._sides
+        ]
+        return np.floor(
+            np.stack([np.sqrt(x * x + y * y + z * z) / (self._bin / 2), *across], axis=-1)
+        ).astype(np.int64)
 
     def _key(self, cells: NDArray[np.int64]) -> NDArray[np.int64]:
         deep, left, up = np.moveaxis(cells - self._least, -1, 0)
@@ -83,14 +90,20 @@ class PathGroups:
         places = footprints.places[:, 3]
         path = footprints.path[:, 3] + np.linalg.norm(places - self._origin, axis=1)
         middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(self._origin - self._middle)
-        group = np.clip(np.rint((path - middle) / self._step).astype(np.int64) + self._half, 0, self.count - 1)
+        group = np.clip(
+            np.rint((path - middle) / self._step).astype(np.int64) + self._half, 0, self.count - 1
+        )
         power = _power(footprints)
         self._weight += np.bincount(group, weights=power, minlength=self.count)
         for axis in range(3):
-            self._sum[:, axis] += np.bincount(group, weights=power * places[:, axis], minlength=self.count)
+            self._sum[:, axis] += np.bincount(
+                group, weights=power * places[:, axis], minlength=self.count
+            )
         return group
 
-    def lengths(self, footprints: Footprints, group: NDArray[np.int64], tx: Array, rx: Array) -> Array:
+    def lengths(
+        self, footprints: Footprints, group: NDArray[np.int64], tx: Array, rx: Array
+    ) -> Array:
         """Mean path of each echo, (rx, echo) [m]."""
         power = _power(footprints)
         total = np.bincount(group, weights=power, minlength=self.count)
@@ -98,14 +111,18 @@ class PathGroups:
         lengths = np.repeat(over_middle[:, None], self.count, axis=1)
         for receiver, antenna in enumerate(rx):
             path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
-            mean = np.bincount(group, weights=power * path, minlength=self.count) / np.where(total > 0, total, 1.0)
+            mean = np.bincount(group, weights=power * path, minlength=self.count) / np.where(
+                total > 0, total, 1.0
+            )
             lengths[receiver] = np.where(total > 0, mean, lengths[receiver])
         return lengths
 
     def centres(self) -> Array:
         """Mean place of the last bounce of each echo, (echo, 3) [m]."""
         known = self._weight[:, None] > 0
-        return np.where(known, self._sum / np.where(known, self._weight[:, None], 1.0), self._middle)
+        return np.where(
+            known, self._sum / np.where(known, self._weight[:, None], 1.0), self._middle
+        )
 
 
 def _power(footprints: Footprints) -> Array:

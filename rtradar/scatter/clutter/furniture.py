@@ -56,7 +56,9 @@ class _Piece:
         self._all, self._first, self._last = surfaces, first, last
         self.sees, self.distance, self.normal = surfaces.sees, surfaces.distance, surfaces.normal
 
-    def meets(self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    def meets(
+        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], Array]:
         """As `Surfaces.meets`."""
         face, distance = self._all.meets(points, normals, directions, own)
         other = (face < self._first) | (face >= self._last)
@@ -94,7 +96,9 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     for piece, triangles in bar:
         last = first + len(triangles.faces)
         grid = _facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
-        returns = _returns(piece, triangles.closed, _Piece(surfaces, first, last), grid, radar, scene)
+        returns = _returns(
+            piece, triangles.closed, _Piece(surfaces, first, last), grid, radar, scene
+        )
         if returns is not None:
             yield returns
         first = last
@@ -118,23 +122,36 @@ def _facets(corners: Array, first: int, edge: float) -> MeshGrid:
     count = 0
     while len(corners):
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+        area = np.linalg.norm(
+            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+        )
         flat = area <= 1e-12 * sides.max(axis=1) ** 2
         small = sides.max(axis=1) <= edge
         done.append((corners[small & ~flat], face[small & ~flat]))
         count += len(done[-1][0])
         corners, face, sides = (array[~small & ~flat] for array in (corners, face, sides))
         if count + 2 * len(corners) > MOST_FACETS:
-            raise InputError(f"furniture: more than {MOST_FACETS} facets of {edge:.3g} m; leave pieces out or move them away")
+            raise InputError(
+                f"furniture: more than {MOST_FACETS} facets of {edge:.3g} m; leave pieces out or move them away"
+            )
         # The longest side from corner 0 to corner 1.
-        turned = np.take_along_axis(corners, ((sides.argmax(axis=1)[:, None] + np.arange(3)) % 3)[..., None], axis=1)
+        turned = np.take_along_axis(
+            corners, ((sides.argmax(axis=1)[:, None] + np.arange(3)) % 3)[..., None], axis=1
+        )
         middle = (turned[:, 0] + turned[:, 1]) / 2
-        halves = [np.stack([turned[:, 0], middle, turned[:, 2]], axis=1), np.stack([middle, turned[:, 1], turned[:, 2]], axis=1)]
+        halves = [
+            np.stack([turned[:, 0], middle, turned[:, 2]], axis=1),
+            np.stack([middle, turned[:, 1], turned[:, 2]], axis=1),
+        ]
         corners, face = np.concatenate(halves), np.tile(face, 2)
-    return MeshGrid(np.concatenate([part for part, _ in done]), np.concatenate([part for _, part in done]))
+    return MeshGrid(
+        np.concatenate([part for part, _ in done]), np.concatenate([part for _, part in done])
+    )
 
 
-def _returns(piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid, radar: Radar, scene: Scene) -> RoomEchoes | None:
+def _returns(
+    piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid, radar: Radar, scene: Scene
+) -> RoomEchoes | None:
     bounces = 1 if closed else SHEET_BOUNCES
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
     shooter = Shooter(
@@ -149,14 +166,27 @@ def _returns(piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid,
     chains = [PathGroups(grid.tubes.places, radar, order) for order in range(2, bounces + 1)]
     nodes = sweep_nodes(radar, FURNITURE_NODES)
     shots = [
-        _shot(shooter.shoot(tx), surfaces, piece.material, groups, chains, tx, radar.rx[radar.rx_of_tx[index]], nodes, radar)
+        _shot(
+            shooter.shoot(tx),
+            surfaces,
+            piece.material,
+            groups,
+            chains,
+            tx,
+            radar.rx[radar.rx_of_tx[index]],
+            nodes,
+            radar,
+        )
         for index, tx in enumerate(radar.tx)
     ]
     amplitude = np.stack([shot.amplitude for shot in shots], axis=1)
     if not amplitude.any():
         return None
     centres = np.concatenate([groups.centres, *(chain.centres() for chain in chains)])
-    bounced = [np.ones(len(groups.centres)), *(np.full(chain.count, chain.order) for chain in chains)]
+    bounced = [
+        np.ones(len(groups.centres)),
+        *(np.full(chain.count, chain.order) for chain in chains),
+    ]
     returns = RoomEchoes(
         name=piece.name,
         kind="furniture" if closed else "reflector",
@@ -190,20 +220,29 @@ def _shot(
     radar: Radar,
 ) -> _Shot:
     wavenumber = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
-    lengths = [np.linalg.norm(rx[:, None] - groups.centres, axis=-1) + np.linalg.norm(tx - groups.centres, axis=-1)]
+    lengths = [
+        np.linalg.norm(rx[:, None] - groups.centres, axis=-1)
+        + np.linalg.norm(tx - groups.centres, axis=-1)
+    ]
     sums = []
     for order, footprints in enumerate(sets):
-        group = chains[order - 1].of(footprints, tx) if order else groups.of(footprints.places[:, 3])
+        group = (
+            chains[order - 1].of(footprints, tx) if order else groups.of(footprints.places[:, 3])
+        )
         if order:
             lengths.append(chains[order - 1].lengths(footprints, group, tx, rx))
         visible = exits(surfaces, footprints, rx)
         turn, lit = _reflected(footprints, material, radar.centre_frequency_hz)
-        total = turn * radiate(lit, visible, group, rx, wavenumber, lengths[-1], polarization=radar.polarization)
+        total = turn * radiate(
+            lit, visible, group, rx, wavenumber, lengths[-1], polarization=radar.polarization
+        )
         sums.append(total)
     return _Shot(np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj())
 
 
-def _reflected(footprints: Footprints, material: Material, frequency_hz: float) -> tuple[complex, Footprints]:
+def _reflected(
+    footprints: Footprints, material: Material, frequency_hz: float
+) -> tuple[complex, Footprints]:
     """Footprints whose fields, sent back by a conductor, times this factor, are what the material sends back.
 
     The factor is the turn of the phase straight on; how it changes with the angle, 1 % of the field in wood, is left out.
@@ -221,4 +260,6 @@ def _reflected(footprints: Footprints, material: Material, frequency_hz: float) 
     straight = reflection(eta, 1.0, "tm")
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j
     factors = [(reflection(eta, cosine, kind) / turn).real[:, None] for kind in _POLARIZATIONS]
-    return turn, replace(footprints, field=factors[1] * (footprints.field - in_te) - factors[0] * in_te)
+    return turn, replace(
+        footprints, field=factors[1] * (footprints.field - in_te) - factors[0] * in_te
+    )

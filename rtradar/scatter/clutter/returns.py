@@ -72,16 +72,25 @@ class RoomEchoes:
         """Largest power of any channel in any range bin, its echoes added with their phases [m^2]."""
         middle = len(self.frequency) // 2
         wavenumber = 2 * np.pi * self.frequency[middle] / SPEED_OF_LIGHT_MPS
-        field = (self.amplitude[middle] * np.exp(1j * wavenumber * self.length)).reshape(-1, self.n_echoes)
-        bins = np.minimum(self.length / (2 * radar.range_bin_m), radar.samples_per_chirp).astype(np.int64)
+        field = (self.amplitude[middle] * np.exp(1j * wavenumber * self.length)).reshape(
+            -1, self.n_echoes
+        )
+        bins = np.minimum(self.length / (2 * radar.range_bin_m), radar.samples_per_chirp).astype(
+            np.int64
+        )
         strongest = 0.0
         # Once more with bins half a bin further: no pair of neighbours is always parted.
-        shifted = np.minimum(self.length / (2 * radar.range_bin_m) + 0.5, radar.samples_per_chirp).astype(np.int64)
+        shifted = np.minimum(
+            self.length / (2 * radar.range_bin_m) + 0.5, radar.samples_per_chirp
+        ).astype(np.int64)
         for cells in (bins.reshape(field.shape), shifted.reshape(field.shape)):
             channel = np.arange(len(field))[:, None] * (radar.samples_per_chirp + 1)
             # Beyond the last bin the low-pass lets nothing through.
             heard = cells < radar.samples_per_chirp
-            sums = [np.bincount((channel + cells)[heard], weights=part[heard], minlength=1) for part in (field.real, field.imag)]
+            sums = [
+                np.bincount((channel + cells)[heard], weights=part[heard], minlength=1)
+                for part in (field.real, field.imag)
+            ]
             strongest = max(strongest, float((sums[0] ** 2 + sums[1] ** 2).max()))
         return strongest
 
@@ -102,7 +111,9 @@ class RoomEchoes:
 
     def at_nodes(self, frequency: Array, radar: Radar) -> NDArray[np.complex128]:
         """Amplitudes (node, tx, rx, echo) of the polynomial at other frequencies (node,) [Hz]."""
-        return np.asarray(np.tensordot(_weights(self.frequency, frequency, radar), self.amplitude, axes=1))
+        return np.asarray(
+            np.tensordot(_weights(self.frequency, frequency, radar), self.amplitude, axes=1)
+        )
 
     def with_fewest_nodes(self, radar: Radar, error: float = FREQUENCY_ERROR) -> RoomEchoes:
         """With the fewest frequency nodes that keep the amplitudes within this of the strongest; see ``off_m``."""
@@ -137,4 +148,6 @@ def sweep_nodes(radar: Radar, count: int) -> Array:
 def _weights(nodes: Array, places: Array, radar: Radar) -> Array:
     """Weights (place, node) of values at nodes in the polynomial through them; Chebyshev's keep all digits."""
     x, y = (2 * (f - radar.centre_frequency_hz) / radar.bandwidth_hz for f in (nodes, places))
-    return np.asarray(np.linalg.solve(chebvander(x, len(nodes) - 1).T, chebvander(y, len(nodes) - 1).T).T)
+    return np.asarray(
+        np.linalg.solve(chebvander(x, len(nodes) - 1).T, chebvander(y, len(nodes) - 1).T).T
+    )

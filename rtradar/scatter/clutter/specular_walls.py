@@ -21,9 +21,23 @@ from numpy.typing import NDArray
 
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.behind_walls import ENOUGH, FAINT, delayed
-from rtradar.scatter.clutter.returns import DENSE_NODES, FREQUENCY_ERROR, RoomEchoes, best_followed, sweep_nodes
+from rtradar.scatter.clutter.returns import (
+    DENSE_NODES,
+    FREQUENCY_ERROR,
+    RoomEchoes,
+    best_followed,
+    sweep_nodes,
+)
 from rtradar.scatter.multipath.slab_series import whole_walls
-from rtradar.scatter.multipath.wall_interaction import Series, height, image, inside, reflected, setting_out, through_walls
+from rtradar.scatter.multipath.wall_interaction import (
+    Series,
+    height,
+    image,
+    inside,
+    reflected,
+    setting_out,
+    through_walls,
+)
 from rtradar.scatter.ray_tubes.footprints import across
 from rtradar.scene import Scene, Wall
 from rtradar.trace.room_tracer import RoomTracer
@@ -35,7 +49,9 @@ _EDGE_M = 1e-9
 """So near to an edge a point lies on it: rounding is a millionth of that."""
 
 
-def mirror_returns(radar: Radar, scene: Scene, tracer: RoomTracer, order: int) -> Iterator[RoomEchoes]:
+def mirror_returns(
+    radar: Radar, scene: Scene, tracer: RoomTracer, order: int
+) -> Iterator[RoomEchoes]:
     """Mirror reflections of up to ``order`` walls, one object for each sequence of walls.
 
     Parameters
@@ -63,13 +79,17 @@ def mirror_returns(radar: Radar, scene: Scene, tracer: RoomTracer, order: int) -
                     yield returns
 
 
-def _between(faces: list[Face], lit: list[Face], heard: list[Face], bounces: int) -> list[list[Face]]:
+def _between(
+    faces: list[Face], lit: list[Face], heard: list[Face], bounces: int
+) -> list[list[Face]]:
     if bounces == 1:
         return [[face for face in lit if face in heard]]
     return [lit, *[faces] * (bounces - 2), heard]
 
 
-def specular_points(sequence: tuple[Face, ...], tx: Array, rx: Array) -> tuple[Array, Array, Array, Array]:
+def specular_points(
+    sequence: tuple[Face, ...], tx: Array, rx: Array
+) -> tuple[Array, Array, Array, Array]:
     """Path over a sequence of faces by images of images.
 
     Parameters
@@ -103,7 +123,11 @@ def specular_points(sequence: tuple[Face, ...], tx: Array, rx: Array) -> tuple[A
         meets = (above > -_EDGE_M) & (below < -_EDGE_M)
         share = np.where(meets, above, np.nan) / np.where(meets, above - below, 1.0)
         here = here + share[..., None] * (behind - here)
-        weight *= (above > -slack) & meets & np.stack([inside(wall, here, margin) for margin in slack.ravel()])
+        weight *= (
+            (above > -slack)
+            & meets
+            & np.stack([inside(wall, here, margin) for margin in slack.ravel()])
+        )
         points.insert(0, here)
     for (wall, back), before in zip(sequence, [tx, *points[:-1]], strict=True):
         weight *= height(wall, before, back=back) > -slack
@@ -113,7 +137,9 @@ def specular_points(sequence: tuple[Face, ...], tx: Array, rx: Array) -> tuple[A
     return np.stack(points, axis=-2), ways / size, size[..., -1, 0], weight.mean(axis=0)
 
 
-def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, sequence: tuple[Face, ...]) -> RoomEchoes | None:
+def _follow(
+    radar: Radar, scene: Scene, tracer: RoomTracer, sequence: tuple[Face, ...]
+) -> RoomEchoes | None:
     tx, rx = radar.tx[:, None], radar.rx[radar.rx_of_tx]
     points, ways, length, weight = specular_points(sequence, tx, rx)
     stops = [np.broadcast_to(tx, rx.shape), *np.moveaxis(points, -2, 0), rx]
@@ -134,7 +160,9 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, sequence: tuple[Face
         frequency = sweep_nodes(radar, DENSE_NODES)
         waves = setting_out(sent, len(frequency))
         for index, number in enumerate(numbers):
-            waves = through_walls(scene, series, index, waves, ends[index], ends[index + 1], frequency)
+            waves = through_walls(
+                scene, series, index, waves, ends[index], ends[index + 1], frequency
+            )
             waves = reflected(scene, series, number, index + 1, waves, legs[:, index], frequency)
         waves = through_walls(scene, series, len(numbers), waves, ends[-2], ends[-1], frequency)
         spread = -2 * sqrt(pi) * (weight / length).ravel()[which]
@@ -158,4 +186,6 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, sequence: tuple[Face
             points=np.repeat(points[:, :, None], len(worth), axis=2),
         ).with_fewest_nodes(radar, FREQUENCY_ERROR if len(worth) == 1 else ENOUGH)
 
-    return best_followed((lambda: in_terms(whole_walls(scene.walls)), lambda: in_terms(delayed(scene, radar))))
+    return best_followed(
+        (lambda: in_terms(whole_walls(scene.walls)), lambda: in_terms(delayed(scene, radar)))
+    )

@@ -97,12 +97,23 @@ class Clutter:
     """
 
     def __init__(
-        self, radar: Radar, scene: Scene, *, variant: str = "auto", spreading: bool = True, seed: int = 0, order: int = 2
+        self,
+        radar: Radar,
+        scene: Scene,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        seed: int = 0,
+        order: int = 2,
     ) -> None:
         if isinstance(order, bool) or not (isinstance(order, int) and 0 <= order <= MOST_ORDER):
-            raise InputError(f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path")
+            raise InputError(
+                f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
+            )
         if not spreading and (scene.walls or scene.furniture):
-            raise InputError(f"clutter: no spreading in scene '{scene.name}'; it can be left out in free space only")
+            raise InputError(
+                f"clutter: no spreading in scene '{scene.name}'; it can be left out in free space only"
+            )
         backend = select(variant)
         mi = use(backend)
         self.radar, self.variant = radar, backend.kind
@@ -143,12 +154,21 @@ class Clutter:
             Another one; what it lacks is in its ``dropped``, with the reason.
         """
         gain = self.radar.samples_per_chirp * self.radar.cycles_per_frame * self.radar.n_channels
-        over = [item.cell_m2 * gain / noise_power_m2 if noise_power_m2 > 0 else math.inf for item in self.kept]
+        over = [
+            item.cell_m2 * gain / noise_power_m2 if noise_power_m2 > 0 else math.inf
+            for item in self.kept
+        ]
         above = [index for index, ratio in enumerate(over) if ratio >= 10 ** (-margin_db / 10)]
         pruned = copy.copy(self)
-        pruned.objects, pruned.kept = tuple(self.objects[index] for index in above), tuple(self.kept[index] for index in above)
+        pruned.objects, pruned.kept = (
+            tuple(self.objects[index] for index in above),
+            tuple(self.kept[index] for index in above),
+        )
         pruned.dropped = self.dropped + tuple(
-            replace(item, reason=f"{-10 * math.log10(ratio):.0f} dB below the noise in its strongest cell, after all gain")
+            replace(
+                item,
+                reason=f"{-10 * math.log10(ratio):.0f} dB below the noise in its strongest cell, after all gain",
+            )
             for index, (item, ratio) in enumerate(zip(self.kept, over, strict=True))
             if index not in above
         )
@@ -171,22 +191,33 @@ class Clutter:
 
     def echoes(self) -> Echoes:
         """All echoes of one TDM cycle in one, at the frequencies of the object that needs most; ``part`` as in `cycle`."""
-        frequency = sweep_nodes(self.radar, max((len(own.frequency) for own in self.objects), default=1))
+        frequency = sweep_nodes(
+            self.radar, max((len(own.frequency) for own in self.objects), default=1)
+        )
         shape = (self.radar.n_tx, self.radar.n_rx, 0)
         amplitudes = [own.at_nodes(frequency, self.radar) for own in self.objects]
         return Echoes(
-            length=np.concatenate([np.empty(shape), *(own.length for own in self.objects)], axis=-1),
-            amplitude=np.concatenate([np.empty((len(frequency), *shape), dtype=np.complex128), *amplitudes], axis=-1),
+            length=np.concatenate(
+                [np.empty(shape), *(own.length for own in self.objects)], axis=-1
+            ),
+            amplitude=np.concatenate(
+                [np.empty((len(frequency), *shape), dtype=np.complex128), *amplitudes], axis=-1
+            ),
             frequency=frequency,
             tx=np.arange(self.radar.n_tx),
-            part=-1 - np.repeat(np.arange(len(self.objects)), [own.n_echoes for own in self.objects]),
-            bounces=np.concatenate([np.empty(0, dtype=np.int64), *(own.bounces for own in self.objects)]),
+            part=-1
+            - np.repeat(np.arange(len(self.objects)), [own.n_echoes for own in self.objects]),
+            bounces=np.concatenate(
+                [np.empty(0, dtype=np.int64), *(own.bounces for own in self.objects)]
+            ),
         )
 
 
 def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:
     """Refuse a room whose strongest echoes are not followed over the sweep, by what is known to be wrong of all others."""
-    strongest = max((float(np.abs(echoes.amplitude).max(initial=0.0)) for echoes in found), default=0.0)
+    strongest = max(
+        (float(np.abs(echoes.amplitude).max(initial=0.0)) for echoes in found), default=0.0
+    )
     for echoes in found:
         if echoes.off_m > FREQUENCY_ERROR * strongest:
             raise InputError(
@@ -198,4 +229,6 @@ def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:
 
 def _item(echoes: RoomEchoes, radar: Radar) -> ClutterItem:
     power, cell = echoes.power_m2(), echoes.strongest_cell_m2(radar)
-    return ClutterItem(echoes.name, echoes.kind, int(echoes.bounces.max()), echoes.n_echoes, power, cell)
+    return ClutterItem(
+        echoes.name, echoes.kind, int(echoes.bounces.max()), echoes.n_echoes, power, cell
+    )

@@ -41,13 +41,21 @@ class ArrayEnds:
     @classmethod
     def of(cls, radar: Radar) -> ArrayEnds:
         """Those of this radar."""
-        lines = [np.arange(first, last) for first, last in ((0, radar.tx_y), (radar.tx_y, radar.n_tx)) if last > first]
+        lines = [
+            np.arange(first, last)
+            for first, last in ((0, radar.tx_y), (radar.tx_y, radar.n_tx))
+            if last > first
+        ]
         line_of_tx = np.repeat(np.arange(len(lines)), [len(line) for line in lines])
         tx_weight = np.concatenate([_straight(len(line)) for line in lines])
         tx_ends, rx_ends, rx_weights = [], [], []
         for line in lines:
             heard = radar.rx_of_tx[line[0]]
-            groups = [np.flatnonzero(chosen) for chosen in (heard < radar.rx_y, heard >= radar.rx_y) if chosen.any()]
+            groups = [
+                np.flatnonzero(chosen)
+                for chosen in (heard < radar.rx_y, heard >= radar.rx_y)
+                if chosen.any()
+            ]
             weight = np.zeros((len(heard), 2 * len(groups)))
             for column, group in enumerate(groups):
                 weight[group, 2 * column : 2 * column + 2] = _straight(len(group))

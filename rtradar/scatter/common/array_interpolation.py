@@ -42,7 +42,10 @@ def _blocks(radar: Radar, along: tuple[int, int]) -> Iterator[_Block]:
         for rx_line in (np.flatnonzero(kept < radar.rx_y), np.flatnonzero(kept >= radar.rx_y)):
             if len(rx_line):
                 tx, rx = radar.tx[tx_line], radar.rx[kept[rx_line]]
-                nodes = (_evenly(min(count, len(line))) for count, line in zip(along, (tx, rx), strict=True))
+                nodes = (
+                    _evenly(min(count, len(line)))
+                    for count, line in zip(along, (tx, rx), strict=True)
+                )
                 yield _Block(tx_line, rx_line, np.stack([tx[[0, -1]], rx[[0, -1]]]), *nodes)
 
 
@@ -54,7 +57,9 @@ def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
     """
     places: list[NDArray[np.float64]] = []
     blocks = list(_blocks(radar, (along_tx, along_rx)))
-    weights = np.zeros((radar.n_tx, radar.n_rx, sum(len(block.tx_nodes) * len(block.rx_nodes) for block in blocks)))
+    weights = np.zeros(
+        (radar.n_tx, radar.n_rx, sum(len(block.tx_nodes) * len(block.rx_nodes) for block in blocks))
+    )
     done = 0
     for block in blocks:
         tx, rx = (
@@ -62,9 +67,14 @@ def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
             for ends, nodes in zip(block.ends, (block.tx_nodes, block.rx_nodes), strict=True)
         )
         places.append(np.stack([np.repeat(tx, len(rx), axis=0), np.tile(rx, (len(tx), 1))], axis=1))
-        own = np.kron(_lagrange(block.tx_nodes, _evenly(len(block.tx))), _lagrange(block.rx_nodes, _evenly(len(block.rx))))
+        own = np.kron(
+            _lagrange(block.tx_nodes, _evenly(len(block.tx))),
+            _lagrange(block.rx_nodes, _evenly(len(block.rx))),
+        )
         count = own.shape[1]
-        weights[np.ix_(block.tx, block.rx, np.arange(done, done + count))] = own.reshape(len(block.tx), len(block.rx), count)
+        weights[np.ix_(block.tx, block.rx, np.arange(done, done + count))] = own.reshape(
+            len(block.tx), len(block.rx), count
+        )
         done += count
     pairs = np.concatenate(places)
     antennas, where = np.unique(pairs.reshape(-1, 3), axis=0, return_inverse=True)
@@ -75,7 +85,12 @@ def spread_nodes(radar: Radar, few: tuple[int, int], many: tuple[int, int]) -> N
     """Weights (pair of many, pair of few) of what was found at the nodes of a coarse `array_nodes` for those of a fine one."""
     blocks = zip(_blocks(radar, few), _blocks(radar, many), strict=True)
     return np.asarray(
-        block_diag(*(np.kron(_lagrange(a.tx_nodes, b.tx_nodes), _lagrange(a.rx_nodes, b.rx_nodes)) for a, b in blocks))
+        block_diag(
+            *(
+                np.kron(_lagrange(a.tx_nodes, b.tx_nodes), _lagrange(a.rx_nodes, b.rx_nodes))
+                for a, b in blocks
+            )
+        )
     )
 
 

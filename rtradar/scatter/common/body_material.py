@@ -66,7 +66,9 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     eta = eta.reshape(-1, *(1,) * cosine.ndim)
     te, tm = (reflection(eta, cosine, kind)[..., None] for kind in ("te", "tm"))
     # A conductor has -1 and +1; straight on their sum vanishes, and with it the need for a plane of incidence.
-    return np.asarray(tm * turned - (te + tm) * np.sum(turned * across, axis=-1, keepdims=True) * across)
+    return np.asarray(
+        tm * turned - (te + tm) * np.sum(turned * across, axis=-1, keepdims=True) * across
+    )
 
 
 def antenna_field(directions: Array, polarization: Literal["v", "h"]) -> Array:
@@ -75,7 +77,9 @@ def antenna_field(directions: Array, polarization: Literal["v", "h"]) -> Array:
     v is world z projected across the direction, h is across both.
     """
     up = np.array([0.0, 0.0, 1.0])
-    field = up - directions[..., 2:] * directions if polarization == "v" else np.cross(directions, up)
+    field = (
+        up - directions[..., 2:] * directions if polarization == "v" else np.cross(directions, up)
+    )
     size = np.linalg.norm(field, axis=-1, keepdims=True)
     return np.asarray(np.where(size > 1e-12, field / np.where(size > 1e-12, size, 1.0), 0.0))
 
@@ -87,7 +91,9 @@ def bisector(to_tx: Array, to_rx: Array) -> Array:
     return np.asarray(middle / np.where(size > 1e-12, size, 1.0))
 
 
-def material_factor(to_tx: Array, to_rx: Array, eta: Field, polarization: Literal["v", "h"]) -> Field:
+def material_factor(
+    to_tx: Array, to_rx: Array, eta: Field, polarization: Literal["v", "h"]
+) -> Field:
     """Co-polar echo over that of a perfect conductor of the same shape.
 
     Parameters

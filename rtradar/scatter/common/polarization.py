@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def copolar(to_tx: NDArray[np.float64], to_rx: NDArray[np.float64], polarization: Literal["v", "h"]) -> NDArray[np.float64]:
+def copolar(
+    to_tx: NDArray[np.float64], to_rx: NDArray[np.float64], polarization: Literal["v", "h"]
+) -> NDArray[np.float64]:
     """Share of the field that stays in its polarisation, reflected by a mirror whose normal halves the angle of Tx and Rx.
 
     Parameters
@@ -36,8 +38,12 @@ def copolar(to_tx: NDArray[np.float64], to_rx: NDArray[np.float64], polarization
     size = np.linalg.norm(normal, axis=-1, keepdims=True)
     normal = normal / np.where(size > 1e-12, size, 1.0)
     up = np.array([0.0, 0.0, 1.0])
-    sent, heard = (np.cross(up, way) if polarization == "h" else up - way[..., 2:] * way for way in (tx, rx))
+    sent, heard = (
+        np.cross(up, way) if polarization == "h" else up - way[..., 2:] * way for way in (tx, rx)
+    )
     norms = np.linalg.norm(sent, axis=-1) * np.linalg.norm(heard, axis=-1)
-    share = np.sum(sent * heard, axis=-1) - 2 * np.sum(sent * normal, axis=-1) * np.sum(heard * normal, axis=-1)
+    share = np.sum(sent * heard, axis=-1) - 2 * np.sum(sent * normal, axis=-1) * np.sum(
+        heard * normal, axis=-1
+    )
     known = (norms > 1e-12) & (size[..., 0] > 1e-12)
     return np.asarray(np.where(known, share / np.where(known, norms, 1.0), 1.0))

@@ -91,7 +91,10 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
 
 
 def one_echo_a_part(
-    tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.float64], frequency_hz: float
+    tx: NDArray[np.int64],
+    length: NDArray[np.float64],
+    amplitude: NDArray[np.float64],
+    frequency_hz: float,
 ) -> Echoes:
     """Echoes of single reflections, one a part, that do not change over the sweep.
 

@@ -54,7 +54,10 @@ def warn_of_small_radii(
         normal += sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     # Opposite antennas have no such normal, and no echo.
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    theta, phi = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
+    theta, phi = (
+        np.arccos(np.clip(normal[..., 2], -1, 1)),
+        np.arctan2(normal[..., 1], normal[..., 0]),
+    )
     a, b, c = target.semi_axes.T
     smaller, _ = ellipsoid_radii(a, b, c, theta, phi)
     small = wavenumber[:, None] * smaller < MINIMUM_KA

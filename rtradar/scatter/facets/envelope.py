@@ -74,24 +74,43 @@ class Envelope:
     """
 
     def __init__(
-        self, sample: Callable[[float, NDArray[np.int64], float | None], Sample], parts: int, tolerance: float, end: int
+        self,
+        sample: Callable[[float, NDArray[np.int64], float | None], Sample],
+        parts: int,
+        tolerance: float,
+        end: int,
     ) -> None:
-        self._sample, self._parts, self._tolerance, self._end = sample, np.arange(parts), tolerance, end
+        self._sample, self._parts, self._tolerance, self._end = (
+            sample,
+            np.arange(parts),
+            tolerance,
+            end,
+        )
         self._anchors: FirstCome[int, Sample] = FirstCome(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def prepare_anchors(self, indices: Iterable[int]) -> None:
         """Find these anchors, of `TOGETHER` intervals at the most, with all cores: one by itself has too little to share."""
-        missing = [index for index in sorted({min(index, self._end) for index in indices}) if index not in self._anchors]
-        found = in_threads(lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing)))
+        missing = [
+            index
+            for index in sorted({min(index, self._end) for index in indices})
+            if index not in self._anchors
+        ]
+        found = in_threads(
+            lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing))
+        )
         for index, sample in zip(missing, found, strict=True):
             self._anchors.keep(index, sample)
 
     def prepare_courses(self, indices: Iterable[int]) -> None:
         """The same for the courses of these intervals."""
-        around = sorted({index + step for index in indices for step in (-1, 0, 1) if index + step >= 0})
+        around = sorted(
+            {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
+        )
         missing = [index for index in around if index not in self._intervals]
-        self.prepare_anchors(index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0)
+        self.prepare_anchors(
+            index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0
+        )
         ends = [self._ends(index) for index in missing]
         found = in_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
         self._intervals.update(zip(missing, found, strict=True))
@@ -111,7 +130,16 @@ class Envelope:
         here, after = self._intervals[index], self._intervals[index + 1]
         before = self._intervals[index - 1] if index > 0 else here
         slope = np.empty_like(here.ratio)
-        _find_slopes(index > 0, before.ratio, before.known, here.ratio, here.known, after.ratio, after.known, slope)
+        _find_slopes(
+            index > 0,
+            before.ratio,
+            before.known,
+            here.ratio,
+            here.known,
+            after.ratio,
+            after.known,
+            slope,
+        )
         return Course(here.ratio, slope, here.known)
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
@@ -119,7 +147,9 @@ class Envelope:
         before = self.anchor(index - 1) if index > 0 else None
         return before, self.anchor(index), self.anchor(index + 1), self.anchor(index + 2)
 
-    def _divided(self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample) -> _Interval:
+    def _divided(
+        self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample
+    ) -> _Interval:
         ratio = np.full((PIECES + 1, *first.ratio.shape), np.nan + 0j)
         ratio[0], ratio[PIECES] = first.ratio, last.ratio
         known = np.zeros((PIECES + 1, len(self._parts)), dtype=bool)
@@ -153,13 +183,18 @@ class Envelope:
         found = self._sample(index + middle / PIECES, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
-        bend = _bend(ratio[left][:, :, parts], found.ratio, ratio[right][:, :, parts], found.strength)
+        bend = _bend(
+            ratio[left][:, :, parts], found.ratio, ratio[right][:, :, parts], found.strength
+        )
         for ends in ((left, middle), (middle, right)):
             self._divide(index, ratio, known, *ends, parts[bend > self._tolerance * whole], whole)
 
 
 def _bend(
-    before: NDArray[np.complex128], here: NDArray[np.complex128], after: NDArray[np.complex128], strength: NDArray[np.float64]
+    before: NDArray[np.complex128],
+    here: NDArray[np.complex128],
+    after: NDArray[np.complex128],
+    strength: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Second difference of the echo of each part (part,), the largest over frequencies and pairs [m]."""
     return np.asarray((np.abs(before - 2 * here + after) * strength).max(axis=(0, 1)))
@@ -171,7 +206,7 @@ def whole_echo(sample: Sample) -> float:
 
 
 @compiled()
-def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, known_after, slope):  # type: ignore[no-untyped-def]
+def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, known_after, slope):
     """Slopes per place (place, node, pair, part) where a part is known; at the very start that of a straight line."""
     nodes, pairs, parts = ratio.shape[1:]
     for part in range(parts):
@@ -193,17 +228,27 @@ def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, 
             for node in range(nodes):
                 for pair in range(pairs):
                     value = ratio[place, node, pair, part]
-                    last = ratio[left, node, pair, part] if left >= 0 else ratio_before[beyond, node, pair, part]
-                    following = ratio[right, node, pair, part] if right <= PIECES else ratio_after[beyond, node, pair, part]
+                    last = (
+                        ratio[left, node, pair, part]
+                        if left >= 0
+                        else ratio_before[beyond, node, pair, part]
+                    )
+                    following = (
+                        ratio[right, node, pair, part]
+                        if right <= PIECES
+                        else ratio_after[beyond, node, pair, part]
+                    )
                     rise, next_rise = (value - last) / gap, (following - value) / next_gap
                     if left < 0 and not inside:
                         rise = next_rise
-                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (gap + next_gap)
+                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (
+                        gap + next_gap
+                    )
             left = place
 
 
 @inlined()
-def stretch(known, place):  # type: ignore[no-untyped-def]
+def stretch(known, place):
     """The known places (place,) on either side of one in 0 to `PIECES`."""
     left = min(int(place), PIECES - 1)
     right = left + 1
@@ -215,8 +260,13 @@ def stretch(known, place):  # type: ignore[no-untyped-def]
 
 
 @inlined()
-def hermite(place, left, right):  # type: ignore[no-untyped-def]
+def hermite(place, left, right):
     """Weights of the values at two places and of the slopes there in the cubic between them."""
     step = right - left
     t = (place - left) / step
-    return (1 + 2 * t) * (1 - t) ** 2, t * t * (3 - 2 * t), step * t * (1 - t) ** 2, step * t * t * (t - 1)
+    return (
+        (1 + 2 * t) * (1 - t) ** 2,
+        t * t * (3 - 2 * t),
+        step * t * (1 - t) ** 2,
+        step * t * t * (t - 1),
+    )

@@ -21,13 +21,15 @@ from rtradar.system.threads import in_threads
 
 
 @inlined()
-def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):  # type: ignore[no-untyped-def]
+def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
     """Facets that any of the antennas may light, by the ball round them all; their count."""
     count_antennas = len(antennas)
     x, y, z = antennas[:, 0].mean(), antennas[:, 1].mean(), antennas[:, 2].mean()
     spread = 0.0
     for antenna in antennas:
-        spread = max(spread, math.sqrt((antenna[0] - x) ** 2 + (antenna[1] - y) ** 2 + (antenna[2] - z) ** 2))
+        spread = max(
+            spread, math.sqrt((antenna[0] - x) ** 2 + (antenna[1] - y) ** 2 + (antenna[2] - z) ** 2)
+        )
     farthest = math.sqrt(x * x + y * y + z * z) + spread + size
     count = 0
     for f in range(len(planes)):
@@ -42,7 +44,7 @@ def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
 
 
 @inlined(fastmath=FAST)
-def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
+def _excess(antenna, x, y, z, out):
     """Path from the antenna to each vertex less that to the origin, which is returned."""
     a, b, c = antenna[0], antenna[1], antenna[2]
     distance = math.sqrt(a * a + b * b + c * c)
@@ -55,7 +57,7 @@ def _excess(antenna, x, y, z, out):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath=FAST)
-def _see(antenna, distance, excess, corners, facing, chosen, seen, view):  # type: ignore[no-untyped-def]
+def _see(antenna, distance, excess, corners, facing, chosen, seen, view):
     """Rows of ``view`` for the chosen facets: mean path, two deviations from it, n.s, and the share that is seen."""
     a, b, c = antenna[0], antenna[1], antenna[2]
     first_of, second_of, third_of = corners[0], corners[1], corners[2]
@@ -72,7 +74,7 @@ def _see(antenna, distance, excess, corners, facing, chosen, seen, view):  # typ
 
 
 @inlined(fastmath=FAST)
-def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u, v, strength):  # type: ignore[no-untyped-def]
+def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u, v, strength):
     """Mean path, two deviations from it and strength of facets under two views."""
     tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
     rx_mean, rx_u, rx_v, rx_facing, rx_seen = rx[0], rx[1], rx[2], rx[3], rx[4]
@@ -92,8 +94,24 @@ def _light(tx, rx, areas, bend, both, far_t, far_r, carrier, spreading, mean, u,
 
 
 @compiled()
-def _integrate(  # type: ignore[no-untyped-def]
-    begin, end, vertices, faces, normals, areas, bend, both, part, antennas, row, seen, pairs, carrier, k, spreading, out
+def _integrate(
+    begin,
+    end,
+    vertices,
+    faces,
+    normals,
+    areas,
+    bend,
+    both,
+    part,
+    antennas,
+    row,
+    seen,
+    pairs,
+    carrier,
+    k,
+    spreading,
+    out,
 ):
     """Fill the tasks from begin to end."""
     count_antennas = antennas.shape[1]
@@ -109,9 +127,21 @@ def _integrate(  # type: ignore[no-untyped-def]
             size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
         for f in range(n_facets):
             i = faces[f, 0]
-            planes[f] = normals[own, f, 0] * x[i] + normals[own, f, 1] * y[i] + normals[own, f, 2] * z[i]
+            planes[f] = (
+                normals[own, f, 0] * x[i] + normals[own, f, 1] * y[i] + normals[own, f, 2] * z[i]
+            )
         lit = np.empty(n_facets, dtype=np.uint32)
-        count = _may_be_lit(antennas[task], planes, normals[own], bend[own], both, math.sqrt(size), seen, row[task], lit)
+        count = _may_be_lit(
+            antennas[task],
+            planes,
+            normals[own],
+            bend[own],
+            both,
+            math.sqrt(size),
+            seen,
+            row[task],
+            lit,
+        )
         chosen = lit[:count]
         # Side by side, and without a sign: what may be counted from an array's end keeps a loop from vector lanes.
         corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
@@ -125,15 +155,44 @@ def _integrate(  # type: ignore[no-untyped-def]
         for antenna in range(count_antennas):
             place = antennas[task, antenna]
             far[antenna] = _excess(place, x, y, z, excess)
-            _see(place, far[antenna], excess, corners, facing, chosen, seen[row[task, antenna]], view[antenna])
+            _see(
+                place,
+                far[antenna],
+                excess,
+                corners,
+                facing,
+                chosen,
+                seen[row[task, antenna]],
+                view[antenna],
+            )
         own_areas, own_bend = np.empty(count), np.empty(count)
         for i in range(count):
             own_areas[i], own_bend[i] = areas[own, chosen[i]], bend[own, chosen[i]]
-        mean, u, v, strength, room = np.empty(count), np.empty(count), np.empty(count), np.empty(count), np.empty(count + 1)
+        mean, u, v, strength, room = (
+            np.empty(count),
+            np.empty(count),
+            np.empty(count),
+            np.empty(count),
+            np.empty(count + 1),
+        )
         for pair in range(pairs.shape[0]):
             t, r = pairs[pair, 0], pairs[pair, 1]
             offset = carrier[task, pair] - far[t] - far[r]
-            _light(view[t], view[r], own_areas, own_bend, both, far[t], far[r], offset, spreading, mean, u, v, strength)
+            _light(
+                view[t],
+                view[r],
+                own_areas,
+                own_bend,
+                both,
+                far[t],
+                far[r],
+                offset,
+                spreading,
+                mean,
+                u,
+                v,
+                strength,
+            )
             largest = largest_spread(u, v, room)
             for node in range(k.shape[1]):
                 wave = k[task, node]
@@ -208,5 +267,8 @@ def facet_integral(
         out,
     )
     at_once = 1 if out.size * len(facets.faces) >= _PARALLEL_SHARES else max(1, len(part))
-    in_threads(lambda first: _integrate(first, min(first + at_once, len(part)), *given), range(0, len(part), at_once))
+    in_threads(
+        lambda first: _integrate(first, min(first + at_once, len(part)), *given),
+        range(0, len(part), at_once),
+    )
     return out

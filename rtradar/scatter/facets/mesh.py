@@ -66,13 +66,21 @@ def mesh_scattering(
     """
     _refuse_coarse(mesh, float(wavenumber.max()))
     corners, closed = np.ascontiguousarray(mesh.corners), mesh.closed
-    tracer = MeshTracer(use(select(variant)), corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
+    tracer = MeshTracer(
+        use(select(variant)), corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    )
     middle = corners.mean(axis=(0, 1))
     field = np.empty(len(tx), dtype=np.complex128)
     for pair in range(len(tx)):
         divided, face = _divide_bent(corners, tx[pair], rx[pair], wavenumber[pair])
-        divided, shares = _seen(tracer, divided, face, np.stack([tx[pair], rx[pair]]), closed, wavenumber[pair])
-        facets = mesh_facets(divided.reshape(-1, 3), np.arange(3 * len(divided)).reshape(-1, 3), both_sides=not closed)
+        divided, shares = _seen(
+            tracer, divided, face, np.stack([tx[pair], rx[pair]]), closed, wavenumber[pair]
+        )
+        facets = mesh_facets(
+            divided.reshape(-1, 3),
+            np.arange(3 * len(divided)).reshape(-1, 3),
+            both_sides=not closed,
+        )
         distances = np.linalg.norm(tx[pair]), np.linalg.norm(rx[pair])
         one = facet_integral(
             facets,
@@ -111,7 +119,9 @@ def _refuse_coarse(triangles: Triangles, wavenumber: float) -> None:
         )
 
 
-def _divide_bent(corners: Array, tx: Array, rx: Array, wavenumber: float) -> tuple[Array, NDArray[np.int64]]:
+def _divide_bent(
+    corners: Array, tx: Array, rx: Array, wavenumber: float
+) -> tuple[Array, NDArray[np.int64]]:
     """Divide facets until spherical waves are plane over each; corners (n, 3, 3), and the triangle each came from (n,)."""
     face = np.arange(len(corners))
     done: list[tuple[Array, NDArray[np.int64]]] = []
@@ -135,28 +145,47 @@ def _divide_bent(corners: Array, tx: Array, rx: Array, wavenumber: float) -> tup
 
 
 def _seen(
-    tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antennas: Array, closed: bool, wavenumber: float
+    tracer: MeshTracer,
+    corners: Array,
+    face: NDArray[np.int64],
+    antennas: Array,
+    closed: bool,
+    wavenumber: float,
 ) -> tuple[Array, NDArray[np.float32]]:
     """Divide facets on edges of shadows; their corners (n, 3, 3), and the share that each antenna sees (antenna, n)."""
     done: list[tuple[Array, Array]] = []
     for level in range(_DIVISIONS + 1):
-        shares = np.stack([_sampled(tracer, corners, face, antenna, closed) for antenna in antennas])
+        shares = np.stack(
+            [_sampled(tracer, corners, face, antenna, closed) for antenna in antennas]
+        )
         edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        mixed = ((shares > 0) & (shares < 1)).any(axis=0) & (edge > math.pi / (2 * wavenumber)) & (level < _DIVISIONS)
+        mixed = (
+            ((shares > 0) & (shares < 1)).any(axis=0)
+            & (edge > math.pi / (2 * wavenumber))
+            & (level < _DIVISIONS)
+        )
         done.append((corners[~mixed], shares[:, ~mixed]))
         corners, face = _quarter(corners[mixed]), np.repeat(face[mixed], 4)
         if not len(corners):
             break
-    return np.concatenate([kept for kept, _ in done]), np.concatenate([of for _, of in done], axis=1).astype(np.float32)
+    return np.concatenate([kept for kept, _ in done]), np.concatenate(
+        [of for _, of in done], axis=1
+    ).astype(np.float32)
 
 
-def _sampled(tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antenna: Array, closed: bool) -> Array:
+def _sampled(
+    tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antenna: Array, closed: bool
+) -> Array:
     """Share of four points of each facet that the antenna sees; those that face away from it are not asked about."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facing = np.flatnonzero((np.sum(normal * (antenna - corners[:, 0]), axis=1) > 0) | (not closed))
     points = _FOUR @ corners[facing]
     share = np.zeros(len(corners))
-    share[facing] = tracer.sees(antenna, points.reshape(-1, 3), np.repeat(face[facing], 4)).reshape(-1, 4).mean(axis=1)
+    share[facing] = (
+        tracer.sees(antenna, points.reshape(-1, 3), np.repeat(face[facing], 4))
+        .reshape(-1, 4)
+        .mean(axis=1)
+    )
     return share
 
 

@@ -46,14 +46,25 @@ class FacetBody:
         [Hz].
     """
 
-    def __init__(self, radar: Radar, body: Body, *, variant: str, spreading: bool, facets: int | None, nodes: int) -> None:
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str,
+        spreading: bool,
+        facets: int | None,
+        nodes: int,
+    ) -> None:
         self._radar, self._semi_axes, self._spreading = radar, body.semi_axes, spreading
         count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
         self._facets = ellipsoid_facets(body.semi_axes, subdivisions_for(count))
         self.frequency = frequency_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind
-        self._shadows = FacetShadows(FacetTracer(use(backend), body.semi_axes), self._facets, body.semi_axes)
+        self._shadows = FacetShadows(
+            FacetTracer(use(backend), body.semi_axes), self._facets, body.semi_axes
+        )
 
     def seen(
         self,
@@ -102,7 +113,9 @@ class FacetBody:
         """
         poses, n = len(centres), len(parts)
         chosen = centres[:, parts]
-        local = np.einsum("tpji,tpaj->tpai", frames[:, parts], antennas[:, None] - chosen[:, :, None])
+        local = np.einsum(
+            "tpji,tpaj->tpai", frames[:, parts], antennas[:, None] - chosen[:, :, None]
+        )
         field = facet_integral(
             self._facets,
             np.tile(parts, poses),
@@ -111,9 +124,15 @@ class FacetBody:
             seen.share,
             pairs,
             np.swapaxes(length, 1, 2).reshape(poses * n, len(pairs)),
-            np.broadcast_to(2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS, (poses * n, len(self.frequency))),
+            np.broadcast_to(
+                2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS, (poses * n, len(self.frequency))
+            ),
             spreading=self._spreading,
         )
-        field = np.moveaxis(field.reshape(poses, n, len(pairs), len(self.frequency)), (3, 0, 2, 1), (0, 1, 2, 3))
+        field = np.moveaxis(
+            field.reshape(poses, n, len(pairs), len(self.frequency)), (3, 0, 2, 1), (0, 1, 2, 3)
+        )
         to_tx, to_rx = (antennas[:, pairs[:, side], None] - chosen[:, None] for side in (0, 1))
-        return np.asarray(np.conj(field) * copolar(to_tx, to_rx, self._radar.polarization), dtype=np.complex128)
+        return np.asarray(
+            np.conj(field) * copolar(to_tx, to_rx, self._radar.polarization), dtype=np.complex128
+        )

@@ -21,7 +21,22 @@ from rtradar.trace.facet_visibility import FacetTracer
 
 
 @inlined()
-def _shares(occluder, antenna, part, centres, frames, semi_axes, vertices, corners, poses, clear, of, hidden, counts, out):  # type: ignore[no-untyped-def]
+def _shares(
+    occluder,
+    antenna,
+    part,
+    centres,
+    frames,
+    semi_axes,
+    vertices,
+    corners,
+    poses,
+    clear,
+    of,
+    hidden,
+    counts,
+    out,
+):
     """Shares of the facets of one part for one antenna; whether any of it is hidden.
 
     ``clear`` and ``of`` (vertex,) are room for what is known of the way to a vertex, and of which occluder; ``hidden
@@ -53,7 +68,9 @@ def _shares(occluder, antenna, part, centres, frames, semi_axes, vertices, corne
                     continue
                 if math.isnan(poses[other, 3, 0]):
                     own = poses[other]
-                    into_ball(part, other, antenna, centres, frames, semi_axes, own[:3], own[3], own[4])
+                    into_ball(
+                        part, other, antenna, centres, frames, semi_axes, own[:3], own[3], own[4]
+                    )
                 # Facets that meet at a vertex ask for the same way one after the other.
                 for k in range(3):
                     corner = c0 if k == 0 else c1 if k == 1 else c2
@@ -62,7 +79,11 @@ def _shares(occluder, antenna, part, centres, frames, semi_axes, vertices, corne
                         start_square, along, span = 0.0, 0.0, 0.0
                         for i in range(3):
                             start = poses[other, 4, i]
-                            way = poses[other, i, 0] * x + poses[other, i, 1] * y + poses[other, i, 2] * z
+                            way = (
+                                poses[other, i, 0] * x
+                                + poses[other, i, 1] * y
+                                + poses[other, i, 2] * z
+                            )
                             way += poses[other, 3, i] - start
                             start_square += start * start
                             along += start * way
@@ -74,19 +95,37 @@ def _shares(occluder, antenna, part, centres, frames, semi_axes, vertices, corne
 
 
 @compiled()
-def _all_shares(hidden_by, antennas, parts, centres, frames, semi_axes, vertices, corners, row, out):  # type: ignore[no-untyped-def]
+def _all_shares(
+    hidden_by, antennas, parts, centres, frames, semi_axes, vertices, corners, row, out
+):
     """Fill the rows from the second on; the first is that of parts in full view. How many are filled."""
     out[0] = 1.0
     count = 1
     # Of every part that may hide another: from that one's axes to those in which it is the unit ball, and the antenna in these.
     poses = np.empty((len(centres), 5, 3))
     clear, of = np.empty(vertices.shape[1]), np.empty(vertices.shape[1], dtype=np.int64)
-    hidden, counts = np.empty(vertices.shape[1], dtype=np.int32), np.empty(corners.shape[1], dtype=np.int32)
+    hidden, counts = (
+        np.empty(vertices.shape[1], dtype=np.int32),
+        np.empty(corners.shape[1], dtype=np.int32),
+    )
     for a in range(len(antennas)):
         for n in range(len(parts)):
             part, occluder, own = parts[n], hidden_by[a, n], vertices[parts[n]]
             row[a, n] = 0
-            given = antennas[a], part, centres, frames, semi_axes, own, corners, poses, clear, of, hidden, counts
+            given = (
+                antennas[a],
+                part,
+                centres,
+                frames,
+                semi_axes,
+                own,
+                corners,
+                poses,
+                clear,
+                of,
+                hidden,
+                counts,
+            )
             if _shares(occluder, *given, out[count]):
                 row[a, n] = count
                 count += 1
@@ -114,7 +153,11 @@ class FacetShadows:
     """
 
     def __init__(self, tracer: FacetTracer, facets: Facets, semi_axes: NDArray[np.float64]) -> None:
-        self._tracer, self._facets, self._semi_axes = tracer, facets, np.ascontiguousarray(semi_axes, dtype=np.float64)
+        self._tracer, self._facets, self._semi_axes = (
+            tracer,
+            facets,
+            np.ascontiguousarray(semi_axes, dtype=np.float64),
+        )
         # Coordinate by coordinate, as the tracer takes them.
         self._places = np.ascontiguousarray(np.swapaxes(facets.vertices, 1, 2))
         # Without a sign: what may be counted from an array's end keeps a loop from vector lanes.
@@ -143,7 +186,9 @@ class FacetShadows:
         row = np.zeros((len(antennas), len(parts)), dtype=np.int64)
         if len(centres) == 1:
             return Shares(np.ones((1, len(self._facets.faces)), dtype=np.float32), row)
-        hidden_by = self._tracer.occluders(centres, frames, antennas, parts, self._places, self._margin)
+        hidden_by = self._tracer.occluders(
+            centres, frames, antennas, parts, self._places, self._margin
+        )
         share = np.empty((1 + row.size, len(self._facets.faces)), dtype=np.float32)
         count = _all_shares(
             hidden_by,

@@ -60,7 +60,9 @@ def subdivisions_for(facets: int) -> int:
     """
     whole = isinstance(facets, int | np.integer) and not isinstance(facets, bool)
     if not whole or not 20 <= facets <= MAXIMUM_FACETS:
-        raise InputError(f"facets = {facets!r}; it must be a whole number from 20 to {MAXIMUM_FACETS}, counted per ellipsoid")
+        raise InputError(
+            f"facets = {facets!r}; it must be a whole number from 20 to {MAXIMUM_FACETS}, counted per ellipsoid"
+        )
     return next(level for level in range(MAXIMUM_SUBDIVISIONS + 1) if 20 * 4**level >= facets)
 
 
@@ -95,7 +97,9 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], subdivisions: int) -> Facet
     return Facets(vertices, faces, normals, areas, np.sqrt(swing / 8))
 
 
-def mesh_facets(vertices: NDArray[np.float64], faces: NDArray[np.integer], *, both_sides: bool) -> Facets:
+def mesh_facets(
+    vertices: NDArray[np.float64], faces: NDArray[np.integer], *, both_sides: bool
+) -> Facets:
     """Facets of one mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``; those without area are left out."""
     whole = np.asarray(vertices, dtype=np.float64)[None]
     chosen = np.asarray(faces, dtype=np.int32)
@@ -111,7 +115,9 @@ def mesh_facets(vertices: NDArray[np.float64], faces: NDArray[np.integer], *, bo
     )
 
 
-def _normals(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     a, b, c = (vertices[:, faces[:, corner]] for corner in range(3))
     normals = np.cross(b - a, c - a)
     twice = np.linalg.norm(normals, axis=2)

@@ -15,7 +15,12 @@ from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.facets.integral import facet_integral
 from rtradar.scatter.facets.mesh import mesh_scattering
 from rtradar.scatter.facets.shadows import FacetShadows
-from rtradar.scatter.facets.surfaces import MAXIMUM_FACETS, Facets, ellipsoid_facets, subdivisions_for
+from rtradar.scatter.facets.surfaces import (
+    MAXIMUM_FACETS,
+    Facets,
+    ellipsoid_facets,
+    subdivisions_for,
+)
 from rtradar.scatter.target_mesh import target_mesh
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.facet_visibility import FacetTracer
@@ -78,20 +83,26 @@ def facet_scattering(
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
     if not isinstance(solid, Ellipsoids) and facets is not None:
-        raise InputError("facets: a mesh brings its own triangles; leave facets out, or subdivide the mesh")
+        raise InputError(
+            "facets: a mesh brings its own triangles; leave facets out, or subdivide the mesh"
+        )
     if len(tx) == 0:
         return np.zeros(0, dtype=np.complex128)
     if not isinstance(solid, Ellipsoids):
         return mesh_scattering(solid, tx, rx, wavenumber, polarization, variant)
     backend = select(variant)
-    surface = ellipsoid_facets(solid.semi_axes, subdivisions_for(_enough_facets(solid, float(wavenumber.max()), facets)))
+    surface = ellipsoid_facets(
+        solid.semi_axes, subdivisions_for(_enough_facets(solid, float(wavenumber.max()), facets))
+    )
     shadows = FacetShadows(FacetTracer(use(backend), solid.semi_axes), surface, solid.semi_axes)
     field = np.empty(len(tx), dtype=np.complex128)
     parts = len(solid.centres)
     block = max(1, _VIEWS_AT_ONCE // (8 * parts * len(surface.faces)))
     for first in range(0, len(tx), block):
         some = slice(first, first + block)
-        field[some] = _ellipsoids(solid, surface, shadows, tx[some], rx[some], wavenumber[some], polarization)
+        field[some] = _ellipsoids(
+            solid, surface, shadows, tx[some], rx[some], wavenumber[some], polarization
+        )
     return field
 
 
@@ -102,7 +113,11 @@ def _enough_facets(target: Ellipsoids, wavenumber: float, facets: int | None) ->
     if facets is not None:
         subdivisions_for(facets)
     if ka > LARGEST_KA and (facets is None or facets < needed):
-        cure = f"set facets={needed}" if needed <= MAXIMUM_FACETS else f"more than {MAXIMUM_FACETS} are not made: take 'specular'"
+        cure = (
+            f"set facets={needed}"
+            if needed <= MAXIMUM_FACETS
+            else f"more than {MAXIMUM_FACETS} are not made: take 'specular'"
+        )
         raise InputError(
             f"physical optics of a part with ka = {ka:.0f}, above {LARGEST_KA:.0f}, needs {needed} facets an ellipsoid; {cure}"
         )

@@ -6,7 +6,7 @@ from rtradar.kernels.jit import inlined
 
 
 @inlined()
-def positive_share(a, b, c):  # type: ignore[no-untyped-def]
+def positive_share(a, b, c):
     """Share of a triangle on which the linear function with these values at its corners is positive."""
     low, high = min(a, min(b, c)), max(a, max(b, c))
     if low >= 0:

@@ -27,13 +27,20 @@ _LEAST = 1e-4
 
 
 @inlined(fastmath=FAST)
-def _phasor(angle):  # type: ignore[no-untyped-def]
+def _phasor(angle):
     """Cosine and sine by Taylor's series of half the angle, within 3e-11: branch-free, and so in vector lanes."""
     turns = angle * (0.5 / math.pi)
     half = math.pi * (turns - np.floor(turns + 0.5))
     x = half * half
     sine = -1 / 1307674368000 * x + 1 / 6227020800
-    sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x * sine))))))
+    sine = half * (
+        1
+        + x
+        * (
+            -1 / 6
+            + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 + x * (-1 / 39916800 + x * sine))))
+        )
+    )
     cosine = 1 / 20922789888000 * x - 1 / 87178291200
     cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * cosine))
     cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
@@ -41,18 +48,20 @@ def _phasor(angle):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath=FAST)
-def _sine(angle):  # type: ignore[no-untyped-def]
+def _sine(angle):
     """Sine of an angle from 0 on, within 1e-12 of itself where it is small."""
     halves = np.floor(angle * (1 / math.pi) + 0.5)
     rest = angle - halves * math.pi
     x = rest * rest
-    sine = 1 / 362880 + x * (-1 / 39916800 + x * (1 / 6227020800 + x * (-1 / 1307674368000 + x / 355687428096000)))
+    sine = 1 / 362880 + x * (
+        -1 / 39916800 + x * (1 / 6227020800 + x * (-1 / 1307674368000 + x / 355687428096000))
+    )
     sine = rest * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
     return sine * (1 - 2 * (halves - 2 * np.floor(0.5 * halves)))
 
 
 @inlined(fastmath=FAST)
-def sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
+def sum_small(mean, u, v, strength, k):
     """Sum of strength exp(-jk mean) times the mean of exp(-jk deviation), of facets with small deviations."""
     real, imaginary = 0.0, 0.0
     for i in range(len(mean)):
@@ -60,9 +69,13 @@ def sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
         p = a * a + a * b + b * b
         q = -a * b * (a + b)
         square = q * q
-        mean_re = 1 + p * (-1 / 12 + p * (1 / 360 + p * (-1 / 20160 + p * (1 / 1814400 - p / 239500800))))
+        mean_re = 1 + p * (
+            -1 / 12 + p * (1 / 360 + p * (-1 / 20160 + p * (1 / 1814400 - p / 239500800)))
+        )
         mean_re += square * (-1 / 20160 + p * (3 / 1814400 - p * 6 / 239500800))
-        mean_im = -1 / 60 + p * (1 / 1260 + p * (-1 / 60480 + p * (4 / 19958400 - p * 5 / 3113510400)))
+        mean_im = -1 / 60 + p * (
+            1 / 1260 + p * (-1 / 60480 + p * (4 / 19958400 - p * 5 / 3113510400))
+        )
         mean_im = q * (mean_im + square * (1 / 19958400 - p * 4 / 3113510400))
         turn_re, turn_im = _phasor(-k * mean[i])
         real += strength[i] * (turn_re * mean_re - turn_im * mean_im)
@@ -71,7 +84,7 @@ def sum_small(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath=FAST)
-def sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
+def sum_large(mean, u, v, strength, k):
     """The same for any deviations, by differences.
 
     Between phases x and y the difference of exp is exp(j (x + y) / 2) sin(h) / h, h = (y - x) / 2; of the two that meet at
@@ -95,7 +108,7 @@ def sum_large(mean, u, v, strength, k):  # type: ignore[no-untyped-def]
 
 
 @inlined(fastmath=FAST)
-def largest_spread(u, v, room):  # type: ignore[no-untyped-def]
+def largest_spread(u, v, room):
     """The largest p, for k = 1; ``room`` is longer by one.
 
     Numbers from 0 on are in the order of their bits, and the largest of integers is found in vector lanes.

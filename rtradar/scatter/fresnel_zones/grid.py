@@ -26,14 +26,14 @@ _GOLDEN_ANGLE = math.pi * (3 - math.sqrt(5))
 
 
 @inlined()
-def from_centre(antenna, centre, back, way, out):  # type: ignore[no-untyped-def]
+def from_centre(antenna, centre, back, way, out):
     """The antenna from the centre, in axes in which the ellipsoid is the unit sphere."""
     subtract(antenna, centre, way)
     apply(back, way, out)
 
 
 @inlined()
-def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, pole, along):  # type: ignore[no-untyped-def]
+def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, pole, along):
     """Fill in the map of one zone; False where there is no specular point.
 
     ``stretch`` A (3, 3), ``back`` its inverse, ``pole`` (3,) the specular point on the unit sphere, ``along`` (2, 3) the
@@ -44,7 +44,15 @@ def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, 
             stretch[i, j] = frame[i, j] * axes[j]
             back[j, i] = frame[i, j] / axes[j]
     work = np.empty((7, 3))
-    normal, e, f, way_t, way_r, curve_e, curve_f = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
+    normal, e, f, way_t, way_r, curve_e, curve_f = (
+        work[0],
+        work[1],
+        work[2],
+        work[3],
+        work[4],
+        work[5],
+        work[6],
+    )
     subtract(point, centre, normal)
     apply(back, normal, pole)
     normalize(pole)
@@ -75,7 +83,11 @@ def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, 
     # Square root of H^-1 = (h_ff, -h_ef; -h_ef, h_ee) / det: M^(1/2) = (M + sqrt(det M)) / sqrt(tr M + 2 sqrt(det M)).
     root = 1 / math.sqrt(determinant)
     scale = math.sqrt(2 / wavenumber) / math.sqrt((h_ee + h_ff) / determinant + 2 * root)
-    s_ee, s_ff, s_ef = (h_ff / determinant + root) * scale, (h_ee / determinant + root) * scale, -h_ef / determinant * scale
+    s_ee, s_ff, s_ef = (
+        (h_ff / determinant + root) * scale,
+        (h_ee / determinant + root) * scale,
+        -h_ef / determinant * scale,
+    )
     for i in range(3):
         along[0, i] = s_ee * curve_e[i] + s_ef * curve_f[i]
         along[1, i] = s_ef * curve_e[i] + s_ff * curve_f[i]
@@ -83,7 +95,7 @@ def axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, 
 
 
 @inlined()
-def meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untyped-def]
+def meridian(angle, pole, along, cap_t, cap_r, step):
     """Direction of one meridian on the unit sphere into ``step (3,)``; its radians a unit of rho, and rho at its end."""
     for i in range(3):
         step[i] = math.cos(angle) * along[0, i] + math.sin(angle) * along[1, i]
@@ -97,14 +109,30 @@ def meridian(angle, pole, along, cap_t, cap_r, step):  # type: ignore[no-untyped
 
 
 @compiled()
-def _lay_rays(tx, rx, centres, frames, semi_axes, points, wavenumber, out):  # type: ignore[no-untyped-def]
+def _lay_rays(tx, rx, centres, frames, semi_axes, points, wavenumber, out):
     zones, rays = out.shape[:2]
-    stretch, back, pole, along, step = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty(3)
+    stretch, back, pole, along, step = (
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty((2, 3)),
+        np.empty(3),
+    )
     cap_t, cap_r, way = np.empty(3), np.empty(3), np.empty(3)
     for zone in range(zones):
         centre = centres[zone]
         there = axes_of_zone(
-            tx[zone], rx[zone], centre, frames[zone], semi_axes[zone], points[zone], wavenumber[zone], stretch, back, pole, along
+            tx[zone],
+            rx[zone],
+            centre,
+            frames[zone],
+            semi_axes[zone],
+            points[zone],
+            wavenumber[zone],
+            stretch,
+            back,
+            pole,
+            along,
         )
         from_centre(tx[zone], centre, back, way, cap_t)
         from_centre(rx[zone], centre, back, way, cap_r)
@@ -154,7 +182,8 @@ def zone_rays(
         World [m]; the specular point itself where the pair sees no mirror image.
     """
     tx, rx, centres, frames, semi_axes, points, wavenumber = (
-        np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes, points, wavenumber)
+        np.ascontiguousarray(a, dtype=np.float64)
+        for a in (tx, rx, centres, frames, semi_axes, points, wavenumber)
     )
     out = np.empty((len(points), shadow_rays, 3))
     _lay_rays(tx, rx, centres, frames, semi_axes, points, wavenumber, out)

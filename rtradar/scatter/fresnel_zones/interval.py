@@ -20,20 +20,30 @@ class FresnelInterval:
         Nodes in between.
     """
 
-    def __init__(self, fine: NDArray[np.bool_], ends: NDArray[np.complex128], occluders: NDArray[np.bool_], inner: int) -> None:
+    def __init__(
+        self,
+        fine: NDArray[np.bool_],
+        ends: NDArray[np.complex128],
+        occluders: NDArray[np.bool_],
+        inner: int,
+    ) -> None:
         self.fine, self.ends, self.occluders = fine, ends, occluders
         # Of the parts that are fine alone, for the others would be many.
         self._column = np.cumsum(fine) - 1
         self._between = np.empty((inner, *ends.shape[1:-1], int(fine.sum())), dtype=np.complex128)
         self._known = np.zeros((inner, self._between.shape[-1]), dtype=bool)
 
-    def missing(self, nodes: slice, parts: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def missing(
+        self, nodes: slice, parts: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
         """Node and part of each share that is not known yet, of these nodes in between and parts."""
         own = parts[self.fine[parts]]
         node, which = np.nonzero(~self._known[nodes][:, self._column[own]])
         return np.arange(len(self._known))[nodes][node], own[which]
 
-    def keep(self, node: NDArray[np.int64], part: NDArray[np.int64], shares: NDArray[np.complex128]) -> None:
+    def keep(
+        self, node: NDArray[np.int64], part: NDArray[np.int64], shares: NDArray[np.complex128]
+    ) -> None:
         """Remember ``shares (share, frequency, pair)``."""
         column = self._column[part]
         self._between[node, :, :, column], self._known[node, column] = shares, True

@@ -57,17 +57,28 @@ class ZoneShares:
     """
 
     def __init__(
-        self, radar: Radar, body: Body, frequency: NDArray[np.float64], occluders: Callable[[float], NDArray[np.bool_]]
+        self,
+        radar: Radar,
+        body: Body,
+        frequency: NDArray[np.float64],
+        occluders: Callable[[float], NDArray[np.bool_]],
     ) -> None:
         self._radar, self._body, self._occluders = radar, body, occluders
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, TX_NODES, RX_NODES)
         self._step = anchor_step(radar)
-        self._fine = min(round(_FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5), self._step)
-        self._anchors: FirstCome[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = FirstCome(_KEPT_ANCHORS, _PASSING)
+        self._fine = min(
+            round(_FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5),
+            self._step,
+        )
+        self._anchors: FirstCome[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = FirstCome(
+            _KEPT_ANCHORS, _PASSING
+        )
         self._intervals: OrderedDict[int, FresnelInterval] = OrderedDict()
 
-    def at(self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None) -> NDArray[np.complex128]:
+    def at(
+        self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
+    ) -> NDArray[np.complex128]:
         """Shares V at these chirps, numbered from the start of the capture.
 
         Parameters
@@ -83,7 +94,9 @@ class ZoneShares:
         chirps = np.asarray(chirps, dtype=np.int64)
         if parts is None:
             parts = np.arange(len(self._body.part_names))
-        out = np.empty((len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts)), dtype=np.complex128)
+        out = np.empty(
+            (len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts)), dtype=np.complex128
+        )
         spread = self._nodes.weights[self._radar.tx_of_chirp(chirps)]
         number = chirps // self._step
         for interval in np.unique(number):
@@ -99,12 +112,18 @@ class ZoneShares:
         return out
 
     def _shares(
-        self, times: NDArray[np.float64], pose: NDArray[np.int64], part: NDArray[np.int64], occluders: NDArray[np.bool_]
+        self,
+        times: NDArray[np.float64],
+        pose: NDArray[np.int64],
+        part: NDArray[np.int64],
+        occluders: NDArray[np.bool_],
     ) -> NDArray[np.complex128]:
         """Shares (share, frequency, pair), each of a part at one of the times (time,) [s], behind ``occluders (part, part)``."""
         centres, frames, semi_axes = self._body.at(times)
         used, place = np.unique(part, return_inverse=True)
-        tx, rx, points, k = middle_zones(self._radar, centres[:, used], frames[:, used], semi_axes[used])
+        tx, rx, points, k = middle_zones(
+            self._radar, centres[:, used], frames[:, used], semi_axes[used]
+        )
         return zone_shares(
             tx[place],
             rx[place],
@@ -130,11 +149,15 @@ class ZoneShares:
         def find() -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
             time = self._time(number * self._step)
             occluders = self._occluders(time)
-            shares = np.ones((len(self._wavenumber), len(self._nodes.pairs), len(occluders)), dtype=np.complex128)
+            shares = np.ones(
+                (len(self._wavenumber), len(self._nodes.pairs), len(occluders)), dtype=np.complex128
+            )
             hidden = np.flatnonzero(occluders.any(axis=1))
             if len(hidden):
                 pose = np.zeros(len(hidden), dtype=np.int64)
-                shares[..., hidden] = np.moveaxis(self._shares(np.array([time]), pose, hidden, occluders), 0, -1)
+                shares[..., hidden] = np.moveaxis(
+                    self._shares(np.array([time]), pose, hidden, occluders), 0, -1
+                )
             return occluders, shares
 
         return self._anchors.get(number, find)
@@ -146,8 +169,14 @@ class ZoneShares:
             anchors = [self._anchor(number + i) for i in (-1, 0, 1, 2)]
             around = np.stack([shares for _, shares in anchors])
             bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
-            fine = (bend > _BEND) if self._fine > 1 and number >= 0 else np.zeros(bend.shape, dtype=bool)
-            interval = FresnelInterval(fine, around[1:3].copy(), anchors[1][0] | anchors[2][0], self._fine - 1)
+            fine = (
+                (bend > _BEND)
+                if self._fine > 1 and number >= 0
+                else np.zeros(bend.shape, dtype=bool)
+            )
+            interval = FresnelInterval(
+                fine, around[1:3].copy(), anchors[1][0] | anchors[2][0], self._fine - 1
+            )
             self._intervals[number] = interval
             if len(self._intervals) > _PASSING:
                 self._intervals.popitem(last=False)
@@ -155,7 +184,9 @@ class ZoneShares:
         node, part = interval.missing(nodes, parts)
         if len(node):
             used, pose = np.unique(node, return_inverse=True)
-            times = np.array([self._time((number + (i + 1) / self._fine) * self._step) for i in used])
+            times = np.array(
+                [self._time((number + (i + 1) / self._fine) * self._step) for i in used]
+            )
             interval.keep(node, part, self._shares(times, pose, part, interval.occluders))
         return interval
 
@@ -172,15 +203,19 @@ class ZoneShares:
         slopes = np.empty_like(nodes)
         slopes[1:-1] = (nodes[2:] - nodes[:-2]) / 2
         for end, left, right in ((0, before, here), (-1, here, after)):
-            wide_left, wide_right = (np.where(one.fine[parts], 1, self._fine) for one in (left, right))
+            wide_left, wide_right = (
+                np.where(one.fine[parts], 1, self._fine) for one in (left, right)
+            )
             rise_left = (nodes[end] - left.beside(-1, parts)) / wide_left
             rise_right = (right.beside(0, parts) - nodes[end]) / wide_right
-            slopes[end] = (rise_left * wide_right + rise_right * wide_left) / (wide_left + wide_right)
+            slopes[end] = (rise_left * wide_right + rise_right * wide_left) / (
+                wide_left + wide_right
+            )
         return here.fine[parts], nodes, slopes
 
 
 @compiled()
-def _blend(nodes, slopes, fine, where, spread, inside, out):  # type: ignore[no-untyped-def]
+def _blend(nodes, slopes, fine, where, spread, inside, out):
     """Cubics in time, then the polynomials over the array."""
     frequencies, pairs, parts = nodes.shape[1:]
     last = nodes.shape[0] - 1
@@ -191,7 +226,10 @@ def _blend(nodes, slopes, fine, where, spread, inside, out):  # type: ignore[no-
             for node in range(last + 1):
                 if node == 0 or node == last or fine[part]:
                     for pair in range(pairs):
-                        if nodes[node, f, pair, part] != nodes[0, f, 0, part] or slopes[node, f, pair, part] != 0:
+                        if (
+                            nodes[node, f, pair, part] != nodes[0, f, 0, part]
+                            or slopes[node, f, pair, part] != 0
+                        ):
                             still = False
             for i in range(len(inside)):
                 if still:

@@ -18,7 +18,11 @@ TX_NODES, RX_NODES = 6, 3
 
 
 def hiding_parts(
-    tracer: BodyTracer, antennas: NDArray[np.float64], rays: NDArray[np.float64], part: NDArray[np.int64], parts: int
+    tracer: BodyTracer,
+    antennas: NDArray[np.float64],
+    rays: NDArray[np.float64],
+    part: NDArray[np.int64],
+    parts: int,
 ) -> NDArray[np.bool_]:
     """Which parts of the posed body are met before points of other parts.
 
@@ -46,7 +50,9 @@ def hiding_parts(
     zone = np.repeat(np.arange(shape[0]), shape[1] * shape[2])
     # The part's own mesh may miss the ray at its rim, or lie a hair behind the point: only others can hide it.
     hidden = (
-        (hits.part >= 0) & (hits.part != part[zone]) & (hits.distance < np.linalg.norm(targets - origins, axis=1) * (1 - 1e-7))
+        (hits.part >= 0)
+        & (hits.part != part[zone])
+        & (hits.distance < np.linalg.norm(targets - origins, axis=1) * (1 - 1e-7))
     )
     found = np.zeros((shape[0], parts), dtype=bool)
     found[zone[hidden], hits.part[hidden]] = True
@@ -76,17 +82,24 @@ class TracedHiders:
         self._tracer.pose(centres[0], frames[0])
         parts = np.arange(len(semi_axes))
         tx, rx, points, k = middle_zones(self._radar, centres, frames, semi_axes)
-        rays = zone_rays(tx, rx, centres[0], frames[0], semi_axes, points[:, 0], k, self._shadow_rays)
+        rays = zone_rays(
+            tx, rx, centres[0], frames[0], semi_axes, points[:, 0], k, self._shadow_rays
+        )
         antennas = np.broadcast_to(self._antennas, (len(parts), *self._antennas.shape))
         return hiding_parts(self._tracer, antennas, rays, parts, len(parts))
 
 
 def middle_zones(
-    radar: Radar, centres: NDArray[np.float64], frames: NDArray[np.float64], semi_axes: NDArray[np.float64]
+    radar: Radar,
+    centres: NDArray[np.float64],
+    frames: NDArray[np.float64],
+    semi_axes: NDArray[np.float64],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Of every part: the middle of the array twice (part, 3), specular points (part, time, 3), wavenumber (part,)."""
     times, parts = centres.shape[:2]
     tx, rx = radar.tx.mean(axis=0), radar.rx.mean(axis=0)
-    _, _, points = mirror(np.tile(tx, (times, 1)), np.tile(rx, (times, 1, 1)), centres, frames, semi_axes, points=True)
+    _, _, points = mirror(
+        np.tile(tx, (times, 1)), np.tile(rx, (times, 1, 1)), centres, frames, semi_axes, points=True
+    )
     k = np.full(parts, 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS)
     return np.tile(tx, (parts, 1)), np.tile(rx, (parts, 1)), np.moveaxis(points[:, 0], 0, 1), k

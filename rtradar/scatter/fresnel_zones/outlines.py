@@ -17,7 +17,9 @@ from rtradar.scatter.fresnel_zones.grid import CELLS, MERIDIANS, from_centre, me
 
 
 @inlined()
-def outlines(part, centres, frames, semi_axes, antennas, occluders, cap_t, cap_r, stretch, pole, along):  # type: ignore[no-untyped-def]
+def outlines(
+    part, centres, frames, semi_axes, antennas, occluders, cap_t, cap_r, stretch, pole, along
+):
     """Least clearance of the rays from each antenna to the corners of the cells: (meridian, antenna, corner)."""
     n_antennas, n_others = len(antennas), 0
     others = np.empty(len(occluders), dtype=np.int64)
@@ -54,7 +56,7 @@ def outlines(part, centres, frames, semi_axes, antennas, occluders, cap_t, cap_r
 
 
 @inlined()
-def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untyped-def]
+def _clearance(antenna, o, u, t, cosine, sine, clear):
     """Lower ``clear`` to how far outside the unit sphere the ray from ``antenna`` to each o + cos u + sin t passes."""
     a0, a1, a2 = antenna[0], antenna[1], antenna[2]
     for j in range(len(cosine)):
@@ -69,7 +71,7 @@ def _clearance(antenna, o, u, t, cosine, sine, clear):  # type: ignore[no-untype
 
 
 @inlined()
-def open_share(a, b, c, d):  # type: ignore[no-untyped-def]
+def open_share(a, b, c, d):
     """Share of a cell where a function is positive, from its values a, b and c, d at the ends of two opposite sides.
 
     As triangles, cut along one diagonal and along the other: no value at a corner can pass 0 and the share jump.
@@ -78,4 +80,9 @@ def open_share(a, b, c, d):  # type: ignore[no-untyped-def]
         return 1.0
     if max(max(a, b), max(c, d)) <= 0:
         return 0.0
-    return (positive_share(a, b, c) + positive_share(d, b, c) + positive_share(a, b, d) + positive_share(a, c, d)) / 4
+    return (
+        positive_share(a, b, c)
+        + positive_share(d, b, c)
+        + positive_share(a, b, d)
+        + positive_share(a, c, d)
+    ) / 4

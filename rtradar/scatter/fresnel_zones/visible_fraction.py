@@ -34,19 +34,24 @@ sum, by which the lost one is divided, has not settled where their lit side ends
 
 
 @inlined()
-def _exponential(turns, real, imaginary):  # type: ignore[no-untyped-def]
+def _exponential(turns, real, imaginary):
     """exp(-2 pi j turns) to 1e-7, in vector lanes, which the library's sine does not take."""
     for j in range(len(turns)):
         # Half the angle, at most a right angle, by its Taylor series; then doubled.
         half = math.pi * (turns[j] - math.floor(turns[j] + 0.5))
         x = half * half
-        sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 - x / 39916800)))))
-        cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * (1 / 40320 + x * (-1 / 3628800 + x / 479001600)))))
+        sine = half * (
+            1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * (1 / 362880 - x / 39916800))))
+        )
+        cosine = 1 + x * (
+            -1 / 2
+            + x * (1 / 24 + x * (-1 / 720 + x * (1 / 40320 + x * (-1 / 3628800 + x / 479001600))))
+        )
         real[j], imaginary[j] = 1 - 2 * sine * sine, -2 * sine * cosine
 
 
 @inlined(fastmath={"reassoc", "contract", "nsz"})
-def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):  # type: ignore[no-untyped-def]
+def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):
     """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
     free_re, free_im, lost_re, lost_im, open_ = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(weight)):
@@ -68,34 +73,61 @@ def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, s
 
 
 @inlined()
-def _zone_share(  # type: ignore[no-untyped-def]
-    tx, rx, point, part, centres, frames, semi_axes, antennas, pairs, occluders, wavenumber, laid_for, out
+def _zone_share(
+    tx,
+    rx,
+    point,
+    part,
+    centres,
+    frames,
+    semi_axes,
+    antennas,
+    pairs,
+    occluders,
+    wavenumber,
+    laid_for,
+    out,
 ):
     """Share left of one part's return, ``out (frequency, pair)``."""
     frequencies, n_pairs = out.shape
     n_antennas = len(antennas)
-    stretch, back, pole, along, step = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty((2, 3)), np.empty(3)
+    stretch, back, pole, along, step = (
+        np.empty((3, 3)),
+        np.empty((3, 3)),
+        np.empty(3),
+        np.empty((2, 3)),
+        np.empty(3),
+    )
     centre = centres[part]
     for f in range(frequencies):
         for pair in range(n_pairs):
             out[f, pair] = 1.0
-    if not axes_of_zone(tx, rx, centre, frames[part], semi_axes[part], point, laid_for, stretch, back, pole, along):
+    if not axes_of_zone(
+        tx, rx, centre, frames[part], semi_axes[part], point, laid_for, stretch, back, pole, along
+    ):
         return
     cap_t, cap_r, way = np.empty(3), np.empty(3), np.empty(3)
     from_centre(tx, centre, back, way, cap_t)
     from_centre(rx, centre, back, way, cap_r)
-    clear = outlines(part, centres, frames, semi_axes, antennas, occluders, cap_t, cap_r, stretch, pole, along)
+    clear = outlines(
+        part, centres, frames, semi_axes, antennas, occluders, cap_t, cap_r, stretch, pole, along
+    )
 
     # Area of a cell, without what changes along a meridian.
     y0, y1 = along[0], along[1]
     area = pole[0] * (y0[1] * y1[2] - y0[2] * y1[1])
-    area = abs(area + pole[1] * (y0[2] * y1[0] - y0[0] * y1[2]) + pole[2] * (y0[0] * y1[1] - y0[1] * y1[0]))
+    area = abs(
+        area + pole[1] * (y0[2] * y1[0] - y0[0] * y1[2]) + pole[2] * (y0[0] * y1[1] - y0[1] * y1[0])
+    )
     up, side, normal_up, normal_side = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     apply(stretch, pole, up)
     apply_transposed(back, pole, normal_up)
     share, facing = np.empty((n_antennas, CELLS)), np.empty((n_antennas, CELLS))
     length, turns, weight = np.empty(CELLS), np.empty(CELLS), np.empty(CELLS)
-    real, imaginary = np.empty((frequencies, n_antennas, CELLS)), np.empty((frequencies, n_antennas, CELLS))
+    real, imaginary = (
+        np.empty((frequencies, n_antennas, CELLS)),
+        np.empty((frequencies, n_antennas, CELLS)),
+    )
     near = np.empty(n_antennas)
     for a in range(n_antennas):
         subtract(antennas[a], point, way)
@@ -118,7 +150,9 @@ def _zone_share(  # type: ignore[no-untyped-def]
             # The innermost cell has three corners.
             share[a, 0] = positive_share(clear[m, a, 0], clear[m, a, 1], clear[after, a, 1])
             for j in range(1, CELLS):
-                share[a, j] = open_share(clear[m, a, j], clear[m, a, j + 1], clear[after, a, j], clear[after, a, j + 1])
+                share[a, j] = open_share(
+                    clear[m, a, j], clear[m, a, j + 1], clear[after, a, j], clear[after, a, j + 1]
+                )
             subtract(antennas[a], centre, way)
             # On the ellipsoid itself normal . point is 1.
             normal_1, normal_2 = dot(normal_up, way), dot(normal_side, way)
@@ -141,7 +175,18 @@ def _zone_share(  # type: ignore[no-untyped-def]
             for pair in range(n_pairs):
                 t, r = pairs[pair, 0], pairs[pair, 1]
                 re, im = real[f], imaginary[f]
-                _add(weight, facing[t], facing[r], re[t], im[t], re[r], im[r], share[t], share[r], sums[f, pair])
+                _add(
+                    weight,
+                    facing[t],
+                    facing[r],
+                    re[t],
+                    im[t],
+                    re[r],
+                    im[r],
+                    share[t],
+                    share[r],
+                    sums[f, pair],
+                )
     for f in range(frequencies):
         for pair in range(n_pairs):
             one = sums[f, pair]
@@ -153,8 +198,23 @@ def _zone_share(  # type: ignore[no-untyped-def]
 
 
 @compiled()
-def _zone_shares(  # type: ignore[no-untyped-def]
-    begin, end, tx, rx, points, part, pose, centres, frames, semi_axes, antennas, pairs, occluders, wavenumber, laid_for, out
+def _zone_shares(
+    begin,
+    end,
+    tx,
+    rx,
+    points,
+    part,
+    pose,
+    centres,
+    frames,
+    semi_axes,
+    antennas,
+    pairs,
+    occluders,
+    wavenumber,
+    laid_for,
+    out,
 ):
     for zone in range(begin, end):
         _zone_share(
@@ -228,7 +288,22 @@ def zone_shares(
     def share(begin: int) -> None:
         end = min(begin + _ZONES_A_THREAD, len(points))
         body = centres, frames, semi_axes
-        _zone_shares(begin, end, tx, rx, points, part, pose, *body, antennas, pairs, occluders, wavenumber, laid_for, out)
+        _zone_shares(
+            begin,
+            end,
+            tx,
+            rx,
+            points,
+            part,
+            pose,
+            *body,
+            antennas,
+            pairs,
+            occluders,
+            wavenumber,
+            laid_for,
+            out,
+        )
 
     in_threads(share, range(0, len(points), _ZONES_A_THREAD))
     return out

@@ -51,7 +51,9 @@ def far_field_echo(
     -----
     Equations :eq:`mirror-point-far` and :eq:`rcs-ellipsoid` of the theory page.
     """
-    tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
+    tx, rx, centres, frames, semi_axes = (
+        np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes)
+    )
     shape = (*rx.shape[:2], centres.shape[1])
     length, amplitude = np.empty(shape), np.empty(shape)
     _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
@@ -59,7 +61,7 @@ def far_field_echo(
 
 
 @compiled(parallel=True, fastmath={"contract"})
-def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):  # type: ignore[no-untyped-def]
+def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude):
     chirps, receivers, parts = length.shape
     for chirp in prange(chirps):
         to_tx = np.empty(3)
@@ -98,16 +100,25 @@ def _far_field(tx, rx, centres, frames, semi_axes, spreading, length, amplitude)
                     support = a * a * n0 * n0 + b * b * n1 * n1 + c * c * n2 * n2
                     scale = 1 / math.sqrt(support)
                     s0, s1, s2 = a * a * n0 * scale, b * b * n1 * scale, c * c * n2 * scale
-                    range_tx = math.sqrt((t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2))
-                    range_rx = math.sqrt((r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2))
+                    range_tx = math.sqrt(
+                        (t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2)
+                    )
+                    range_rx = math.sqrt(
+                        (r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2)
+                    )
                     # Square root of the cross-section, pi (abc)^2 / h^4: that of `rtradar.rcs.ellipsoid` without its angles.
                     root = root_volume * squared * (scale * scale)
                     # Straight through there is no bisector, and no reflection.
                     there = squared >= _NO_BISECTOR
                     lanes[3, k] = range_tx + range_rx if there else norm_tx + norm
-                    lanes[4, k] = (root / (range_tx * range_rx) if spreading else root) if there else 0.0
+                    lanes[4, k] = (
+                        (root / (range_tx * range_rx) if spreading else root) if there else 0.0
+                    )
                 for k in range(count):
-                    length[chirp, first + k, part], amplitude[chirp, first + k, part] = lanes[3, k], lanes[4, k]
+                    length[chirp, first + k, part], amplitude[chirp, first + k, part] = (
+                        lanes[3, k],
+                        lanes[4, k],
+                    )
 
 
 def plane_wave_echo(
@@ -128,15 +139,22 @@ def plane_wave_echo(
     sight = centres - place
     distance = np.linalg.norm(sight, axis=-1)
     sight = sight / distance[..., None]
-    lead = np.einsum("ci,cpi->cp", tx - place, sight)[:, None] + np.einsum("cri,cpi->crp", rx - place, sight)
+    lead = np.einsum("ci,cpi->cp", tx - place, sight)[:, None] + np.einsum(
+        "cri,cpi->crp", rx - place, sight
+    )
     amplitude = np.sqrt(_cross_section(semi_axes, np.einsum("cpji,cpj->cpi", frames, -sight)))
     if spreading:
         amplitude = amplitude / distance**2
     return 2 * distance[:, None] - lead, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
-def _cross_section(semi_axes: NDArray[np.float64], normal: NDArray[np.float64]) -> NDArray[np.float64]:
-    theta, phi = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
+def _cross_section(
+    semi_axes: NDArray[np.float64], normal: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    theta, phi = (
+        np.arccos(np.clip(normal[..., 2], -1, 1)),
+        np.arctan2(normal[..., 1], normal[..., 0]),
+    )
     return ellipsoid(semi_axes[:, 0], semi_axes[:, 1], semi_axes[:, 2], theta, phi)
 
 
@@ -184,11 +202,15 @@ class Analytic:
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
 
-def analytic(radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor") -> Analytic:
+def analytic(
+    radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor"
+) -> Analytic:
     """`Analytic` as the model of that name."""
     return Analytic(radar, body, spreading=spreading, material=material)
 
 
-def analytic_paper(radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor") -> Analytic:
+def analytic_paper(
+    radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor"
+) -> Analytic:
     """`Analytic` as in the paper."""
     return Analytic(radar, body, paper=True, spreading=spreading, material=material)

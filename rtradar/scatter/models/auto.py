@@ -18,7 +18,16 @@ from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
 from rtradar.scatter.models.analytic import far_field_echo
-from rtradar.scatter.models.auto_errors import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, SPECULAR, WAYS, Forecast, forecast
+from rtradar.scatter.models.auto_errors import (
+    ANALYTIC,
+    FRESNEL,
+    LEFT_OUT,
+    PHYSICAL_OPTICS,
+    SPECULAR,
+    WAYS,
+    Forecast,
+    forecast,
+)
 from rtradar.scatter.models.auto_plan import choose
 from rtradar.scatter.models.fresnel import sweep_nodes
 from rtradar.scatter.models.physical_optics import PhysicalOptics
@@ -95,8 +104,12 @@ class Auto:
         tolerance_complex: float | None = None,
     ) -> None:
         if not (math.isfinite(tolerance_db) and tolerance_db > 0):
-            raise InputError(f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db)")
-        if tolerance_complex is not None and not (math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX):
+            raise InputError(
+                f"auto: tolerance_db = {tolerance_db}; it must be positive (--tolerance-db)"
+            )
+        if tolerance_complex is not None and not (
+            math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX
+        ):
             raise InputError(
                 f"auto: tolerance_complex = {tolerance_complex}; it must be at least {_LEAST_COMPLEX}, a share of the rms field "
                 "(--tolerance-complex)"
@@ -126,7 +139,9 @@ class Auto:
                 found.append((self._by(way, at, chirps, parts, cut), weights[way][:, parts]))
         if not found:
             # Nobody is seen: one part stands for all, with nothing to return.
-            found.append((self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1))))
+            found.append(
+                (self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1)))
+            )
         frequency = max((group.frequency for group, _ in found), key=len)
         part = np.concatenate([group.part for group, _ in found])
         # Filled in place: to make each group complex and join them afterwards would cost more than the closed forms.
@@ -152,10 +167,16 @@ class Auto:
         names = self._body.part_names
         whole = self._ways.sum()
         return {
-            "ways": {name: float(count / whole) for name, count in zip(WAYS, self._ways.sum(axis=1), strict=True)},
+            "ways": {
+                name: float(count / whole)
+                for name, count in zip(WAYS, self._ways.sum(axis=1), strict=True)
+            },
             "why": {reason: float(count / whole) for reason, count in self._why.items()},
             "parts": {
-                part: {name: float(share) for name, share in zip(WAYS, counts / counts.sum(), strict=True)}
+                part: {
+                    name: float(share)
+                    for name, share in zip(WAYS, counts / counts.sum(), strict=True)
+                }
                 for part, counts in zip(names, self._ways.T, strict=True)
             },
         }
@@ -164,7 +185,10 @@ class Auto:
         """Add some instants, chosen (time, part), to what `account` tells."""
         # Of what the next cheaper way leaves wrong, is most due to curvature?
         cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
-        wrong, optics = (np.take_along_axis(errors, cheaper, axis=1)[:, 0] for errors in (told.wrong, told.optics))
+        wrong, optics = (
+            np.take_along_axis(errors, cheaper, axis=1)[:, 0]
+            for errors in (told.wrong, told.optics)
+        )
         curved = optics > wrong
         higher = chosen > ANALYTIC
         for reason, where in {
@@ -224,10 +248,17 @@ class Auto:
         return Planned(chosen.copy(), told.in_view.copy(), told.occluders.copy())
 
     def _by(
-        self, way: int, at: ChirpPoses, chirps: NDArray[np.int64], parts: NDArray[np.int64], cut: NDArray[np.bool_]
+        self,
+        way: int,
+        at: ChirpPoses,
+        chirps: NDArray[np.int64],
+        parts: NDArray[np.int64],
+        cut: NDArray[np.bool_],
     ) -> _Group:
         if way >= PHYSICAL_OPTICS:
-            echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(chirps)
+            echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(
+                chirps
+            )
             return _Group(
                 echoes.length[..., parts],
                 echoes.amplitude[..., parts],
@@ -242,7 +273,12 @@ class Auto:
             length, values = far_field_echo(*poses, spreading=self._spreading)
         else:
             start = self._starts.at(chirps, parts)
-            length, values, _ = mirror(*poses, start=start, polarization=self._radar.polarization, spreading=self._spreading)
+            length, values, _ = mirror(
+                *poses,
+                start=start,
+                polarization=self._radar.polarization,
+                spreading=self._spreading,
+            )
             if way == SPECULAR and cut[parts].any():
                 values *= self._specular_points.at(chirps, parts)[0]
         values = values[None]
@@ -255,7 +291,9 @@ class Auto:
     def _specular_points(self) -> MirrorVisibility:
         backend = select(self._variant)
         self.variant = backend.kind
-        return MirrorVisibility(self._radar, self._body, BodyTracer(use(backend), self._body.semi_axes))
+        return MirrorVisibility(
+            self._radar, self._body, BodyTracer(use(backend), self._body.semi_axes)
+        )
 
     @cached_property
     def _zones(self) -> ZoneShares:
@@ -263,11 +301,17 @@ class Auto:
 
     @cached_property
     def _physical_optics(self) -> EchoModel:
-        return self._traced(PhysicalOptics(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+        return self._traced(
+            PhysicalOptics(
+                self._radar, self._body, variant=self._variant, spreading=self._spreading
+            )
+        )
 
     @cached_property
     def _reference(self) -> EchoModel:
-        return self._traced(Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading))
+        return self._traced(
+            Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading)
+        )
 
     def _traced(self, model: EchoModel) -> EchoModel:
         self.variant = model.variant

@@ -85,12 +85,20 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     nodes = array_nodes(radar, 2, 2)
     pairs = len(nodes.pairs)
     tx, rx = (np.tile(nodes.antennas[nodes.pairs[:, side]], (times, 1)) for side in (0, 1))
-    at = (tx, rx[:, None], np.repeat(poses.centres, pairs, axis=0), np.repeat(poses.frames, pairs, axis=0), poses.semi_axes)
+    at = (
+        tx,
+        rx[:, None],
+        np.repeat(poses.centres, pairs, axis=0),
+        np.repeat(poses.frames, pairs, axis=0),
+        poses.semi_axes,
+    )
     far_length, far = far_field_echo(*at, spreading=spreading)
     length, near, _ = mirror(*at, polarization=radar.polarization, spreading=spreading)
     # What a tolerance is held against is what the antennas let through.
     gain = leg_gain(radar, ChirpPoses(np.zeros(len(tx), dtype=np.int64), *at))
-    turned = (gain * far * np.exp(1j * wavenumber * (far_length - length))).reshape(times, pairs, parts)
+    turned = (gain * far * np.exp(1j * wavenumber * (far_length - length))).reshape(
+        times, pairs, parts
+    )
     near = (gain * near).reshape(times, pairs, parts)
 
     share, seen, radius, occluders = _views(radar, poses, wavenumber)
@@ -109,7 +117,15 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     wrong[:, FRESNEL] = free * (_AT_AN_EDGE * cut) ** 2
     wrong[:, PHYSICAL_OPTICS] = true * _INTERPOLATED**2
     in_view = np.abs(share - 1) < 1 - _IN_VIEW
-    return Forecast(true, power, wrong, optics, in_view & seen, ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW), occluders)
+    return Forecast(
+        true,
+        power,
+        wrong,
+        optics,
+        in_view & seen,
+        ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW),
+        occluders,
+    )
 
 
 def _views(
@@ -137,7 +153,9 @@ def _views(
     # A ray moved by so much comes nearer to another unit sphere by at most that over its shortest semi-axis: the reach, and
     # as much of the way to the farthest antenna as is left where it passes the other part.
     array = np.linalg.norm(np.concatenate([radar.tx, radar.rx]) - eye, axis=1).max()
-    apart = np.linalg.norm(points[:, :, None] - poses.centres[:, None], axis=-1) + poses.semi_axes.max(axis=1)
+    apart = np.linalg.norm(
+        points[:, :, None] - poses.centres[:, None], axis=-1
+    ) + poses.semi_axes.max(axis=1)
     moved = reach[..., None] + array * np.minimum(apart / distance[..., None], 1.0)
     occluders = np.asarray(clearance < moved / poses.semi_axes.min(axis=1))
     share = np.ones((times, parts), dtype=np.complex128)
@@ -147,17 +165,27 @@ def _views(
         k = np.full(len(pose), wavenumber)
         one = np.zeros((1, 2), dtype=np.int64)
         zone = (here, here, points[pose, part], part.astype(np.int64), pose.astype(np.int64))
-        found = zone_shares(*zone, (centres, frames, semi_axes), here[:, None], one, occluders[pose, part], k[:, None], k)
+        found = zone_shares(
+            *zone,
+            (centres, frames, semi_axes),
+            here[:, None],
+            one,
+            occluders[pose, part],
+            k[:, None],
+            k,
+        )
         share[pose, part] = found[:, 0, 0]
     return share, seen, np.asarray(np.sqrt(smaller * larger)), occluders
 
 
 @compiled(parallel=True)
-def _clearances(eye, points, centres, frames, semi_axes, out):  # type: ignore[no-untyped-def]
+def _clearances(eye, points, centres, frames, semi_axes, out):
     """How far outside each other part, stretched to a unit sphere, the ray from ``eye`` to each part's point passes."""
     times, parts = points.shape[:2]
     for time in prange(times):
         for part in range(parts):
             for other in range(parts):
                 pose = (centres[time, other], frames[time, other], semi_axes[other])
-                out[time, part, other] = math.inf if other == part else clearance(eye, points[time, part], *pose)
+                out[time, part, other] = (
+                    math.inf if other == part else clearance(eye, points[time, part], *pose)
+                )

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.scatter.models.auto_errors import ANALYTIC, FRESNEL, LEFT_OUT, PHYSICAL_OPTICS, Forecast
+from rtradar.scatter.models.auto_errors import (
+    ANALYTIC,
+    FRESNEL,
+    LEFT_OUT,
+    PHYSICAL_OPTICS,
+    Forecast,
+)
 
 _COST = np.array([0.0, 1.0, 1.5, 6.0, 12.0, 200.0])
 """Of a part, by and large: it says which change to try first, where several would do."""
@@ -46,7 +52,9 @@ def choose(told: Forecast, power_share: float, complex_share: float | None) -> N
         _raise(chosen, excess, _SYSTEMATIC * power_share * whole)
         # Facets, once meshed and traced for one part, serve all.
         by_facets = np.flatnonzero((chosen >= PHYSICAL_OPTICS).any(axis=1))
-        chosen[by_facets] = np.where(chosen[by_facets] == FRESNEL, PHYSICAL_OPTICS, chosen[by_facets])
+        chosen[by_facets] = np.where(
+            chosen[by_facets] == FRESNEL, PHYSICAL_OPTICS, chosen[by_facets]
+        )
 
     refine()
     padded = np.pad(chosen, ((1, 1), (0, 0)), mode="edge")
@@ -55,7 +63,9 @@ def choose(told: Forecast, power_share: float, complex_share: float | None) -> N
     return chosen
 
 
-def _raise(chosen: NDArray[np.int64], error: NDArray[np.float64], allowed: NDArray[np.float64]) -> None:
+def _raise(
+    chosen: NDArray[np.int64], error: NDArray[np.float64], allowed: NDArray[np.float64]
+) -> None:
     """Raise choices until the sum of the errors (time, way, part) is within what is allowed (time,); in place."""
     parts = error.shape[2]
     while True:
@@ -69,7 +79,9 @@ def _raise(chosen: NDArray[np.int64], error: NDArray[np.float64], allowed: NDArr
         dearer = _COST[:, None] - _COST[chosen[missed]][:, None]
         # More than is allowed need not be mended.
         gain = np.minimum(gain, (np.abs(total[missed]) - allowed[missed])[:, None, None])
-        worth = np.where((dearer > 0) & (gain > 0), gain / np.maximum(dearer, 1e-9), -np.inf).reshape(len(missed), -1)
+        worth = np.where(
+            (dearer > 0) & (gain > 0), gain / np.maximum(dearer, 1e-9), -np.inf
+        ).reshape(len(missed), -1)
         best = worth.argmax(axis=1)
         possible = worth[np.arange(len(missed)), best] > -np.inf
         if not possible.any():

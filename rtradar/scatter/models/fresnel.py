@@ -53,7 +53,13 @@ class Fresnel:
     """
 
     def __init__(
-        self, radar: Radar, body: Body, *, variant: str = "auto", spreading: bool = True, shadow_rays: int = SHADOW_RAYS
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        shadow_rays: int = SHADOW_RAYS,
     ) -> None:
         _check(shadow_rays)
         self._radar, self._body, self._spreading = radar, body, spreading
@@ -68,7 +74,9 @@ class Fresnel:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         start, shares = self._starts.at(chirps), self.shares.at(chirps)
-        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
+        length, amplitude, _ = mirror(
+            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        )
         parts = length.shape[2]
         return Echoes(
             length=length,
@@ -88,7 +96,9 @@ def sweep_nodes(radar: Radar) -> NDArray[np.float64]:
     16 GHz one node leaves 4.7 % rms of the free field, two 2.2 %, three 1.4 %; at 77 to 81 GHz one leaves 2.3 %, three 2.1 %.
     """
     nodes = 3 if radar.bandwidth_hz > _WIDE * radar.centre_frequency_hz else 1
-    return radar.centre_frequency_hz - radar.bandwidth_hz / 2 * np.cos((np.arange(nodes) + 0.5) * math.pi / nodes)
+    return radar.centre_frequency_hz - radar.bandwidth_hz / 2 * np.cos(
+        (np.arange(nodes) + 0.5) * math.pi / nodes
+    )
 
 
 def fresnel_scattering(
@@ -133,8 +143,12 @@ def fresnel_scattering(
     """
     _check(shadow_rays)
     pairs, parts = len(tx), len(target.semi_axes)
-    centres, frames = (np.broadcast_to(a, (pairs, *a.shape)) for a in (target.centres, target.frames))
-    length, amplitude, points = mirror(tx, rx[:, None], centres, frames, target.semi_axes, polarization=polarization, points=True)
+    centres, frames = (
+        np.broadcast_to(a, (pairs, *a.shape)) for a in (target.centres, target.frames)
+    )
+    length, amplitude, points = mirror(
+        tx, rx[:, None], centres, frames, target.semi_axes, polarization=polarization, points=True
+    )
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
     tracer.pose(target.centres, target.frames)
@@ -142,16 +156,33 @@ def fresnel_scattering(
     part = np.tile(np.arange(parts), pairs)
     zone_tx, zone_rx, k = (np.repeat(a, parts, axis=0) for a in (tx, rx, wavenumber))
     places = points.reshape(-1, 3)
-    rays = zone_rays(zone_tx, zone_rx, target.centres[part], target.frames[part], target.semi_axes[part], places, k, shadow_rays)
+    rays = zone_rays(
+        zone_tx,
+        zone_rx,
+        target.centres[part],
+        target.frames[part],
+        target.semi_axes[part],
+        places,
+        k,
+        shadow_rays,
+    )
     antennas = np.stack([zone_tx, zone_rx], axis=1)
     occluders = hiding_parts(tracer, antennas, rays, part, parts)
     shares = np.ones(pairs * parts, dtype=np.complex128)
     some = np.flatnonzero(occluders.any(axis=1))
     if len(some):
         one_pair = np.array([[0, 1]])
-        where = (zone_tx[some], zone_rx[some], places[some], part[some], np.zeros(len(some), dtype=np.int64))
+        where = (
+            zone_tx[some],
+            zone_rx[some],
+            places[some],
+            part[some],
+            np.zeros(len(some), dtype=np.int64),
+        )
         poses = (target.centres[None], target.frames[None], target.semi_axes)
-        shares[some] = zone_shares(*where, poses, antennas[some], one_pair, occluders[some], k[some, None], k[some])[:, 0, 0]
+        shares[some] = zone_shares(
+            *where, poses, antennas[some], one_pair, occluders[some], k[some, None], k[some]
+        )[:, 0, 0]
     ranges = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
     phase = np.exp(-1j * wavenumber[:, None] * (length[:, 0] - (ranges[0] + ranges[1])[:, None]))
     field = (amplitude[:, 0] * shares.reshape(pairs, parts) * phase).sum(axis=1)

@@ -16,7 +16,15 @@ from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import chirp_poses
-from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch, whole_echo
+from rtradar.scatter.facets.envelope import (
+    PIECES,
+    TOGETHER,
+    Envelope,
+    Sample,
+    hermite,
+    stretch,
+    whole_echo,
+)
 from rtradar.scatter.facets.moving_body import FacetBody
 from rtradar.scatter.specular_point.solver import mirror
 
@@ -27,7 +35,7 @@ _MOST_FREQUENCIES = 9
 
 
 @compiled()
-def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):  # type: ignore[no-untyped-def]
+def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):
     """Amplitude (node, chirp, rx, part) at these chirps, which stand at these shares of the way from anchor to anchor."""
     nodes, pairs, parts = ratio.shape[1:]
     receivers = weights.shape[1]
@@ -37,7 +45,9 @@ def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):
         for part in range(parts):
             left, right = stretch(known[:, part], place)
             ends[0, part], ends[1, part] = left, right
-            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite(place, left, right)
+            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite(
+                place, left, right
+            )
         own = weights[tx[chirp]]
         value = np.empty(parts, dtype=np.complex128)
         amplitude[:, chirp] = 0
@@ -112,11 +122,17 @@ class PhysicalOptics:
             raise InputError(
                 f"physical-optics: frequencies = {frequencies}; it must be a whole number from 1 to {_MOST_FREQUENCIES}"
             )
-        for name, value in (("anchor_s", anchor_s), ("tolerance", tolerance), ("unevenness", unevenness)):
+        for name, value in (
+            ("anchor_s", anchor_s),
+            ("tolerance", tolerance),
+            ("unevenness", unevenness),
+        ):
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"physical-optics: {name} = {value}; it must be positive")
         self._radar, self._body, self._spreading = radar, body, spreading
-        self._surface = FacetBody(radar, body, variant=variant, spreading=spreading, facets=facets, nodes=frequencies)
+        self._surface = FacetBody(
+            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=frequencies
+        )
         self.variant: str | None = self._surface.variant
         self._coarse, self._fine = array_nodes(radar, *_COARSE), array_nodes(radar, *_FINE)
         # From coarse nodes to fine ones, which stand at antennas or between them.
@@ -134,7 +150,10 @@ class PhysicalOptics:
         ratio, strength = self._spread @ coarse.ratio, self._spread @ coarse.strength
         echo = coarse.ratio * coarse.strength
         scale = whole_echo(coarse) if whole is None else whole
-        uneven = np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1)) > self._unevenness * scale
+        uneven = (
+            np.abs(echo - echo.mean(axis=1, keepdims=True)).max(axis=(0, 1))
+            > self._unevenness * scale
+        )
         if uneven.any():
             fine = self._at_nodes(pose, self._fine, parts[uneven])
             ratio[:, :, uneven], strength[:, uneven] = fine.ratio, fine.strength
@@ -142,7 +161,9 @@ class PhysicalOptics:
 
     def _at_nodes(self, pose: Poses, nodes: ArrayNodes, parts: NDArray[np.int64]) -> Sample:
         antennas, pairs = nodes.antennas, nodes.pairs
-        centres, frames = (np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames))
+        centres, frames = (
+            np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
+        )
         length, strength, _ = mirror(
             antennas[pairs[:, 0]],
             antennas[pairs[:, 1], None],
@@ -171,23 +192,37 @@ class PhysicalOptics:
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength, _ = mirror(*at[1:], polarization=self._radar.polarization, spreading=self._spreading)
+        length, strength, _ = mirror(
+            *at[1:], polarization=self._radar.polarization, spreading=self._spreading
+        )
         parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals = chirps // self._step
         # Power is measured at anchors, where nothing is asked of what comes after.
         between = set(intervals[chirps % self._step != 0].tolist())
-        for _, group in groupby(sorted(set(intervals.tolist())), key=lambda interval: interval // TOGETHER):
+        for _, group in groupby(
+            sorted(set(intervals.tolist())), key=lambda interval: interval // TOGETHER
+        ):
             together = list(group)
-            self._envelope.prepare_anchors(interval for interval in together if interval not in between)
+            self._envelope.prepare_anchors(
+                interval for interval in together if interval not in between
+            )
             self._envelope.prepare_courses(between.intersection(together))
             for interval in together:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
-                    share, course = chirps[inside] / self._step - interval, self._envelope.course(interval)
-                    _fill(inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude)
+                    share, course = (
+                        chirps[inside] / self._step - interval,
+                        self._envelope.course(interval),
+                    )
+                    _fill(
+                        inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude
+                    )
                     continue
-                over_array = self._fine.weights[at.tx_index[inside]] @ self._envelope.anchor(interval).ratio[:, None]
+                over_array = (
+                    self._fine.weights[at.tx_index[inside]]
+                    @ self._envelope.anchor(interval).ratio[:, None]
+                )
                 amplitude[:, inside] = over_array * strength[inside]
         return Echoes(
             length=length,

@@ -134,7 +134,10 @@ class Rays:
             surfaces=self._surfaces,
             grid=grid,
             bounces=self._bounces,
-            wavenumber=2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS,
+            wavenumber=2
+            * np.pi
+            * (radar.start_frequency_hz + radar.bandwidth_hz)
+            / SPEED_OF_LIGHT_MPS,
             polarization=radar.polarization,
             spreading=self._spreading,
         )
@@ -156,14 +159,21 @@ class Rays:
                 spreading=self._spreading,
                 tapered=order > 0,
             )
-            amplitudes.append(sums if len(nodes) == len(frequency) else barycentric_interpolate(nodes, sums, frequency))
+            amplitudes.append(
+                sums
+                if len(nodes) == len(frequency)
+                else barycentric_interpolate(nodes, sums, frequency)
+            )
         return _Shot(np.concatenate(lengths, axis=-1), np.concatenate(amplitudes, axis=-1).conj())
 
     def _nodes(self, several_bounces: bool) -> Array:
         """Frequencies (node,) at the zeros of a Chebyshev polynomial over the sweep [Hz]."""
         bandwidth = self._radar.bandwidth_hz
         count = 3 + min(17, math.ceil(_NODES_PER_HZ[several_bounces] * bandwidth))
-        return self._radar.start_frequency_hz + bandwidth * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
+        return (
+            self._radar.start_frequency_hz
+            + bandwidth * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
+        )
 
 
 class _Shot(NamedTuple):
@@ -176,7 +186,12 @@ class _Shot(NamedTuple):
 def _cubic(share: float) -> tuple[float, float, float, float]:
     """Weights of the anchors -1, 0, 1, 2 at ``share`` of the way from 0 to 1: Catmull and Rom's cubic, smooth at anchors."""
     s, t = share, 1 - share
-    return -s * t * t / 2, t * (1 + t * (4 - 3 * t)) / 2, s * (1 + s * (4 - 3 * s)) / 2, -t * s * s / 2
+    return (
+        -s * t * t / 2,
+        t * (1 + t * (4 - 3 * t)) / 2,
+        s * (1 + s * (4 - 3 * s)) / 2,
+        -t * s * s / 2,
+    )
 
 
 def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array:
@@ -188,5 +203,7 @@ def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array
     for receiver, antenna in enumerate(rx):
         path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
         mean = np.bincount(footprints.surface, weights=power * path, minlength=parts)
-        lengths[receiver] = np.where(total > 0, mean / np.where(total > 0, total, 1.0), otherwise[receiver])
+        lengths[receiver] = np.where(
+            total > 0, mean / np.where(total > 0, total, 1.0), otherwise[receiver]
+        )
     return lengths

@@ -44,7 +44,9 @@ class Reference:
         facets: int | None = None,
     ) -> None:
         self._radar, self._body = radar, body
-        self._surface = FacetBody(radar, body, variant=variant, spreading=spreading, facets=facets, nodes=_NODES)
+        self._surface = FacetBody(
+            radar, body, variant=variant, spreading=spreading, facets=facets, nodes=_NODES
+        )
         self.variant: str | None = self._surface.variant
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
@@ -55,7 +57,9 @@ class Reference:
         nodes, parts = len(self._surface.frequency), np.arange(length.shape[2])
         amplitude = np.empty((nodes, *length.shape), dtype=np.complex128)
         cycles = chirps // self._radar.n_tx
-        pairs = np.stack([np.zeros(self._radar.n_rx, dtype=np.int64), 1 + np.arange(self._radar.n_rx)], axis=1)
+        pairs = np.stack(
+            [np.zeros(self._radar.n_rx, dtype=np.int64), 1 + np.arange(self._radar.n_rx)], axis=1
+        )
         for cycle in np.unique(cycles):
             inside = np.flatnonzero(cycles == cycle)
             # Tx and Rx of these chirps, each once.

@@ -55,6 +55,8 @@ class Specular:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         weight, start = self.visibility.at(chirps)
-        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
+        length, amplitude, _ = mirror(
+            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        )
         echo = self._surface.echo(at, amplitude * weight)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)

@@ -42,7 +42,13 @@ class WallPath:
     @property
     def name(self) -> str:
         """Walls in the order in which the wave meets them, the body between them: ``floor > body``."""
-        return " > ".join([*(face.wall.name for face in self.out), "body", *(face.wall.name for face in reversed(self.back))])
+        return " > ".join(
+            [
+                *(face.wall.name for face in self.out),
+                "body",
+                *(face.wall.name for face in reversed(self.back)),
+            ]
+        )
 
 
 def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPath, ...]:
@@ -65,7 +71,9 @@ def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPat
             for wall in walls
             if not leg or leg[-1].wall is not wall
         ]
-    paths = [WallPath(out, back) for out, back in product(legs, legs) if len(out) + len(back) <= order]
+    paths = [
+        WallPath(out, back) for out, back in product(legs, legs) if len(out) + len(back) <= order
+    ]
     return tuple(sorted(paths, key=lambda path: path.order))
 
 

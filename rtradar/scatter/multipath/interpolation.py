@@ -9,7 +9,19 @@ from rtradar.kernels.jit import compiled
 
 
 @compiled(parallel=True, fastmath={"contract"})
-def weigh(amplitude, before, after, seen_before, seen_after, share, interval, line, tx_weight, rx_weight, out):  # type: ignore[no-untyped-def]
+def weigh(
+    amplitude,
+    before,
+    after,
+    seen_before,
+    seen_after,
+    share,
+    interval,
+    line,
+    tx_weight,
+    rx_weight,
+    out,
+):
     """Fill ``out (node, chirp, rx, echo)`` complex64: amplitude times what walls, body and shadows leave of it, conjugated.
 
     ``before, after (interval, node, line, 2, rx_end, echo)`` complex64, at the ends of lines of antennas, go over into each
@@ -27,14 +39,24 @@ def weigh(amplitude, before, after, seen_before, seen_after, share, interval, li
         fade = np.empty(echoes, dtype=np.float32)
         for end in range(ends):
             for side in range(2):
-                old, new = np.float32(tx_weight[chirp, side] * (1 - smooth)), np.float32(tx_weight[chirp, side] * smooth)
+                old, new = (
+                    np.float32(tx_weight[chirp, side] * (1 - smooth)),
+                    np.float32(tx_weight[chirp, side] * smooth),
+                )
                 for echo in range(echoes):
                     left[end, echo] += (
-                        old * seen_before[which, own, side, end, echo] + new * seen_after[which, own, side, end, echo]
+                        old * seen_before[which, own, side, end, echo]
+                        + new * seen_after[which, own, side, end, echo]
                     )
-                old, new = np.float32(tx_weight[chirp, side] * (1 - part)), np.float32(tx_weight[chirp, side] * part)
+                old, new = (
+                    np.float32(tx_weight[chirp, side] * (1 - part)),
+                    np.float32(tx_weight[chirp, side] * part),
+                )
                 for node in range(nodes):
-                    first, last = before[which, node, own, side, end], after[which, node, own, side, end]
+                    first, last = (
+                        before[which, node, own, side, end],
+                        after[which, node, own, side, end],
+                    )
                     for echo in range(echoes):
                         real[node, end, echo] += old * first[echo].real + new * last[echo].real
                         imaginary[node, end, echo] += old * first[echo].imag + new * last[echo].imag

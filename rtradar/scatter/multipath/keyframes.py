@@ -22,7 +22,12 @@ from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, corners, images
 from rtradar.scatter.multipath.slab_delays import AT_ONCE, Met, PathTerms
 from rtradar.scatter.multipath.slab_series import WallSeries
-from rtradar.scatter.multipath.wall_interaction import Passage, reflected, setting_out, through_walls
+from rtradar.scatter.multipath.wall_interaction import (
+    Passage,
+    reflected,
+    setting_out,
+    through_walls,
+)
 from rtradar.scatter.specular_point.solver import mirror
 from rtradar.scene import Scene
 from rtradar.trace.body_tracer import BodyTracer
@@ -97,16 +102,33 @@ def path_anchors(
         for side, places in (("out", ends.tx), ("back", ends.rx))
     ]
     direct = np.array([paths[p].order == 0 for p in path], dtype=bool)
-    factors = [(chosen, met, _left(around, legs, direct, chosen, *fields)) for chosen, met, fields in _pairs(paths, path, legs)]
+    factors = [
+        (chosen, met, _left(around, legs, direct, chosen, *fields))
+        for chosen, met, fields in _pairs(paths, path, legs)
+    ]
     strength = np.zeros((*exists.shape[:2], 2, ends.rx.shape[1], len(path)))
     for chosen, _, found in factors:
         strength[..., chosen] = np.maximum(strength[..., chosen], np.abs(found).max(axis=0))
-    seen = legs[0].valid[:, :, :, None] & legs[1].valid[:, :, None] & exists[:, :, None, None] & (strength > 0)
+    seen = (
+        legs[0].valid[:, :, :, None]
+        & legs[1].valid[:, :, None]
+        & exists[:, :, None, None]
+        & (strength > 0)
+    )
     columns = []
     for chosen, met, found in factors:
         worth = _worth(found, strength[..., chosen])
-        columns.append(np.array([terms.column(int(echo), met) if kept else -1 for echo, kept in zip(chosen, worth, strict=True)]))
-    factor = np.zeros((len(around.frequency_hz), *strength.shape[:-1], len(terms)), dtype=np.complex128)
+        columns.append(
+            np.array(
+                [
+                    terms.column(int(echo), met) if kept else -1
+                    for echo, kept in zip(chosen, worth, strict=True)
+                ]
+            )
+        )
+    factor = np.zeros(
+        (len(around.frequency_hz), *strength.shape[:-1], len(terms)), dtype=np.complex128
+    )
     for (_, _, found), column in zip(factors, columns, strict=True):
         factor[..., column[column >= 0]] = found[..., column >= 0]
     if around.tracers is not None:
@@ -119,9 +141,13 @@ def path_anchors(
                 _clear_of_body(body, leg, still[anchor], anchor, part, np.flatnonzero(direct))
         seen &= clear[0][:, :, :, None] & clear[1][:, :, None]
     middle = factor[len(factor) // 2]
-    flat = np.all(np.abs(factor - middle) <= _FLAT * np.abs(middle), axis=(0, 2, 3, 4), keepdims=True)
+    flat = np.all(
+        np.abs(factor - middle) <= _FLAT * np.abs(middle), axis=(0, 2, 3, 4), keepdims=True
+    )
     factor = np.where(flat, middle, factor)
-    return PathAnchors(np.moveaxis(factor, 0, 1).astype(np.complex64), seen, start.astype(np.float32))
+    return PathAnchors(
+        np.moveaxis(factor, 0, 1).astype(np.complex64), seen, start.astype(np.float32)
+    )
 
 
 def _pairs(
@@ -135,7 +161,9 @@ def _pairs(
         if len(out.waves[there]) == len(back.waves[here]) == 1:
             continue
         chosen = np.flatnonzero(path == number)
-        for (met_out, sent), (met_back, heard) in product(out.waves[there].items(), back.waves[here].items()):
+        for (met_out, sent), (met_back, heard) in product(
+            out.waves[there].items(), back.waves[here].items()
+        ):
             if (met_out, met_back) != AT_ONCE:
                 fields = sent[..., out.of_leg[chosen], :], heard[..., back.of_leg[chosen], :]
                 yield chosen, (met_out, met_back), fields
@@ -170,7 +198,11 @@ def _worth(factor: Field, strength: Array) -> NDArray[np.bool_]:
 
 
 def _specular_points(
-    ends: ArrayEnds, paths: Sequence[WallPath], path: NDArray[np.int64], part: NDArray[np.int64], poses: Poses
+    ends: ArrayEnds,
+    paths: Sequence[WallPath],
+    path: NDArray[np.int64],
+    part: NDArray[np.int64],
+    poses: Poses,
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Specular points, and whether there is one at all.
 
@@ -191,8 +223,14 @@ def _specular_points(
     for number in np.unique(path):
         chosen = np.flatnonzero(path == number)
         own = part[chosen]
-        from_tx, to_rx = images(paths[number].out, tx.reshape(-1, 3)), images(paths[number].back, rx.reshape(-1, 3))
-        centres, frames = (np.repeat(array[:, own], len(from_tx), axis=0) for array in (poses.centres, poses.frames))
+        from_tx, to_rx = (
+            images(paths[number].out, tx.reshape(-1, 3)),
+            images(paths[number].back, rx.reshape(-1, 3)),
+        )
+        centres, frames = (
+            np.repeat(array[:, own], len(from_tx), axis=0)
+            for array in (poses.centres, poses.frames)
+        )
         antennas = np.tile(from_tx, (anchors, 1)), np.tile(to_rx, (anchors, 1))[:, None]
         found = mirror(*antennas, centres, frames, poses.semi_axes[own], points=True)
         exists[..., chosen] = (np.abs(found[1]) > 0).reshape(*shape[:3], len(own))
@@ -221,7 +259,11 @@ class _Carried(NamedTuple):
 def _carry(around: Surroundings, legs: Sequence[Leg], antennas: Array, points: Array) -> _Carried:
     shape = (points.shape[0], *antennas.shape[:2], points.shape[2])
     field = np.zeros((len(around.frequency_hz), *shape, 3), dtype=np.complex128)
-    arriving, valid, of_leg = np.empty((*shape, 3)), np.empty(shape, dtype=bool), np.empty(len(legs), dtype=np.int64)
+    arriving, valid, of_leg = (
+        np.empty((*shape, 3)),
+        np.empty(shape, dtype=bool),
+        np.empty(len(legs), dtype=np.int64),
+    )
     pieces, all_waves = [], {}
     scene, frequency = around.scene, around.frequency_hz
     for leg in dict.fromkeys(legs):
@@ -260,7 +302,12 @@ def _no_furniture(room: RoomTracer, leg: _Carried, asked: NDArray[np.bool_]) -> 
 
 
 def _clear_of_body(
-    body: BodyTracer, leg: _Carried, clear: NDArray[np.bool_], anchor: int, part: NDArray[np.int64], direct: NDArray[np.int64]
+    body: BodyTracer,
+    leg: _Carried,
+    clear: NDArray[np.bool_],
+    anchor: int,
+    part: NDArray[np.int64],
+    direct: NDArray[np.int64],
 ) -> None:
     """Take out of ``clear (line, end, echo)``, of one posed anchor, what the body hides; direct echoes are not looked at."""
     rays = []
@@ -269,7 +316,18 @@ def _clear_of_body(
         line, end, echo = np.nonzero(clear[..., chosen] & ~np.isin(chosen, direct))
         # At the specular point the part itself cannot be in the way, before a wall it can.
         own = part[chosen[echo]] if last else np.full(len(echo), -1)
-        rays.append((origins[anchor, line, end, echo], targets[anchor, line, end, echo], own, line, end, chosen[echo]))
-    starts, stops, own, line, end, echo = (np.concatenate(column) for column in zip(*rays, strict=True))
+        rays.append(
+            (
+                origins[anchor, line, end, echo],
+                targets[anchor, line, end, echo],
+                own,
+                line,
+                end,
+                chosen[echo],
+            )
+        )
+    starts, stops, own, line, end, echo = (
+        np.concatenate(column) for column in zip(*rays, strict=True)
+    )
     hidden = ~body.sees(starts, stops, own)
     clear[line[hidden], end[hidden], echo[hidden]] = False

@@ -96,11 +96,17 @@ class Multipath:
         material: str = "perfect-conductor",
     ) -> None:
         if not spreading and (scene.walls or scene.furniture):
-            raise InputError(f"scene '{scene.name}': spreading may be off in free space only; leave --no-spreading out")
+            raise InputError(
+                f"scene '{scene.name}': spreading may be off in free space only; leave --no-spreading out"
+            )
         if isinstance(order, bool) or order not in range(4):
-            raise InputError(f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3")
+            raise InputError(
+                f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3"
+            )
         if fidelity not in ("specular", "analytic"):
-            raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: specular, analytic")
+            raise InputError(
+                f"fidelity '{fidelity}' knows no walls; allowed in a room: specular, analytic"
+            )
         self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
         self._visibility: MirrorVisibility | None = None
@@ -116,18 +122,26 @@ class Multipath:
             tracer = BodyTracer(mi, body.semi_axes)
             self._visibility = MirrorVisibility(radar, body, tracer)
             tracers = (tracer, RoomTracer(mi, scene))
-        series = room_series(scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order)
+        series = room_series(
+            scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
+        )
         self._frequency = series.frequency
         self._surface = Surface(material, radar)
         eta = body_material(material, self._frequency).eta(self._frequency)
-        self._around = Surroundings(scene, series.walls, tracers, eta, self._frequency, radar.polarization)
+        self._around = Surroundings(
+            scene, series.walls, tracers, eta, self._frequency, radar.polarization
+        )
         self._plain = not scene.walls and not scene.furniture and material == "perfect-conductor"
         self._ends = ArrayEnds.of(radar)
         self._step = anchor_step(radar, ANCHORS_S)
-        self.paths: tuple[WallPath, ...] = wall_paths(scene.walls, np.asarray(radar.position_m), order)
+        self.paths: tuple[WallPath, ...] = wall_paths(
+            scene.walls, np.asarray(radar.position_m), order
+        )
         self._over_walls = WallEchoes(radar, self.paths, far_field=fidelity == "analytic")
         parts = len(body.part_names)
-        self._path, self._part = (array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts))
+        self._path, self._part = (
+            array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts)
+        )
         self._terms = PathTerms(radar, scene, series.walls, self.paths, self._path)
         self.not_followed: dict[str, float] = {}
         self._kept: dict[int, PathAnchors] = {}
@@ -156,7 +170,10 @@ class Multipath:
         n_direct, n_echoes = at.centres.shape[1], len(self._part)
         length, amplitude = self._direct(chirps, at, near.take(slice(n_direct)).places())
         shape = (len(self._frequency), *length.shape[:2])
-        lengths, bare = np.empty((*length.shape[:2], n_echoes)), np.empty((*length.shape[:2], n_echoes))
+        lengths, bare = (
+            np.empty((*length.shape[:2], n_echoes)),
+            np.empty((*length.shape[:2], n_echoes)),
+        )
         lengths[..., :n_direct], bare[..., :n_direct] = length, amplitude
         if n_echoes > n_direct:
             ghosts = slice(n_direct, n_echoes)
@@ -167,10 +184,23 @@ class Multipath:
         if self._terms.delayed:
             echo = np.array(self._terms.echo)
             lengths = self._terms.lengths(at, near.places(), self._part, lengths)
-            bare, seen_before, seen_after = (array[..., echo] for array in (bare, seen_before, seen_after))
+            bare, seen_before, seen_after = (
+                array[..., echo] for array in (bare, seen_before, seen_after)
+            )
         out = np.empty((*shape, len(self._terms)), dtype=np.complex64)
         weights = tx_weight, self._ends.rx_weight[at.tx_index]
-        weigh(bare, before.factor, after.factor, seen_before, seen_after, share, interval, line, *weights, out)
+        weigh(
+            bare,
+            before.factor,
+            after.factor,
+            seen_before,
+            seen_after,
+            share,
+            interval,
+            line,
+            *weights,
+            out,
+        )
         return self._as_echoes(at.tx_index, lengths, out)
 
     def course(self, name: str, point: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -180,11 +210,18 @@ class Multipath:
         out, back = (corners(leg, middle, point)[0] for leg in (path.out, path.back))
         return np.array([*out, *reversed(back[:-1])])
 
-    def _as_echoes(self, tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.complex128]) -> Echoes:
+    def _as_echoes(
+        self, tx: NDArray[np.int64], length: NDArray[np.float64], amplitude: NDArray[np.complex128]
+    ) -> Echoes:
         echo = np.array(self._terms.echo, dtype=np.int64)
         bounces = 1 + np.array([self.paths[path].order for path in self._path], dtype=np.int64)
         return Echoes(
-            length=length, amplitude=amplitude, frequency=self._frequency, tx=tx, part=self._part[echo], bounces=bounces[echo]
+            length=length,
+            amplitude=amplitude,
+            frequency=self._frequency,
+            tx=tx,
+            part=self._part[echo],
+            bounces=bounces[echo],
         )
 
     def _direct(
@@ -195,7 +232,9 @@ class Multipath:
             return far_field_echo(*at[1:], spreading=self._spreading)
         weight, met = self._visibility.at(chirps)
         start = met if near is None else near
-        length, amplitude, _ = mirror(*at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading)
+        length, amplitude, _ = mirror(
+            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        )
         return length, amplitude * weight
 
     # -- anchors -------------------------------------------------------------------------------------------------
@@ -206,11 +245,19 @@ class Multipath:
         """Interval of each chirp, share of it that is over, and the anchors before and after each interval."""
         intervals, interval = np.unique(chirps // self._step, return_inverse=True)
         share = chirps % self._step / self._step
-        ends = np.concatenate([intervals, intervals[[bool(share[interval == i].any()) for i in range(len(intervals))]] + 1])
+        ends = np.concatenate(
+            [
+                intervals,
+                intervals[[bool(share[interval == i].any()) for i in range(len(intervals))]] + 1,
+            ]
+        )
         self._find(np.unique(ends))
         before = _stack([self._kept[int(number)] for number in intervals], len(self._terms))
         # Where every chirp of an interval is its first, what comes after it does not matter.
-        after = _stack([self._kept.get(int(number) + 1, self._kept[int(number)]) for number in intervals], len(self._terms))
+        after = _stack(
+            [self._kept.get(int(number) + 1, self._kept[int(number)]) for number in intervals],
+            len(self._terms),
+        )
         return interval, share, before, after
 
     def _find(self, numbers: NDArray[np.int64]) -> None:
@@ -218,13 +265,25 @@ class Multipath:
         for first in range(0, len(missing), _ANCHORS_AT_ONCE):
             some = missing[first : first + _ANCHORS_AT_ONCE]
             at = chirp_poses(self._radar, self._body, np.array(some) * self._step)
-            found = path_anchors(self._around, self._ends, self.paths, self._path, self._part, self._terms, Poses(*at[3:]))
+            found = path_anchors(
+                self._around,
+                self._ends,
+                self.paths,
+                self._path,
+                self._part,
+                self._terms,
+                Poses(*at[3:]),
+            )
             for place, number in enumerate(some):
                 self._kept[number] = PathAnchors(*(array[place].copy() for array in found))
         needed = set(numbers.tolist())
         # The first that came stay, for a recording is gone through twice, from its start.
-        size = max((sum(array.nbytes for array in anchor) for anchor in self._kept.values()), default=1)
-        for number in [number for number in self._kept if number not in needed][int(_KEPT_BYTES / size) :]:
+        size = max(
+            (sum(array.nbytes for array in anchor) for anchor in self._kept.values()), default=1
+        )
+        for number in [number for number in self._kept if number not in needed][
+            int(_KEPT_BYTES / size) :
+        ]:
             del self._kept[number]
 
     # -- what is worth its cost ------------------------------------------------------------------------------------
@@ -262,7 +321,9 @@ class Multipath:
             if column_power.sum() > 0
         }
         gain = radar.samples_per_chirp * radar.cycles_per_frame * radar.n_channels
-        worth = (column_power > 0) & (column_power * gain >= noise_power_m2 * 10 ** (-MARGIN_DB / 10))
+        worth = (column_power > 0) & (
+            column_power * gain >= noise_power_m2 * 10 ** (-MARGIN_DB / 10)
+        )
         echo = np.array(self._terms.echo)
         power, keep = np.zeros(len(self._part)), np.zeros(len(self._part), dtype=bool)
         np.add.at(power, echo, column_power)
@@ -283,7 +344,9 @@ class Multipath:
         for number, anchor in self._kept.items():
             (factor, seen, start), count = anchor, len(columns)
             kept = _widened(factor, count)[..., columns].copy()
-            self._kept[number] = PathAnchors(kept, seen[..., keep].copy(), start[..., keep, :].copy())
+            self._kept[number] = PathAnchors(
+                kept, seen[..., keep].copy(), start[..., keep, :].copy()
+            )
 
 
 class PersonAlone:
@@ -298,12 +361,16 @@ class PersonAlone:
         room = self._room
         at = chirp_poses(room._radar, room._body, chirps)
         length, amplitude = room._direct(chirps, at)
-        return one_echo_a_part(at.tx_index, length, room._surface.echo(at, amplitude), room._radar.centre_frequency_hz)
+        return one_echo_a_part(
+            at.tx_index, length, room._surface.echo(at, amplitude), room._radar.centre_frequency_hz
+        )
 
 
 def _stack(anchors: list[PathAnchors], columns: int) -> PathAnchors:
     factor, seen, start = zip(*anchors, strict=True)
-    return PathAnchors(np.stack([_widened(own, columns) for own in factor]), np.stack(seen), np.stack(start))
+    return PathAnchors(
+        np.stack([_widened(own, columns) for own in factor]), np.stack(seen), np.stack(start)
+    )
 
 
 def _widened(factor: NDArray[np.complex64], columns: int) -> NDArray[np.complex64]:

@@ -70,8 +70,18 @@ def account(
     lost = own & ~keep
     why = []
     if (power[lost] == 0).any():
-        why.append("never seen: no specular point in the wall, or in the shadow of furniture or body")
+        why.append(
+            "never seen: no specular point in the wall, or in the shadow of furniture or body"
+        )
     if (power[lost] > 0).any():
         why.append(f"more than {MARGIN_DB:g} dB below the noise after processing")
     over = 10 * math.log10(total / noise) if total > 0 and noise > 0 else None
-    return PathAccount(path.name, path.order, total, over, tuple(names[own & keep]), tuple(names[lost]), "; ".join(why))
+    return PathAccount(
+        path.name,
+        path.order,
+        total,
+        over,
+        tuple(names[own & keep]),
+        tuple(names[lost]),
+        "; ".join(why),
+    )

@@ -47,7 +47,12 @@ class PathTerms:
     """
 
     def __init__(
-        self, radar: Radar, scene: Scene, series: Sequence[WallSeries], paths: Sequence[WallPath], path: NDArray[np.int64]
+        self,
+        radar: Radar,
+        scene: Scene,
+        series: Sequence[WallSeries],
+        paths: Sequence[WallPath],
+        path: NDArray[np.int64],
     ) -> None:
         self._radar, self._scene, self._series, self._paths = radar, scene, series, paths
         self._path = path
@@ -83,8 +88,13 @@ class PathTerms:
         """Leave out all other columns for good, and all other echoes, of which no column may be left."""
         number = np.cumsum(echo) - 1
         chosen = np.flatnonzero(column)
-        self.echo, self.met = [int(number[self.echo[i]]) for i in chosen], [self.met[i] for i in chosen]
-        self._columns = {key: place for place, key in enumerate(zip(self.echo, self.met, strict=True))}
+        self.echo, self.met = (
+            [int(number[self.echo[i]]) for i in chosen],
+            [self.met[i] for i in chosen],
+        )
+        self._columns = {
+            key: place for place, key in enumerate(zip(self.echo, self.met, strict=True))
+        }
         self._path = self._path[echo]
         self._lists, self._settled = None, True
 
@@ -92,12 +102,17 @@ class PathTerms:
         """Walls that each column met and that neither terms nor nodes follow over the sweep."""
         return [
             frozenset(
-                self._scene.walls[one.wall].name for way in met for one in way if not self._series[one.wall].held[one.passes % 2]
+                self._scene.walls[one.wall].name
+                for way in met
+                for one in way
+                if not self._series[one.wall].held[one.passes % 2]
             )
             for met in self.met
         ]
 
-    def lengths(self, at: ChirpPoses, places: Array, part: NDArray[np.int64], length: Array) -> Array:
+    def lengths(
+        self, at: ChirpPoses, places: Array, part: NDArray[np.int64], length: Array
+    ) -> Array:
         """Lengths of all columns.
 
         Parameters
@@ -121,12 +136,28 @@ class PathTerms:
         out = np.empty((*length.shape[:2], len(self)))
         echo = np.array(self.echo)
         body = at.centres, at.frames, at.semi_axes, part
-        _longer(self._tx, self._rx, at.tx_index, places, *body, length, echo, column, wall_of, passage, out)
+        _longer(
+            self._tx,
+            self._rx,
+            at.tx_index,
+            places,
+            *body,
+            length,
+            echo,
+            column,
+            wall_of,
+            passage,
+            out,
+        )
         return out
 
     def _listed(self) -> tuple[NDArray[np.int64], NDArray[np.int64], Array]:
         """For each column its two legs and where their passages begin and end; passes, and what they depend on."""
-        column, passes, passage = np.zeros((len(self), 2, 3), dtype=np.int64), list[int](), list[Array]()
+        column, passes, passage = (
+            np.zeros((len(self), 2, 3), dtype=np.int64),
+            list[int](),
+            list[Array](),
+        )
         for number, (echo, met) in enumerate(zip(self.echo, self.met, strict=True)):
             path = self._paths[self._path[echo]]
             for side, leg in enumerate((path.out, path.back)):
@@ -135,8 +166,20 @@ class PathTerms:
                     wall = self._scene.walls[one.wall]
                     index_squared = self._series[one.wall].terms[one.passes % 2][-1].index_squared
                     passes.append(one.passes)
-                    passage.append(np.array([*_seen_from_the_end(self._scene, leg, one), wall.thickness_m, index_squared]))
-        return column, np.array(passes, dtype=np.int64), np.array(passage, dtype=np.float64).reshape(-1, 5)
+                    passage.append(
+                        np.array(
+                            [
+                                *_seen_from_the_end(self._scene, leg, one),
+                                wall.thickness_m,
+                                index_squared,
+                            ]
+                        )
+                    )
+        return (
+            column,
+            np.array(passes, dtype=np.int64),
+            np.array(passage, dtype=np.float64).reshape(-1, 5),
+        )
 
 
 def _seen_from_the_end(scene: Scene, leg: Leg, one: Passage) -> Array:
@@ -148,7 +191,7 @@ def _seen_from_the_end(scene: Scene, leg: Leg, one: Passage) -> Array:
 
 
 @inlined()
-def _delay(antenna, place, first, last, passes, passage):  # type: ignore[no-untyped-def]
+def _delay(antenna, place, first, last, passes, passage):
     """What the passages on a leg add to it."""
     x, y, z = place[0] - antenna[0], place[1] - antenna[1], place[2] - antenna[2]
     inverse = 1 / math.sqrt(x * x + y * y + z * z)
@@ -163,7 +206,7 @@ def _delay(antenna, place, first, last, passes, passage):  # type: ignore[no-unt
 
 
 @inlined()
-def _on_surface(local, axes, centre, frame, out):  # type: ignore[no-untyped-def]
+def _on_surface(local, axes, centre, frame, out):
     """Where the ray from a part's centre through a point in its axes leaves the ellipsoid; ``out`` in the world."""
     x, y, z = local
     size = math.sqrt((x / axes[0]) ** 2 + (y / axes[1]) ** 2 + (z / axes[2]) ** 2)
@@ -174,8 +217,21 @@ def _on_surface(local, axes, centre, frame, out):  # type: ignore[no-untyped-def
 
 
 @compiled(parallel=True)
-def _longer(  # type: ignore[no-untyped-def]
-    tx, rx, tx_index, local, centres, frames, semi_axes, part, length, echo, column, passes, passage, out
+def _longer(
+    tx,
+    rx,
+    tx_index,
+    local,
+    centres,
+    frames,
+    semi_axes,
+    part,
+    length,
+    echo,
+    column,
+    passes,
+    passage,
+    out,
 ):
     """Fill ``out (chirp, rx, column)``; ``column (column, 2, 3)``: leg, first passage and the one after the last, each way."""
     chirps, receivers, columns = out.shape
@@ -184,14 +240,26 @@ def _longer(  # type: ignore[no-untyped-def]
         places = np.empty((len(part), 3))
         for one in range(len(part)):
             own = part[one]
-            _on_surface(local[chirp, one], semi_axes[own], centres[chirp, own], frames[chirp, own], places[one])
+            _on_surface(
+                local[chirp, one],
+                semi_axes[own],
+                centres[chirp, own],
+                frames[chirp, own],
+                places[one],
+            )
         for number in range(columns):
             place = places[echo[number]]
             leg, first, last = column[number, 0, 0], column[number, 0, 1], column[number, 0, 2]
-            more = _delay(tx[leg, transmitter], place, first, last, passes, passage) if last > first else 0.0
+            more = (
+                _delay(tx[leg, transmitter], place, first, last, passes, passage)
+                if last > first
+                else 0.0
+            )
             leg, first, last = column[number, 1, 0], column[number, 1, 1], column[number, 1, 2]
             for receiver in range(receivers):
                 whole = length[chirp, receiver, echo[number]] + more
                 if last > first:
-                    whole += _delay(rx[leg, transmitter, receiver], place, first, last, passes, passage)
+                    whole += _delay(
+                        rx[leg, transmitter, receiver], place, first, last, passes, passage
+                    )
                 out[chirp, receiver, number] = whole

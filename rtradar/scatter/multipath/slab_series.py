@@ -66,17 +66,25 @@ class Term:
         inside = self.passes * thickness_m * np.sqrt(self.index_squared - 1 + cosine**2)
         return np.asarray(inside - thickness_m * cosine if self.passes % 2 else inside)
 
-    def coefficient(self, wall: Wall, cosine: Array, frequency: Array, polarization: Polarization) -> Field:
+    def coefficient(
+        self, wall: Wall, cosine: Array, frequency: Array, polarization: Polarization
+    ) -> Field:
         """Its factor (...) for the field, without the phase of `extra_m`; of transmission, in place of as much air."""
         eta = wall.material.eta(frequency)
         if self.whole:
             factor = slab(eta, wall.thickness_m, frequency, cosine, polarization)[self.passes % 2]
         else:
-            factor = slab_passes(eta, wall.thickness_m, frequency, cosine, polarization, self.passes, rest=self.rest)
+            factor = slab_passes(
+                eta, wall.thickness_m, frequency, cosine, polarization, self.passes, rest=self.rest
+            )
         extra = self.extra_m(wall.thickness_m, cosine)
         if self.passes % 2:
             extra = extra + wall.thickness_m * cosine
-        return np.asarray(factor * np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * extra)) if extra.any() else factor
+        return (
+            np.asarray(factor * np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * extra))
+            if extra.any()
+            else factor
+        )
 
 
 WHOLE = (Term(0, rest=True), Term(1, rest=True))
@@ -97,7 +105,9 @@ class RoomSeries(NamedTuple):
     frequency: Array
 
 
-def room_series(walls: Sequence[Wall], radar: Radar, *, most_nodes: int, enough: float, bounces: int) -> RoomSeries:
+def room_series(
+    walls: Sequence[Wall], radar: Radar, *, most_nodes: int, enough: float, bounces: int
+) -> RoomSeries:
     """The fewest terms of each wall, and then the fewest Chebyshev nodes, by which all coefficients are known.
 
     Parameters
@@ -123,7 +133,8 @@ def room_series(walls: Sequence[Wall], radar: Radar, *, most_nodes: int, enough:
         if key not in known:
             powers = min(max(bounces, 1), 2), 2
             (back, first, one), (on, second, other) = (
-                _fewest(wall, radar, passes, power, most_nodes, enough) for passes, power in enumerate(powers)
+                _fewest(wall, radar, passes, power, most_nodes, enough)
+                for passes, power in enumerate(powers)
             )
             known[key] = WallSeries((back, on), (one, other)), max(first, second)
         chosen.append(known[key][0])
@@ -164,12 +175,18 @@ def _fewest(
 
         def off(count: int, terms: tuple[Term, ...] = terms, exact: Field = exact) -> float:
             nodes = chebyshev(radar, count)
-            known = np.einsum("fn,tnpc->tfpc", _through(nodes, dense), _products(wall, terms, nodes, power))
+            known = np.einsum(
+                "fn,tnpc->tfpc", _through(nodes, dense), _products(wall, terms, nodes, power)
+            )
             return float((np.abs(known - exact).sum(axis=0).max(axis=(0, 1)) / scale).max())
 
         worst = off(most_nodes)
         if worst < enough:
-            return terms, next((count for count in range(1, most_nodes) if off(count) < enough), most_nodes), True
+            return (
+                terms,
+                next((count for count in range(1, most_nodes) if off(count) < enough), most_nodes),
+                True,
+            )
         if worst < least:
             least, best = worst, terms
     return best, most_nodes, False
@@ -183,13 +200,19 @@ def _forms(passes: int, index_squared: float) -> Iterator[tuple[Term, ...]]:
 
 def _moved(passes: int, index_squared: float) -> Iterator[tuple[Term, ...]]:
     for count in range(1 if passes else 2, MOST_TERMS + 1):
-        yield tuple(Term(passes + 2 * i, rest=i == count - 1, index_squared=index_squared) for i in range(count))
+        yield tuple(
+            Term(passes + 2 * i, rest=i == count - 1, index_squared=index_squared)
+            for i in range(count)
+        )
 
 
 def _products(wall: Wall, terms: Sequence[Term], frequency: Array, power: int) -> Field:
     """Coefficients of all terms, or of all pairs of them, (term or pair, node, polarization, cosine)."""
     each = np.array(
-        [[term.coefficient(wall, _COSINES, frequency[:, None], kind) for kind in _POLARIZATIONS] for term in terms]
+        [
+            [term.coefficient(wall, _COSINES, frequency[:, None], kind) for kind in _POLARIZATIONS]
+            for term in terms
+        ]
     ).swapaxes(1, 2)
     return each if power == 1 else (each[:, None] * each[None]).reshape(-1, *each.shape[1:])
 
@@ -204,5 +227,8 @@ def _index_squared(material: Material, radar: Radar) -> float:
 def _through(nodes: Array, dense: Array) -> Array:
     """Values (dense, node) of the Lagrange polynomials of the nodes."""
     others = ~np.eye(len(nodes), dtype=bool)
-    columns = [np.prod((dense[:, None] - nodes[own]) / (nodes[i] - nodes[own]), axis=1) for i, own in enumerate(others)]
+    columns = [
+        np.prod((dense[:, None] - nodes[own]) / (nodes[i] - nodes[own]), axis=1)
+        for i, own in enumerate(others)
+    ]
     return np.stack(columns, axis=1)

@@ -43,7 +43,9 @@ class WallEchoes:
         self._rx_in_lanes = np.ascontiguousarray(np.swapaxes(self._rx, 2, 3))
         self._rx_middle = np.array([images(leg, ends.rx_middle[ends.line_of_tx]) for leg in legs])
 
-    def at(self, path: NDArray[np.int64], part: NDArray[np.int64], poses: ChirpPoses, near: Nearby) -> tuple[Array, Array]:
+    def at(
+        self, path: NDArray[np.int64], part: NDArray[np.int64], poses: ChirpPoses, near: Nearby
+    ) -> tuple[Array, Array]:
         """Lengths and returns.
 
         Parameters
@@ -60,12 +62,22 @@ class WallEchoes:
             [m]; without regard to polarisation, which is a matter of the legs.
         """
         shape = (*poses.rx.shape[:2], len(path))
-        length, amplitude, known = np.empty(shape), np.empty(shape), np.empty((shape[0], shape[2]), dtype=bool)
+        length, amplitude, known = (
+            np.empty(shape),
+            np.empty(shape),
+            np.empty((shape[0], shape[2]), dtype=bool),
+        )
         if self._far_field:
             for number in np.unique(path):
                 own = path == number
-                ellipsoids = (poses.centres[:, part[own]], poses.frames[:, part[own]], poses.semi_axes[part[own]])
-                length[..., own], amplitude[..., own] = far_field_echo(*self._antennas(number, poses.tx_index), *ellipsoids)
+                ellipsoids = (
+                    poses.centres[:, part[own]],
+                    poses.frames[:, part[own]],
+                    poses.semi_axes[part[own]],
+                )
+                length[..., own], amplitude[..., own] = far_field_echo(
+                    *self._antennas(number, poses.tx_index), *ellipsoids
+                )
             return length, amplitude
         nearby_echoes(
             self._tx,
@@ -84,9 +96,15 @@ class WallEchoes:
         for echo in np.flatnonzero(~known.all(axis=0)):
             chirps, own = np.flatnonzero(~known[:, echo]), part[echo : echo + 1]
             tx, rx = self._antennas(path[echo], poses.tx_index[chirps])
-            ellipsoids = (poses.centres[chirps][:, own], poses.frames[chirps][:, own], poses.semi_axes[own])
+            ellipsoids = (
+                poses.centres[chirps][:, own],
+                poses.frames[chirps][:, own],
+                poses.semi_axes[own],
+            )
             polarization = self._radar.polarization
-            exact, strength, points = mirror(tx, rx, *ellipsoids, polarization=polarization, points=True)
+            exact, strength, points = mirror(
+                tx, rx, *ellipsoids, polarization=polarization, points=True
+            )
             share = copolar(tx[:, None, None] - points, rx[:, :, None] - points, polarization)
             length[chirps, :, echo] = exact[..., 0]
             returned = strength / np.where(np.abs(share) > 1e-6, share, np.inf)

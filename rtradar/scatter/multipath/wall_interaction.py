@@ -26,7 +26,9 @@ Series = Sequence[WallSeries]
 Waves = list["Wave"]
 _POLARIZATIONS: tuple[Polarization, ...] = ("te", "tm")
 
-_NORMAL_INCIDENCE = 1e-9  # sine of incidence below which the plane of incidence has no direction of its own
+_NORMAL_INCIDENCE = (
+    1e-9  # sine of incidence below which the plane of incidence has no direction of its own
+)
 
 
 def height(wall: Wall, points: Array, *, back: bool = False) -> Array:
@@ -55,7 +57,9 @@ def inside(wall: Wall, points: Array, margin_m: float = 0.0) -> NDArray[np.bool_
     return within
 
 
-def specular_point(wall: Wall, origins: Array, targets: Array, *, back: bool = False) -> tuple[Array, NDArray[np.bool_]]:
+def specular_point(
+    wall: Wall, origins: Array, targets: Array, *, back: bool = False
+) -> tuple[Array, NDArray[np.bool_]]:
     """Where a wave from an origin to a target is reflected.
 
     Parameters
@@ -90,13 +94,17 @@ def crossed(wall: Wall, origins: Array, targets: Array) -> NDArray[np.bool_]:
     across = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
     if across.any():
         # Where they pass the front: the fronts of a room meet without a gap, the middle planes of its slabs do not.
-        starts, ends = (np.broadcast_to(places, (*across.shape, 3))[across] for places in (origins, targets))
+        starts, ends = (
+            np.broadcast_to(places, (*across.shape, 3))[across] for places in (origins, targets)
+        )
         share = first[across] / (first - second)[across]
         across[across] = inside(wall, starts + share[:, None] * (ends - starts))
     return across
 
 
-def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[0]) -> Field:
+def reflect(
+    wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[0]
+) -> Field:
     """The field after reflection, at the face that it meets.
 
     Parameters
@@ -122,11 +130,15 @@ def reflect(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike
     onward = directions - 2 * against[..., None] * normal
     cosine, frequency = np.minimum(np.abs(against), 1.0), _nodes(frequency_hz, against)
     te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in _POLARIZATIONS)
-    lost = np.exp(-2 * (2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.roughness_m * cosine) ** 2)
+    lost = np.exp(
+        -2 * (2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.roughness_m * cosine) ** 2
+    )
     return _dyad(field, directions, onward, normal, te * lost, tm * lost)
 
 
-def transmit(wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[1]) -> Field:
+def transmit(
+    wall: Wall, field: Field, directions: Array, frequency_hz: ArrayLike, term: Term = WHOLE[1]
+) -> Field:
     """The field behind the wall, in place of the same way through air; arguments as those of `reflect`.
 
     The ray goes straight on: the small shift to the side is left out, its phase is not.
@@ -157,7 +169,15 @@ class Wave(NamedTuple):
     field: Field
 
 
-def reflected(scene: Scene, series: Series, number: int, piece: int, waves: Waves, directions: Array, frequency: Array) -> Waves:
+def reflected(
+    scene: Scene,
+    series: Series,
+    number: int,
+    piece: int,
+    waves: Waves,
+    directions: Array,
+    frequency: Array,
+) -> Waves:
     """Waves after reflection by a wall, each once for each term of its slab.
 
     Parameters
@@ -192,7 +212,13 @@ def reflected(scene: Scene, series: Series, number: int, piece: int, waves: Wave
 
 
 def through_walls(
-    scene: Scene, series: Series, piece: int, waves: Waves, origins: Array, targets: Array, frequency: Array
+    scene: Scene,
+    series: Series,
+    piece: int,
+    waves: Waves,
+    origins: Array,
+    targets: Array,
+    frequency: Array,
 ) -> Waves:
     """Waves at the end of straight legs, through all walls on the way.
 
@@ -215,7 +241,9 @@ def through_walls(
     list of Wave
         Without spreading and without the phase of the leg's length; 0 behind metal.
     """
-    origins, targets = np.broadcast_arrays(np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64))
+    origins, targets = np.broadcast_arrays(
+        np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)
+    )
     for number, wall in enumerate(scene.walls):
         legs = crossed(wall, origins, targets)
         if not legs.any():
@@ -242,7 +270,13 @@ def through_walls(
 def setting_out(field: Array, nodes: int) -> Waves:
     """A wave at its antenna, of a field (..., 3) that is the same at all nodes."""
     shape = np.shape(field)
-    return [Wave((), np.zeros(shape[:-1]), np.array(np.broadcast_to(field, (nodes, *shape)), dtype=np.complex128))]
+    return [
+        Wave(
+            (),
+            np.zeros(shape[:-1]),
+            np.array(np.broadcast_to(field, (nodes, *shape)), dtype=np.complex128),
+        )
+    ]
 
 
 def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
@@ -251,12 +285,20 @@ def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
     return frequency.reshape(-1, *(1,) * like.ndim)
 
 
-def _dyad(field: Field, arriving: Array, leaving: Array, normal: Array, te: Field, tm: Field) -> Field:
+def _dyad(
+    field: Field, arriving: Array, leaving: Array, normal: Array, te: Field, tm: Field
+) -> Field:
     across = np.cross(arriving, normal)
     sine = np.linalg.norm(across, axis=-1, keepdims=True)
     # Straight on, both coefficients do the same: any direction across serves.
     spare = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across = np.where(sine > _NORMAL_INCIDENCE, across / np.where(sine > 0, sine, 1.0), spare / np.linalg.norm(spare))
+    across = np.where(
+        sine > _NORMAL_INCIDENCE,
+        across / np.where(sine > 0, sine, 1.0),
+        spare / np.linalg.norm(spare),
+    )
     share_te = (field * across).sum(axis=-1) * te
     share_tm = (field * np.cross(across, arriving)).sum(axis=-1) * tm
-    return np.asarray(share_te[..., None] * across + share_tm[..., None] * np.cross(across, leaving))
+    return np.asarray(
+        share_te[..., None] * across + share_tm[..., None] * np.cross(across, leaving)
+    )

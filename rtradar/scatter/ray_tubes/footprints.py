@@ -32,7 +32,9 @@ from rtradar.kernels.phasor import phasor
 from rtradar.scatter.facets.triangle_mean import mean_of_phasor
 
 Array = NDArray[np.float64]
-_TASKS = 32  # that threads share: some receivers, and a share of the tubes that is summed on its own
+_TASKS = (
+    32  # that threads share: some receivers, and a share of the tubes that is summed on its own
+)
 _STEEP = 1e-9  # sine of the angle from the vertical below which v has no direction of its own
 
 
@@ -116,7 +118,9 @@ def radiate(
     (node, rx, group) complex128
         Scattering length for exp(+j omega t), over R2 with ``spreading`` [m].
     """
-    parts = np.zeros((math.ceil(_TASKS / len(rx)), len(wavenumber), *length.shape), dtype=np.complex128)
+    parts = np.zeros(
+        (math.ceil(_TASKS / len(rx)), len(wavenumber), *length.shape), dtype=np.complex128
+    )
     if len(footprints):
         f, c = footprints, np.ascontiguousarray
         _radiate(
@@ -152,7 +156,7 @@ def across(direction: Array, polarization: Literal["v", "h"]) -> Array:
 
 
 @compiled(parallel=True)
-def _radiate(  # type: ignore[no-untyped-def]
+def _radiate(
     places,
     path,
     direction,
@@ -202,7 +206,9 @@ def _radiate(  # type: ignore[no-untyped-def]
             else:
                 qx, qy, qz = sy * hz - sz * hy, sz * hx - sx * hz, sx * hy - sy * hx
             n_s = nx * sx + ny * sy + nz * sz
-            weight = (ex * qx + ey * qy + ez * qz) * (n_s - n_d) + (qx * dx + qy * dy + qz * dz) * n_e
+            weight = (ex * qx + ey * qy + ez * qz) * (n_s - n_d) + (
+                qx * dx + qy * dy + qz * dz
+            ) * n_e
             weight -= (ex * sx + ey * sy + ez * sz) * (nx * qx + ny * qy + nz * qz)
             weight /= 2
             if tapered:
@@ -212,14 +218,24 @@ def _radiate(  # type: ignore[no-untyped-def]
             own = group[tube]
             mean = 0.0
             for corner in range(3):
-                wx, wy, wz = x - places[tube, corner, 0], y - places[tube, corner, 1], z - places[tube, corner, 2]
-                u[corner] = path[tube, corner] - length[receiver, own] + math.sqrt(wx * wx + wy * wy + wz * wz)
+                wx, wy, wz = (
+                    x - places[tube, corner, 0],
+                    y - places[tube, corner, 1],
+                    z - places[tube, corner, 2],
+                )
+                u[corner] = (
+                    path[tube, corner]
+                    - length[receiver, own]
+                    + math.sqrt(wx * wx + wy * wy + wz * wz)
+                )
                 mean += u[corner] / 3
             # A bow of the path across the triangle, quadratic, is on average 3/4 of what it is in the middle.
             bow = 0.75 * (path[tube, 3] + leg - length[receiver, own] - mean)
             for node in range(nodes):
                 k = wavenumber[node]
-                real, imaginary = mean_of_phasor(k * (u[0] - mean), k * (u[1] - mean), k * (u[2] - mean))
+                real, imaginary = mean_of_phasor(
+                    k * (u[0] - mean), k * (u[1] - mean), k * (u[2] - mean)
+                )
                 phase = k * (mean + bow)
                 cosine, sine = phasor(phase / (2 * math.pi))
                 out[chunk, node, receiver, own] += weight * complex(

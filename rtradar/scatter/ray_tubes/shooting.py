@@ -101,7 +101,9 @@ class Shooter:
         steepness = np.einsum("ti,ti->t", tx - tubes.places[:, 3], tubes.normals[:, 3])
         lit = np.flatnonzero(steepness != 0 if self.two_sided else steepness > 0)
         middles = tubes.places[lit, 3]
-        lit = lit[self.surfaces.sees(np.broadcast_to(tx, middles.shape), middles, tubes.surface[lit])]
+        lit = lit[
+            self.surfaces.sees(np.broadcast_to(tx, middles.shape), middles, tubes.surface[lit])
+        ]
         places, normals = tubes.places[lit], tubes.normals[lit]
         if self.two_sided:
             normals = normals * np.sign(steepness[lit])[:, None, None]
@@ -113,7 +115,9 @@ class Shooter:
             field = field / path[:, 3:]
         return Footprints(places, path, directions, normals, field, tubes.surface[lit]), lit
 
-    def _follow(self, start: Footprints) -> tuple[list[tuple[Footprints, NDArray[np.int64]]], NDArray[np.bool_]]:
+    def _follow(
+        self, start: Footprints
+    ) -> tuple[list[tuple[Footprints, NDArray[np.int64]]], NDArray[np.bool_]]:
         """Footprints after 2, 3, ... bounces with the tube each comes from, and which tubes want to be split."""
         rough = np.zeros(len(start), dtype=bool)
         here, origin, chain = start, np.arange(len(start)), []
@@ -135,7 +139,11 @@ def exits(surfaces: Surfaces, footprints: Footprints, rx: Array) -> NDArray[np.b
 
 
 def _bounce(
-    surfaces: Surfaces, here: Footprints, origin: NDArray[np.int64], rough: NDArray[np.bool_], wavenumber: float
+    surfaces: Surfaces,
+    here: Footprints,
+    origin: NDArray[np.int64],
+    rough: NDArray[np.bool_],
+    wavenumber: float,
 ) -> tuple[Footprints, NDArray[np.int64]]:
     """Footprints one bounce on, and the tubes they come from; marks ``rough`` ones."""
     against = np.einsum("tci,tci->tc", here.directions, here.normals)
@@ -159,14 +167,18 @@ def _bounce(
     normals = np.where(lands[..., None], normals, normals[:, 3:])
     steepness = np.einsum("tci,tci->tc", onward, normals)
     height = np.einsum("tci,tci->tc", places[:, 3:] - here.places, normals)
-    distance = np.where(lands, distance, height / np.where(steepness < -_GRAZING, steepness, np.nan))
+    distance = np.where(
+        lands, distance, height / np.where(steepness < -_GRAZING, steepness, np.nan)
+    )
     places = here.places + distance[..., None] * onward
     size = np.linalg.norm(here.places - here.places[:, 3:], axis=-1)
     whole = ((np.abs(distance) < 3 * (distance[:, 3:] + size)) & (against < 0)).all(axis=1)
     path = here.path + distance
     bow = path[:, 3] - path[:, :3].mean(axis=1)
     together = ((met == landing) | (wavenumber * np.abs(traced - distance) < _BOW_RAD)).all(axis=1)
-    rough[origin[~(whole & lands.all(axis=1) & together & (wavenumber * np.abs(bow) < _BOW_RAD))]] = True
+    rough[
+        origin[~(whole & lands.all(axis=1) & together & (wavenumber * np.abs(bow) < _BOW_RAD))]
+    ] = True
     there = Footprints(places, path, onward, normals, field, landing[:, 3]).take(whole)
     before, after = here.width()[whole], there.width()
     # A tube seen edge-on, or with its waist just here, has a footprint that sends nothing.
@@ -178,7 +190,10 @@ def _trace(surfaces: Surfaces, here: Footprints, onward: Array) -> tuple[NDArray
     """What the four rays of each tube meet, (tube, 4), and how far; -1 and infinity for nothing."""
     inward = here.places + _INSET * (here.places[:, 3:] - here.places)
     met, distance = surfaces.meets(
-        inward.reshape(-1, 3), here.normals.reshape(-1, 3), onward.reshape(-1, 3), np.repeat(here.surface, 4)
+        inward.reshape(-1, 3),
+        here.normals.reshape(-1, 3),
+        onward.reshape(-1, 3),
+        np.repeat(here.surface, 4),
     )
     return met.reshape(-1, 4), distance.reshape(-1, 4)
 
@@ -186,5 +201,8 @@ def _trace(surfaces: Surfaces, here: Footprints, onward: Array) -> tuple[NDArray
 def _joined(parts: list[Footprints], like: Footprints) -> Footprints:
     if not parts:
         return like.take(np.zeros(len(like), dtype=bool))
-    arrays = (np.concatenate([getattr(part, name) for part in parts]) for name in Footprints.__dataclass_fields__)
+    arrays = (
+        np.concatenate([getattr(part, name) for part in parts])
+        for name in Footprints.__dataclass_fields__
+    )
     return Footprints(*arrays)

@@ -126,7 +126,9 @@ def check_options(rays_per_wavelength: float, bounces: int) -> None:
         Where one is out of range.
     """
     if not 0.1 <= rays_per_wavelength <= 100:
-        raise InputError(f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100")
+        raise InputError(
+            f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100"
+        )
     if not (isinstance(bounces, int) and 1 <= bounces <= 10):
         raise InputError(f"rays: bounces = {bounces}; allowed are 1 to 10")
 

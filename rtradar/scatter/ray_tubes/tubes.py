@@ -69,7 +69,9 @@ class EllipsoidGrid:
         divisions = np.maximum(2, np.ceil(np.sqrt(_areas(semi_axes) / (5 * np.sqrt(3) * edge**2))))
         _refuse_many(20 * divisions**2)
         grids = [_sphere(int(n)) for n in divisions]
-        return cls(np.concatenate(grids), np.repeat(np.arange(len(grids)), [len(grid) for grid in grids]))
+        return cls(
+            np.concatenate(grids), np.repeat(np.arange(len(grids)), [len(grid) for grid in grids])
+        )
 
     def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
         """Those facets, each in four, on the sphere of the corners' own radius less what finer facets stand out less."""
@@ -102,7 +104,9 @@ class PosedGrid:
         """The facets in the world."""
         u, part = _with_middle(self.grid.corners), self.grid.part
         place, normal = np.empty_like(u), np.empty_like(u)
-        for index, (centre, frame, axes) in enumerate(zip(self.centres, self.frames, self.semi_axes, strict=True)):
+        for index, (centre, frame, axes) in enumerate(
+            zip(self.centres, self.frames, self.semi_axes, strict=True)
+        ):
             own = slice(*np.searchsorted(part, [index, index + 1]))
             place[own] = centre + (u[own] * axes) @ frame.T
             normal[own] = (u[own] / axes) @ frame.T
@@ -172,7 +176,9 @@ def _across(triangles: Array) -> Array:
 
 def _refuse_many(counts: Array) -> None:
     if counts.sum() > MOST_TUBES:
-        raise InputError(f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; lower rays_per_wavelength or the frequency")
+        raise InputError(
+            f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; lower rays_per_wavelength or the frequency"
+        )
 
 
 def _areas(semi_axes: Array) -> Array:

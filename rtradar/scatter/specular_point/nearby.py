@@ -47,17 +47,26 @@ class Nearby(NamedTuple):
 
     def take(self, echoes: slice) -> Nearby:
         """Some of the echoes."""
-        before, after = (np.ascontiguousarray(at[..., echoes, :]) for at in (self.before, self.after))
-        return self._replace(before=before, after=after, wanted=np.ascontiguousarray(self.wanted[..., echoes]))
+        before, after = (
+            np.ascontiguousarray(at[..., echoes, :]) for at in (self.before, self.after)
+        )
+        return self._replace(
+            before=before, after=after, wanted=np.ascontiguousarray(self.wanted[..., echoes])
+        )
 
     def places(self) -> Array:
         """The same for each chirp, (chirp, echo, 3)."""
-        ends = [np.einsum("cs,cs...->c...", self.tx_weight, at[self.interval, self.line]) for at in (self.before, self.after)]
-        return np.asarray(ends[0] + self.share[:, None, None] * (ends[1] - ends[0]), dtype=np.float64)
+        ends = [
+            np.einsum("cs,cs...->c...", self.tx_weight, at[self.interval, self.line])
+            for at in (self.before, self.after)
+        ]
+        return np.asarray(
+            ends[0] + self.share[:, None, None] * (ends[1] - ends[0]), dtype=np.float64
+        )
 
 
 @inlined()
-def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
+def _slope(point, to_e, to_f, antenna, out):
     """Range from ``point``, and its direction along two tangents: ``out`` = range, e, f."""
     x, y, z = antenna[0] - point[0], antenna[1] - point[1], antenna[2] - point[2]
     distance = math.sqrt(x * x + y * y + z * z)
@@ -67,14 +76,16 @@ def _slope(point, to_e, to_f, antenna, out):  # type: ignore[no-untyped-def]
 
 
 @inlined()
-def _facing(point, normal, antenna, distance):  # type: ignore[no-untyped-def]
+def _facing(point, normal, antenna, distance):
     return (
-        (antenna[0] - point[0]) * normal[0] + (antenna[1] - point[1]) * normal[1] + (antenna[2] - point[2]) * normal[2]
+        (antenna[0] - point[0]) * normal[0]
+        + (antenna[1] - point[1]) * normal[1]
+        + (antenna[2] - point[2]) * normal[2]
     ) / distance
 
 
 @inlined()
-def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untyped-def]
+def _tangents(local, axes, frame, e, f, normal, bend):
     """Tangents and normal in world axes at a point in the part's own; ``bend`` = ee, ff, ef of the shape operator."""
     n0, n1, n2 = local[0] / axes[0] ** 2, local[1] / axes[1] ** 2, local[2] / axes[2] ** 2
     gradient = math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
@@ -85,7 +96,11 @@ def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untype
     v = n0 * n1 * u
     e0, e1, e2 = 1 + sign * n0 * n0 * u, sign * v, -sign * n0
     f0, f1, f2 = v, sign + n1 * n1 * u, -n1
-    a, b, c = 1 / (axes[0] ** 2 * gradient), 1 / (axes[1] ** 2 * gradient), 1 / (axes[2] ** 2 * gradient)
+    a, b, c = (
+        1 / (axes[0] ** 2 * gradient),
+        1 / (axes[1] ** 2 * gradient),
+        1 / (axes[2] ** 2 * gradient),
+    )
     bend[0] = e0 * e0 * a + e1 * e1 * b + e2 * e2 * c
     bend[1] = f0 * f0 * a + f1 * f1 * b + f2 * f2 * c
     bend[2] = e0 * f0 * a + e1 * f1 * b + e2 * f2 * c
@@ -96,8 +111,21 @@ def _tangents(local, axes, frame, e, f, normal, bend):  # type: ignore[no-untype
 
 
 @compiled(parallel=True)
-def nearby_echoes(  # type: ignore[no-untyped-def]
-    tx, rx, middle, tx_index, out_leg, back_leg, part, centres, frames, semi_axes, near, length, amplitude, known
+def nearby_echoes(
+    tx,
+    rx,
+    middle,
+    tx_index,
+    out_leg,
+    back_leg,
+    part,
+    centres,
+    frames,
+    semi_axes,
+    near,
+    length,
+    amplitude,
+    known,
 ):
     """Lengths and returns of echoes, starting near their specular points.
 
@@ -141,8 +169,14 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
             if not near.wanted[which, line, echo]:
                 known[chirp, echo] = True
                 there_and_back = math.sqrt(
-                    (here[0] - centre[0]) ** 2 + (here[1] - centre[1]) ** 2 + (here[2] - centre[2]) ** 2
-                ) + math.sqrt((there[0] - centre[0]) ** 2 + (there[1] - centre[1]) ** 2 + (there[2] - centre[2]) ** 2)
+                    (here[0] - centre[0]) ** 2
+                    + (here[1] - centre[1]) ** 2
+                    + (here[2] - centre[2]) ** 2
+                ) + math.sqrt(
+                    (there[0] - centre[0]) ** 2
+                    + (there[1] - centre[1]) ** 2
+                    + (there[2] - centre[2]) ** 2
+                )
                 for receiver in range(receivers):
                     length[chirp, receiver, echo] = there_and_back
                     amplitude[chirp, receiver, echo] = 0.0
@@ -156,19 +190,40 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
             settled = False
             facing_tx = 0.0
             for _ in range(_MAX_STEPS):
-                scale = 1 / math.sqrt((local[0] / axes[0]) ** 2 + (local[1] / axes[1]) ** 2 + (local[2] / axes[2]) ** 2)
+                scale = 1 / math.sqrt(
+                    (local[0] / axes[0]) ** 2
+                    + (local[1] / axes[1]) ** 2
+                    + (local[2] / axes[2]) ** 2
+                )
                 for i in range(3):
                     local[i] *= scale
                 for i in range(3):
-                    point[i] = centre[i] + frame[i, 0] * local[0] + frame[i, 1] * local[1] + frame[i, 2] * local[2]
+                    point[i] = (
+                        centre[i]
+                        + frame[i, 0] * local[0]
+                        + frame[i, 1] * local[1]
+                        + frame[i, 2] * local[2]
+                    )
                 _tangents(local, axes, frame, e, f, normal, bend)
                 _slope(point, e, f, here, to_tx)
                 _slope(point, e, f, there, to_rx)
                 facing_tx = _facing(point, normal, here, to_tx[0])
                 facing = facing_tx + _facing(point, normal, there, to_rx[0])
-                h_ee = (1 - to_tx[1] ** 2) / to_tx[0] + (1 - to_rx[1] ** 2) / to_rx[0] + facing * bend[0]
-                h_ff = (1 - to_tx[2] ** 2) / to_tx[0] + (1 - to_rx[2] ** 2) / to_rx[0] + facing * bend[1]
-                h_ef = -to_tx[1] * to_tx[2] / to_tx[0] - to_rx[1] * to_rx[2] / to_rx[0] + facing * bend[2]
+                h_ee = (
+                    (1 - to_tx[1] ** 2) / to_tx[0]
+                    + (1 - to_rx[1] ** 2) / to_rx[0]
+                    + facing * bend[0]
+                )
+                h_ff = (
+                    (1 - to_tx[2] ** 2) / to_tx[0]
+                    + (1 - to_rx[2] ** 2) / to_rx[0]
+                    + facing * bend[1]
+                )
+                h_ef = (
+                    -to_tx[1] * to_tx[2] / to_tx[0]
+                    - to_rx[1] * to_rx[2] / to_rx[0]
+                    + facing * bend[2]
+                )
                 determinant = h_ee * h_ff - h_ef * h_ef
                 slope_e, slope_f = to_tx[1] + to_rx[1], to_tx[2] + to_rx[2]
                 step_e = (h_ff * slope_e - h_ef * slope_f) / determinant
@@ -182,8 +237,12 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                     break
                 # The step, turned back into the part's own axes.
                 for i in range(3):
-                    local[i] += step_e * (frame[0, i] * e[0] + frame[1, i] * e[1] + frame[2, i] * e[2])
-                    local[i] += step_f * (frame[0, i] * f[0] + frame[1, i] * f[1] + frame[2, i] * f[2])
+                    local[i] += step_e * (
+                        frame[0, i] * e[0] + frame[1, i] * e[1] + frame[2, i] * e[2]
+                    )
+                    local[i] += step_f * (
+                        frame[0, i] * f[0] + frame[1, i] * f[1] + frame[2, i] * f[2]
+                    )
             own_ee = (1 - to_tx[1] ** 2) / to_tx[0] + facing_tx * bend[0]
             own_ff = (1 - to_tx[2] ** 2) / to_tx[0] + facing_tx * bend[1]
             own_ef = -to_tx[1] * to_tx[2] / to_tx[0] + facing_tx * bend[2]
@@ -197,7 +256,10 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                 x, y, z = heard[0, receiver] - p0, heard[1, receiver] - p1, heard[2, receiver] - p2
                 distance = math.sqrt(x * x + y * y + z * z)
                 inverse = 1 / distance
-                along_e, along_f = (x * e0 + y * e1 + z * e2) * inverse, (x * f0 + y * f1 + z * f2) * inverse
+                along_e, along_f = (
+                    (x * e0 + y * e1 + z * e2) * inverse,
+                    (x * f0 + y * f1 + z * f2) * inverse,
+                )
                 facing_rx = (x * n0 + y * n1 + z * n2) * inverse
                 h_ee = own_ee + (1 - along_e * along_e) * inverse + facing_rx * bend_ee
                 h_ff = own_ff + (1 - along_f * along_f) * inverse + facing_rx * bend_ff
@@ -208,12 +270,23 @@ def nearby_echoes(  # type: ignore[no-untyped-def]
                 step_f = (h_ee * slope_f - h_ef * slope_e) / determinant
                 drop = slope_e * step_e + slope_f * step_f
                 lengths[receiver] = own_range + distance - 0.5 * drop
-                returns[receiver] = ROOT_PI * (facing_tx + facing_rx) * inverse / (math.sqrt(determinant) * own_range)
+                returns[receiver] = (
+                    ROOT_PI
+                    * (facing_tx + facing_rx)
+                    * inverse
+                    / (math.sqrt(determinant) * own_range)
+                )
                 # What is left out is about a third of this drop times the step over the radius of curvature.
                 left_out[receiver] = drop * drop * (step_e * step_e + step_f * step_f)
                 least_facing[receiver] = min(facing_rx, determinant)
             settled &= facing_tx > 0
             for receiver in range(receivers):
-                settled &= least_facing[receiver] > 0 and left_out[receiver] < (3 * _LEFT_OUT_M * least) ** 2
-                length[chirp, receiver, echo], amplitude[chirp, receiver, echo] = lengths[receiver], returns[receiver]
+                settled &= (
+                    least_facing[receiver] > 0
+                    and left_out[receiver] < (3 * _LEFT_OUT_M * least) ** 2
+                )
+                length[chirp, receiver, echo], amplitude[chirp, receiver, echo] = (
+                    lengths[receiver],
+                    returns[receiver],
+                )
             known[chirp, echo] = settled

@@ -34,16 +34,26 @@ ROOT_PI = math.sqrt(math.pi)
 
 # Inlined, for only so do loops over it run in vector lanes.
 @njit(error_model="numpy", fastmath={"contract"}, inline="always")
-def _newton(x, y, z, tx0, tx1, tx2, rx0, rx1, rx2, inv_a, inv_b, inv_c):  # type: ignore[no-untyped-def]
+def _newton(x, y, z, tx0, tx1, tx2, rx0, rx1, rx2, inv_a, inv_b, inv_c):
     """One step toward the specular point, from a point on the surface, all in the ellipsoid's axes.
 
     Length of the path, what the step takes off it, the step and the square of its size; det H; unit vectors to Tx and Rx, the
     normal, and the product of both ranges.
     """
     t0, t1, t2, r0, r1, r2 = tx0 - x, tx1 - y, tx2 - z, rx0 - x, rx1 - y, rx2 - z
-    range_t, range_r = math.sqrt(t0 * t0 + t1 * t1 + t2 * t2), math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+    range_t, range_r = (
+        math.sqrt(t0 * t0 + t1 * t1 + t2 * t2),
+        math.sqrt(r0 * r0 + r1 * r1 + r2 * r2),
+    )
     near_t, near_r = 1 / range_t, 1 / range_r
-    t0, t1, t2, r0, r1, r2 = t0 * near_t, t1 * near_t, t2 * near_t, r0 * near_r, r1 * near_r, r2 * near_r
+    t0, t1, t2, r0, r1, r2 = (
+        t0 * near_t,
+        t1 * near_t,
+        t2 * near_t,
+        r0 * near_r,
+        r1 * near_r,
+        r2 * near_r,
+    )
     n0, n1, n2 = x * inv_a, y * inv_b, z * inv_c
     flat = 1 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
     n0, n1, n2 = n0 * flat, n1 * flat, n2 * flat
@@ -56,20 +66,50 @@ def _newton(x, y, z, tx0, tx1, tx2, rx0, rx1, rx2, inv_a, inv_b, inv_c):  # type
     bend = ((t0 + r0) * n0 + (t1 + r1) * n1 + (t2 + r2) * n2) * flat
     te, tf = t0 * e0 + t1 * e1 + t2 * e2, t0 * f0 + t1 * f1 + t2 * f2
     re, rf = r0 * e0 + r1 * e1 + r2 * e2, r0 * f0 + r1 * f1 + r2 * f2
-    h_ee = (1 - te * te) * near_t + (1 - re * re) * near_r + bend * (e0 * e0 * inv_a + e1 * e1 * inv_b + e2 * e2 * inv_c)
-    h_ff = (1 - tf * tf) * near_t + (1 - rf * rf) * near_r + bend * (f0 * f0 * inv_a + f1 * f1 * inv_b + f2 * f2 * inv_c)
-    h_ef = -te * tf * near_t - re * rf * near_r + bend * (e0 * f0 * inv_a + e1 * f1 * inv_b + e2 * f2 * inv_c)
+    h_ee = (
+        (1 - te * te) * near_t
+        + (1 - re * re) * near_r
+        + bend * (e0 * e0 * inv_a + e1 * e1 * inv_b + e2 * e2 * inv_c)
+    )
+    h_ff = (
+        (1 - tf * tf) * near_t
+        + (1 - rf * rf) * near_r
+        + bend * (f0 * f0 * inv_a + f1 * f1 * inv_b + f2 * f2 * inv_c)
+    )
+    h_ef = (
+        -te * tf * near_t
+        - re * rf * near_r
+        + bend * (e0 * f0 * inv_a + e1 * f1 * inv_b + e2 * f2 * inv_c)
+    )
     determinant = h_ee * h_ff - h_ef * h_ef
     slope_e, slope_f = te + re, tf + rf
     step_e = (h_ff * slope_e - h_ef * slope_f) / determinant
     step_f = (h_ee * slope_f - h_ef * slope_e) / determinant
     d0, d1, d2 = step_e * e0 + step_f * f0, step_e * e1 + step_f * f1, step_e * e2 + step_f * f2
     drop, size = 0.5 * (slope_e * step_e + slope_f * step_f), step_e * step_e + step_f * step_f
-    return range_t + range_r, drop, d0, d1, d2, size, determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, range_t * range_r
+    return (
+        range_t + range_r,
+        drop,
+        d0,
+        d1,
+        d2,
+        size,
+        determinant,
+        t0,
+        t1,
+        t2,
+        r0,
+        r1,
+        r2,
+        n0,
+        n1,
+        n2,
+        range_t * range_r,
+    )
 
 
 @njit(error_model="numpy", fastmath={"contract"}, inline="always")
-def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, horizontal):  # type: ignore[no-untyped-def]
+def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, horizontal):
     """Co-polar return: the field is E_r = 2 (n.E) n - E_i, each polarisation drawn across its own line of sight."""
     along_t, along_r = up0 * t0 + up1 * t1 + up2 * t2, up0 * r0 + up1 * r1 + up2 * r2
     p0 = up1 * t2 - up2 * t1 if horizontal else up0 - along_t * t0
@@ -79,7 +119,12 @@ def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, hori
     s1 = up2 * r0 - up0 * r2 if horizontal else up1 - along_r * r1
     s2 = up0 * r1 - up1 * r0 if horizontal else up2 - along_r * r2
     size = math.sqrt((p0 * p0 + p1 * p1 + p2 * p2) * (s0 * s0 + s1 * s1 + s2 * s2))
-    share = p0 * s0 + p1 * s1 + p2 * s2 - 2 * (p0 * n0 + p1 * n1 + p2 * n2) * (s0 * n0 + s1 * n1 + s2 * n2)
+    share = (
+        p0 * s0
+        + p1 * s1
+        + p2 * s2
+        - 2 * (p0 * n0 + p1 * n1 + p2 * n2) * (s0 * n0 + s1 * n1 + s2 * n2)
+    )
     polarization = share / size if size > 1e-12 else 1.0
     facing = (t0 + r0) * n0 + (t1 + r1) * n1 + (t2 + r2) * n2
     # A ray that only grazes has no reflection of this order; the matrix is singular there, or worse.
@@ -88,7 +133,7 @@ def _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up0, up1, up2, hori
 
 
 @inlined()
-def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
+def _solve(tx, rx, axes, up, horizontal, spreading, start, out):
     """Specular point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
 
     ``start`` is a first guess on the surface, or NaN for none; one that faces away is not used. ``out``: length, amplitude,
@@ -119,8 +164,8 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
     old_x, old_y, old_z, best = x, y, z, math.inf
     tolerance = (_STEP_TOLERANCE * min(axes[0], min(axes[1], axes[2]))) ** 2
     for _ in range(_MAX_STEPS):
-        length, drop, d0, d1, d2, size, determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, ranges = _newton(
-            x, y, z, tx[0], tx[1], tx[2], rx[0], rx[1], rx[2], inv_a, inv_b, inv_c
+        length, drop, d0, d1, d2, size, determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, ranges = (
+            _newton(x, y, z, tx[0], tx[1], tx[2], rx[0], rx[1], rx[2], inv_a, inv_b, inv_c)
         )
         if length > best * (1 + 4e-16) or not (t0 + r0) * n0 + (t1 + r1) * n1 + (t2 + r2) * n2 > 0:
             # The step went past the minimum (a needle's tip seen from near) or round to the dark side, where a flat body
@@ -135,14 +180,16 @@ def _solve(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore
         scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
         x, y, z = x * scale, y * scale, z * scale
     out[0] = length - drop
-    out[1] = _return(determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up[0], up[1], up[2], horizontal)
+    out[1] = _return(
+        determinant, t0, t1, t2, r0, r1, r2, n0, n1, n2, up[0], up[1], up[2], horizontal
+    )
     if spreading:
         out[1] /= ranges
     out[2], out[3], out[4] = x, y, z
 
 
 @inlined(fastmath={"contract"})
-def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ignore[no-untyped-def]
+def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):
     """The same for up to `_LANES` receivers ``rx (3, rx)`` side by side, from a ``start`` near all of their specular points.
 
     ``out (6, rx)``: length, amplitude, the point's x, y, z, and a number that is positive where the search has settled on the
@@ -167,11 +214,26 @@ def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ign
             scale = 1 / math.sqrt(x * x * inv_a + y * y * inv_b + z * z * inv_c)
             lanes[0, i], lanes[1, i], lanes[2, i] = x * scale, y * scale, z * scale
     for i in range(_LANES):
-        length, drop, _, _, _, size, determinant, s0, s1, s2, r0, r1, r2, n0, n1, n2, ranges = _newton(
-            lanes[0, i], lanes[1, i], lanes[2, i], t0, t1, t2, lanes[3, i], lanes[4, i], lanes[5, i], inv_a, inv_b, inv_c
+        length, drop, _, _, _, size, determinant, s0, s1, s2, r0, r1, r2, n0, n1, n2, ranges = (
+            _newton(
+                lanes[0, i],
+                lanes[1, i],
+                lanes[2, i],
+                t0,
+                t1,
+                t2,
+                lanes[3, i],
+                lanes[4, i],
+                lanes[5, i],
+                inv_a,
+                inv_b,
+                inv_c,
+            )
         )
         lanes[6, i] = length - drop
-        returned = _return(determinant, s0, s1, s2, r0, r1, r2, n0, n1, n2, up0, up1, up2, horizontal)
+        returned = _return(
+            determinant, s0, s1, s2, r0, r1, r2, n0, n1, n2, up0, up1, up2, horizontal
+        )
         lanes[7, i] = returned / ranges if spreading else returned
         lit = min(s0 * n0 + s1 * n1 + s2 * n2, r0 * n0 + r1 * n1 + r2 * n2)
         lanes[8, i] = min(min(lit, determinant), tolerance - size)
@@ -181,8 +243,20 @@ def _in_lanes(tx, rx, axes, up, horizontal, spreading, start, out):  # type: ign
 
 
 @compiled()
-def _mirror(  # type: ignore[no-untyped-def]
-    begin, end, tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point
+def _mirror(
+    begin,
+    end,
+    tx,
+    rx,
+    centres,
+    frames,
+    semi_axes,
+    start,
+    horizontal,
+    spreading,
+    length,
+    amplitude,
+    point,
 ):
     """Fill length, amplitude and, unless empty, point for the chirps from begin to end."""
     receivers, parts = rx.shape[1], centres.shape[1]
@@ -208,19 +282,29 @@ def _mirror(  # type: ignore[no-untyped-def]
                     guess[i] = one[2 + i]
             for first in range(0, receivers, _LANES):
                 some = slice(first, min(first + _LANES, receivers))
-                _in_lanes(local_t, local_r[:, some], axes, up, horizontal, spreading, guess, out[:, some])
+                _in_lanes(
+                    local_t, local_r[:, some], axes, up, horizontal, spreading, guess, out[:, some]
+                )
             for receiver in range(receivers):
                 if not out[5, receiver] > 0:
-                    _solve(local_t, local_r[:, receiver], axes, up, horizontal, spreading, guess, one)
+                    _solve(
+                        local_t, local_r[:, receiver], axes, up, horizontal, spreading, guess, one
+                    )
                     for i in range(5):
                         out[i, receiver] = one[i]
-                length[chirp, receiver, part], amplitude[chirp, receiver, part] = out[0, receiver], out[1, receiver]
+                length[chirp, receiver, part], amplitude[chirp, receiver, part] = (
+                    out[0, receiver],
+                    out[1, receiver],
+                )
                 # Neighbouring receivers have neighbouring specular points.
                 guess[0], guess[1], guess[2] = out[2, receiver], out[3, receiver], out[4, receiver]
                 if point.shape[0] > 0:
                     for j in range(3):
                         point[chirp, receiver, part, j] = (
-                            centre[j] + frame[j, 0] * guess[0] + frame[j, 1] * guess[1] + frame[j, 2] * guess[2]
+                            centre[j]
+                            + frame[j, 0] * guess[0]
+                            + frame[j, 1] * guess[1]
+                            + frame[j, 2] * guess[2]
                         )
 
 
@@ -274,7 +358,9 @@ def mirror(
     -----
     Equations :eq:`mirror-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page, times :eq:`polarization`.
     """
-    tx, rx, centres, frames, semi_axes = (np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes))
+    tx, rx, centres, frames, semi_axes = (
+        np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes)
+    )
     shape = (*rx.shape[:2], centres.shape[1])
     length, amplitude = np.empty(shape), np.empty(shape)
     point = np.empty((*shape, 3)) if points else np.empty((0, 0, 0, 0))
@@ -285,7 +371,21 @@ def mirror(
 
     def solve(begin: int) -> None:
         end = min(begin + _CHIRPS_A_THREAD, len(tx))
-        _mirror(begin, end, tx, rx, centres, frames, semi_axes, start, horizontal, spreading, length, amplitude, point)
+        _mirror(
+            begin,
+            end,
+            tx,
+            rx,
+            centres,
+            frames,
+            semi_axes,
+            start,
+            horizontal,
+            spreading,
+            length,
+            amplitude,
+            point,
+        )
 
     in_threads(solve, range(0, len(tx), _CHIRPS_A_THREAD))
     return length, amplitude, point

@@ -31,7 +31,9 @@ class MirrorStarts:
         self._step = anchor_step(radar)
         self._anchors: FirstCome[int, NDArray[np.float64]] = FirstCome(_KEPT_ANCHORS, _PASSING)
 
-    def at(self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
+    def at(
+        self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
+    ) -> NDArray[np.float64]:
         """Specular points at the anchors before some chirps, in the axes of the parts.
 
         Parameters
@@ -46,8 +48,12 @@ class MirrorStarts:
         (chirp, part, 3) float64
             [m].
         """
-        numbers, place = np.unique(np.asarray(chirps, dtype=np.int64) // self._step, return_inverse=True)
-        points = np.stack([self._anchors.get(number, partial(self._find, number)) for number in numbers.tolist()])
+        numbers, place = np.unique(
+            np.asarray(chirps, dtype=np.int64) // self._step, return_inverse=True
+        )
+        points = np.stack(
+            [self._anchors.get(number, partial(self._find, number)) for number in numbers.tolist()]
+        )
         return (points if parts is None else points[:, parts])[place]
 
     def _find(self, number: int) -> NDArray[np.float64]:

@@ -44,7 +44,10 @@ def trace_anchor(tracer: BodyTracer, at: ChirpPoses) -> Anchor:
 
 
 def unobstructed(
-    tracer: BodyTracer, tx: NDArray[np.float64], rx: NDArray[np.float64], points: NDArray[np.float64]
+    tracer: BodyTracer,
+    tx: NDArray[np.float64],
+    rx: NDArray[np.float64],
+    points: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
     """Whether no other part of the posed body is nearer, on both legs, than the point of each part.
 
@@ -63,7 +66,10 @@ def unobstructed(
     """
     own = np.broadcast_to(np.arange(points.shape[2]), points.shape[:3]).ravel()
     targets = points.reshape(-1, 3)
-    legs = (np.broadcast_to(tx[:, None, None], points.shape), np.broadcast_to(rx[:, :, None], points.shape))
+    legs = (
+        np.broadcast_to(tx[:, None, None], points.shape),
+        np.broadcast_to(rx[:, :, None], points.shape),
+    )
     from_tx, from_rx = (tracer.sees(antennas.reshape(-1, 3), targets, own) for antennas in legs)
     return (from_tx & from_rx).reshape(points.shape[:3])
 
@@ -161,7 +167,10 @@ class MirrorVisibility:
             inside = np.flatnonzero(intervals == interval)
             if (chirps[inside] == first).all():
                 here = self._anchor(first)
-                weight[inside], start[inside] = here.visible[..., parts][tx[inside]], here.start[parts]
+                weight[inside], start[inside] = (
+                    here.visible[..., parts][tx[inside]],
+                    here.start[parts],
+                )
                 continue
             share = (chirps[inside] - first) / self._step
             share = (share**2 * (3 - 2 * share))[:, None, None]

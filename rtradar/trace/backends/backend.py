@@ -81,10 +81,14 @@ def select(variant: str = "auto") -> Backend:
         Where ``auto`` or ``cpu`` has to take scalar.
     """
     if variant not in ("auto", "cpu", *VARIANTS):
-        raise InputError(f"variant '{variant}' is unknown; allowed: auto, cpu, {', '.join(VARIANTS)}")
+        raise InputError(
+            f"variant '{variant}' is unknown; allowed: auto, cpu, {', '.join(VARIANTS)}"
+        )
     for package in ("mitsuba", "drjit"):
         if find_spec(package) is None:
-            raise BackendError(f"the package {package} is not installed; install it: pip install mitsuba")
+            raise BackendError(
+                f"the package {package} is not installed; install it: pip install mitsuba"
+            )
     library, verdict, trouble = _first_good()
     path, version = (library.path, verdict.version) if library and verdict else (None, None)
     if variant == "cuda":
@@ -128,13 +132,17 @@ def use(backend: Backend) -> ModuleType:
     try:
         import mitsuba as mi
 
-        if first:  # whoever imported Dr.Jit before us may have computed with it, and rules its threads
+        if (
+            first
+        ):  # whoever imported Dr.Jit before us may have computed with it, and rules its threads
             begin_with_one()
         if mi.variant() != backend.variant:
             mi.set_variant(backend.variant)
     except ImportError as error:
         reason = str(error).splitlines()[0]
-        raise BackendError(f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor") from error
+        raise BackendError(
+            f"Mitsuba's variant {backend.variant} cannot be used ({reason}); see: rtradar doctor"
+        ) from error
     return mi
 
 

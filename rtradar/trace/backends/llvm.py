@@ -16,7 +16,9 @@ ENVIRONMENT_VARIABLE = "DRJIT_LIBLLVM_PATH"
 
 WHEEL = "karellen-llvm-core"
 
-_NAME = re.compile(r"libLLVM(?:-(?P<dashed>\d[\d.]*)(?:git|rc\d*)?)?\.(?:so(?:\.(?P<dotted>\d[\d.]*))?|dylib)")
+_NAME = re.compile(
+    r"libLLVM(?:-(?P<dashed>\d[\d.]*)(?:git|rc\d*)?)?\.(?:so(?:\.(?P<dotted>\d[\d.]*))?|dylib)"
+)
 
 _SYSTEM_PATTERNS = {
     "linux": (
@@ -76,7 +78,11 @@ def candidates() -> list[Library]:
 
 def _by_age(library: Library) -> tuple[float, ...]:
     # A file without a number is what the package manager calls its current one.
-    return tuple(-float(number) for number in library.version.split(".")) if library.version else (-float("inf"),)
+    return (
+        tuple(-float(number) for number in library.version.split("."))
+        if library.version
+        else (-float("inf"),)
+    )
 
 
 def _of_wheel() -> Iterator[str]:

@@ -34,11 +34,16 @@ def main(variant: str, timed: bool) -> None:
     scene = mi.load_dict({"type": "scene", "triangle": mesh})
     distances = []
     for x in (0.25, 2.0):
-        hit = scene.ray_intersect_preliminary(mi.Ray3f(mi.Point3f(x, 0.25, 4.0), mi.Vector3f(0, 0, -1)))
+        hit = scene.ray_intersect_preliminary(
+            mi.Ray3f(mi.Point3f(x, 0.25, 4.0), mi.Vector3f(0, 0, -1))
+        )
         nearest: Any = dr.slice(dr.minimum(hit.t, dr.opaque(mi.Float, 5.0)))
         distances.append(float(nearest))
     # A hit may lie some steps of float32 off: reciprocals of rays are first guessed by the processor, each maker's its own way.
-    works = all(abs(distance - right) < 1e-6 * right for distance, right in zip(distances, (4, 5), strict=True))
+    works = all(
+        abs(distance - right) < 1e-6 * right
+        for distance, right in zip(distances, (4, 5), strict=True)
+    )
     print(json.dumps({"works": works}), flush=True)
     if timed:
         print(json.dumps({"query_s": query_s(mi)}), flush=True)
@@ -49,11 +54,17 @@ def query_s(mi: Any) -> float:
     import numpy as np
 
     # Two poles apart, vertices in a grid of polar angle and azimuth: triangles need not be even for this.
-    polar, azimuth = np.meshgrid(np.linspace(0, np.pi, BANDS + 1), np.linspace(0, 2 * np.pi, BANDS + 1), indexing="ij")
-    vertices = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1)
+    polar, azimuth = np.meshgrid(
+        np.linspace(0, np.pi, BANDS + 1), np.linspace(0, 2 * np.pi, BANDS + 1), indexing="ij"
+    )
+    vertices = np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=-1
+    )
     corner = (np.arange(BANDS)[:, None] * (BANDS + 1) + np.arange(BANDS)).ravel()[:, None]
     right, below = corner + 1, corner + BANDS + 1
-    faces = np.concatenate([np.hstack([corner, below, right]), np.hstack([right, below, below + 1])])
+    faces = np.concatenate(
+        [np.hstack([corner, below, right]), np.hstack([right, below, below + 1])]
+    )
     mesh = mi.Mesh("sphere", len(vertices) ** 2, len(faces))
     parameters = mi.traverse(mesh)
     parameters["vertex_positions"] = vertices.ravel().astype(np.float32)
@@ -68,7 +79,9 @@ def query_s(mi: Any) -> float:
         met = ask(mi, scene, places)
         best = min(best, time.perf_counter() - began)
     radius = np.hypot(*places)
-    if met[radius > 1].any() or not met[radius < 0.99].all():  # its triangles lie less than 0.3 % inside of a sphere
+    if (
+        met[radius > 1].any() or not met[radius < 0.99].all()
+    ):  # its triangles lie less than 0.3 % inside of a sphere
         raise RuntimeError("rays meet what they must not meet")
     return best
 
@@ -80,7 +93,11 @@ def ask(mi: Any, scene: Any, places: Any) -> Any:
     down = mi.Vector3f(0, 0, -1)
     if mi.variant().startswith("scalar"):
         return np.array([scene.ray_test(mi.Ray3f(mi.Point3f(x, y, 4), down)) for x, y in places.T])
-    starts = mi.Point3f(mi.Float(places[0]), mi.Float(places[1]), mi.Float(np.full(places.shape[1], 4, dtype=np.float32)))
+    starts = mi.Point3f(
+        mi.Float(places[0]),
+        mi.Float(places[1]),
+        mi.Float(np.full(places.shape[1], 4, dtype=np.float32)),
+    )
     return scene.ray_test(mi.Ray3f(starts, down)).numpy()
 
 
@@ -88,5 +105,7 @@ if __name__ == "__main__":
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))  # an abort may come and should leave no core file
+        resource.setrlimit(
+            resource.RLIMIT_CORE, (0, 0)
+        )  # an abort may come and should leave no core file
     main(sys.argv[1], "--timed" in sys.argv[2:])

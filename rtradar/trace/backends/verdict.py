@@ -28,7 +28,10 @@ QUERY_TIMEOUT_S = 30.0
 
 _PROBE = Path(__file__).with_name("probe.py")
 
-_STOPPED = {-number for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))}
+_STOPPED = {
+    -number
+    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))
+}
 """Somebody ended the probe, with the program that waits for it perhaps: that says nothing of the library."""
 
 
@@ -79,9 +82,13 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
     try:
         verdict, ended = _probe(variant, library)
     except subprocess.TimeoutExpired:
-        return Verdict(f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None)
+        return Verdict(
+            f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None
+        )
     if key is not None and ended not in _STOPPED:
-        _write_cache({**_read_cache(), key: {"finding": verdict.finding, "version": verdict.version}})
+        _write_cache(
+            {**_read_cache(), key: {"finding": verdict.finding, "version": verdict.version}}
+        )
     return verdict
 
 
@@ -127,7 +134,14 @@ def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[
         # -P keeps the modules beside the script from shadowing others.
         command = [sys.executable, "-P", str(_PROBE), variant, *(["--timed"] if timed else [])]
         limit_s = QUERY_TIMEOUT_S if timed else TIMEOUT_S
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, errors="replace", timeout=limit_s)
+        done = subprocess.run(
+            command,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=limit_s,
+        )
     said: dict[str, Any] = {}
     for line in done.stdout.splitlines():
         if line.startswith("{"):

@@ -46,10 +46,16 @@ def test_radians_are_read(asf_files: tuple[Path, Path]) -> None:
         ("first 0 0 450\n", "first 0 0 0\nfirst 0 0 0\n", ["two.amc, line 11", "twice"]),
         ("second 90\n", "", ["two.amc", "frame 2 lacks 1 bones (second)", "cut off"]),
         ("\n2\n", "\n3\n", ["two.amc, line 8", "frame 3 follows frame 1", "consecutive"]),
-        ("\n1\nroot 1 2 3 0 0 0", "\nroot 1 2 3 0 0 0", ["two.amc, line 4", "before the first frame"]),
+        (
+            "\n1\nroot 1 2 3 0 0 0",
+            "\nroot 1 2 3 0 0 0",
+            ["two.amc, line 4", "before the first frame"],
+        ),
     ],
 )
-def test_bad_amc_says_where(asf_files: tuple[Path, Path], old: str, new: str, words: list[str]) -> None:
+def test_bad_amc_says_where(
+    asf_files: tuple[Path, Path], old: str, new: str, words: list[str]
+) -> None:
     amc, asf = asf_files
     text = amc.read_bytes().decode("latin-1").replace("\r\n", "\n")
     assert old in text
@@ -61,7 +67,11 @@ def test_bad_amc_says_where(asf_files: tuple[Path, Path], old: str, new: str, wo
     ("old", "new", "words"),
     [
         ("name second", "name first", ["two.asf, line 24", "twice"]),
-        ("length 10\n", "length 10\n    name third\n", ["two.asf, line 19", "'first' gets a second name"]),
+        (
+            "length 10\n",
+            "length 10\n    name third\n",
+            ["two.asf, line 19", "'first' gets a second name"],
+        ),
         ("first second", "first third", ["two.asf, line 33", "'third'"]),
         ("    first second\n", "", ["two.asf, line 22", "'second'", "does not hang"]),
         ("dof rx\n", "dof l\n", ["two.asf, line 28", "only rx, ry, rz"]),
@@ -76,7 +86,9 @@ def test_bad_amc_says_where(asf_files: tuple[Path, Path], old: str, new: str, wo
         ),
     ],
 )
-def test_bad_asf_says_where(asf_files: tuple[Path, Path], old: str, new: str, words: list[str]) -> None:
+def test_bad_asf_says_where(
+    asf_files: tuple[Path, Path], old: str, new: str, words: list[str]
+) -> None:
     amc, asf = asf_files
     text = asf.read_bytes().decode("latin-1").replace("\r\n", "\n")
     assert old in text

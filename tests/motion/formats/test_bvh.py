@@ -73,17 +73,23 @@ def test_poses_by_hand(tmp_path: Path) -> None:
     motion = load_motion(write(tmp_path, BVH))
     assert motion.rate_hz == 30.0
     assert motion.joints == ("hip", "knee", "knee_end")
-    np.testing.assert_allclose(motion.positions[0], [[0, 0, 1.0], [0, 0, 0.5], [0, 0, 0]], atol=1e-12)
+    np.testing.assert_allclose(
+        motion.positions[0], [[0, 0, 1.0], [0, 0, 0.5], [0, 0, 0]], atol=1e-12
+    )
     # The hip turns by 90 about x: down (-y) becomes -z. The knee's channels are Y, Z, X: Z by 90 first takes -y to +x,
     # which the hip's turn leaves alone. World is (z, x, y) of mocap.
-    np.testing.assert_allclose(motion.positions[1], [[0.2, 0.1, 1], [-0.3, 0.1, 1], [-0.3, 0.6, 1]], atol=1e-12)
+    np.testing.assert_allclose(
+        motion.positions[1], [[0.2, 0.1, 1], [-0.3, 0.1, 1], [-0.3, 0.6, 1]], atol=1e-12
+    )
 
 
 def test_carrying_joint_becomes_root_and_positions_replace_offsets(tmp_path: Path) -> None:
     motion = load_motion(write(tmp_path, CARRIED))
     assert motion.joints == ("hip", "knee", "knee_end", "chest")
     assert motion.rate_hz == 120.0
-    np.testing.assert_allclose(motion.positions[0], [[0, 0, 1.0], [0, 0, 0.6], [0, 0, 0.1], [0, 0, 1.3]], atol=1e-12)
+    np.testing.assert_allclose(
+        motion.positions[0], [[0, 0, 1.0], [0, 0, 0.6], [0, 0, 0.1], [0, 0, 1.3]], atol=1e-12
+    )
     # The world joint turns by 90 about y, x to -z: the hip at mocap (5, 100, 0) stands at (0, 100, -5).
     np.testing.assert_allclose(motion.positions[1, 0], [-0.05, 0, 1.0], atol=1e-12)
 
@@ -93,7 +99,9 @@ def test_unit_is_found(tmp_path: Path, unit_m: float) -> None:
     text = BVH.replace("-50", repr(-0.5 / unit_m))
     motion = load_motion(write(tmp_path, text))
     np.testing.assert_allclose(np.linalg.norm(motion.offsets[1:], axis=1), 0.5, rtol=1e-12)
-    assert np.linalg.norm(load_motion(write(tmp_path, text), unit_m=2.0).offsets[1]) == pytest.approx(1.0 / unit_m)
+    assert np.linalg.norm(
+        load_motion(write(tmp_path, text), unit_m=2.0).offsets[1]
+    ) == pytest.approx(1.0 / unit_m)
 
 
 @pytest.mark.parametrize(
@@ -102,13 +110,21 @@ def test_unit_is_found(tmp_path: Path, unit_m: float) -> None:
         ("HIERARCHY", "HIER", ["line 1", "not a BVH"]),
         ("JOINT knee", "JOINT hip", ["line 6", "'hip'"]),
         ("CHANNELS 3", "CHANNELS 4", ["line 9", "CHANNELS"]),
-        ("Yrotation Zrotation Xrotation\n    End", "Yrotation Zrotation Yrotation\n    End", ["line 9", "different"]),
+        (
+            "Yrotation Zrotation Xrotation\n    End",
+            "Yrotation Zrotation Yrotation\n    End",
+            ["line 9", "different"],
+        ),
         ("OFFSET 0 0 0", "OFFSET 0 0", ["line 4", "three"]),
         ("  }\n}\nMOTION", "  }\nMOTION", ["MOTION", "brace"]),
         ("}\nMOTION", "}\n}\nMOTION", ["brace too many"]),
         ("Frames: 2", "Frames: 3", ["2 frames", "promises 3", "cut off"]),
         ("Frame Time: .0333333", "Frame Time: 0", ["line 18", "positive"]),
-        ("10 100 20 0 90 0 0 90 0", "10 100 20 0 90 0 0 90", ["line 20", "frame 2", "8 values", "9 channels"]),
+        (
+            "10 100 20 0 90 0 0 90 0",
+            "10 100 20 0 90 0 0 90",
+            ["line 20", "frame 2", "8 values", "9 channels"],
+        ),
         ("10 100 20", "10 nan 20", ["line 20", "finite"]),
         ("10 100 20", "10 x 20", ["line 20", "'x'"]),
         ("-50", "-5000", ["unit_m"]),
@@ -129,7 +145,9 @@ def test_bad_bvh_says_where(tmp_path: Path, old: str, new: str, words: list[str]
 
 def test_stretching_bone_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"leg.bvh, line 10: bone to 'knee' stretches by 5.0 cm"):
-        load_motion(write(tmp_path, CARRIED.replace("5 100 0 0 0 0  0 -40 0", "5 100 0 0 0 0  0 -50 0")))
+        load_motion(
+            write(tmp_path, CARRIED.replace("5 100 0 0 0 0  0 -40 0", "5 100 0 0 0 0  0 -50 0"))
+        )
 
 
 def test_skeleton_is_refused(tmp_path: Path) -> None:
@@ -139,10 +157,15 @@ def test_skeleton_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("frames", [2, 3, 4, 5, 8, 11])
 def test_bvh_in_pieces(
-    tmp_path: Path, in_pieces: Callable[[], None], same: Callable[[Motion, Motion], None], frames: int
+    tmp_path: Path,
+    in_pieces: Callable[[], None],
+    same: Callable[[Motion, Motion], None],
+    frames: int,
 ) -> None:
     head = CARRIED[: CARRIED.index("Frames:")]
-    rows = [f"0 0 {10 * k}  {k} 100 0 {20 * k} 0 0  0 -40 {0.01 * k} 0 {3 * k} 0" for k in range(frames)]
+    rows = [
+        f"0 0 {10 * k}  {k} 100 0 {20 * k} 0 0  0 -40 {0.01 * k} 0 {3 * k} 0" for k in range(frames)
+    ]
     path = tmp_path / "long.bvh"
     path.write_text(head + f"Frames: {frames}\nFrame Time: 0.01\n" + "\n".join(rows))
     whole = load_motion(path)

@@ -58,12 +58,19 @@ MARK = codecs.BOM_UTF8.decode("latin-1")
 
 def motions(folder: Path, mark: str, comment: str = "") -> list[rt.Motion]:
     for name, text in (("a.asf", ASF), ("a.amc", AMC), ("b.bvh", BVH)):
-        (folder / name).write_text(mark + (f"# {comment}\n" if name != "b.bvh" else "") + text, encoding="latin-1")
-    return [rt.load_motion(folder / "a.amc", skeleton=folder / "a.asf"), rt.load_motion(folder / "b.bvh", unit_m=1.0)]
+        (folder / name).write_text(
+            mark + (f"# {comment}\n" if name != "b.bvh" else "") + text, encoding="latin-1"
+        )
+    return [
+        rt.load_motion(folder / "a.amc", skeleton=folder / "a.asf"),
+        rt.load_motion(folder / "b.bvh", unit_m=1.0),
+    ]
 
 
 def test_a_recording_is_the_same_with_it(tmp_path: Path) -> None:
-    for plain, marked in zip(motions(tmp_path, ""), motions(tmp_path, MARK, "ÅngströmÀ"), strict=True):
+    for plain, marked in zip(
+        motions(tmp_path, ""), motions(tmp_path, MARK, "ÅngströmÀ"), strict=True
+    ):
         assert plain.joints == marked.joints
         for field in ("offsets", "root_positions", "rotations"):
             np.testing.assert_array_equal(getattr(plain, field), getattr(marked, field))

@@ -24,7 +24,22 @@ FRAMES, RATE = 90, 120.0
 # The set of the HDM05 recordings, in the order of their files; some of it is not needed.
 HDM05 = [
     *("LFHD", "RFHD", "LBHD", "RBHD", "C7", "T10", "CLAV", "STRN", "RBAC"),
-    *("LSHO", "LUPA", "LELB", "LFRM", "LWRA", "LWRB", "LFIN", "RSHO", "RUPA", "RELB", "RFRM", "RWRA", "RWRB", "RFIN"),
+    *(
+        "LSHO",
+        "LUPA",
+        "LELB",
+        "LFRM",
+        "LWRA",
+        "LWRB",
+        "LFIN",
+        "RSHO",
+        "RUPA",
+        "RELB",
+        "RFRM",
+        "RWRA",
+        "RWRB",
+        "RFIN",
+    ),
     *("LFWT", "RFWT", "LBWT", "RBWT", "LTHI", "LKNE", "LSHN", "LANK", "LHEE", "LTOE", "LMT5"),
     *("RTHI", "RKNE", "RSHN", "RANK", "RHEE", "RTOE", "RMT5"),
 ]
@@ -51,7 +66,9 @@ STANDING = {
 
 # In the world, the directions that are forward, left and up of a segment in this pose.
 UPRIGHT = np.eye(3)
-AXES = {"forearm": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])}  # thumb up, elbow behind
+AXES = {
+    "forearm": np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
+}  # thumb up, elbow behind
 
 
 def place(name: str) -> np.ndarray:
@@ -78,14 +95,27 @@ def moved(points: np.ndarray) -> np.ndarray:
     time = np.arange(FRAMES) / RATE
     cosine, sine = np.cos(0.3 + 1.2 * time), np.sin(0.3 + 1.2 * time)
     turn = np.zeros((FRAMES, 3, 3))
-    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = cosine, -sine, sine, cosine, 1
+    turn[:, 0, 0], turn[:, 0, 1], turn[:, 1, 0], turn[:, 1, 1], turn[:, 2, 2] = (
+        cosine,
+        -sine,
+        sine,
+        cosine,
+        1,
+    )
     return (
         points @ turn.transpose(0, 2, 1)
         + np.stack([1.1 * time, 0.2 * np.sin(3 * time), 0.02 * np.cos(9 * time)], axis=1)[:, None]
     )
 
 
-def write(path: Path, positions_m: np.ndarray, names: list[str] = HDM05, unit: str = "mm", prefix: str = "", **more: Any) -> Path:
+def write(
+    path: Path,
+    positions_m: np.ndarray,
+    names: list[str] = HDM05,
+    unit: str = "mm",
+    prefix: str = "",
+    **more: Any,
+) -> Path:
     """A C3D file of positions (frame, marker, 3) [m]; NaN is a marker that was not seen."""
     file = ezc3d.c3d()
     file["parameters"]["POINT"]["RATE"]["value"] = [RATE]
@@ -94,7 +124,11 @@ def write(path: Path, positions_m: np.ndarray, names: list[str] = HDM05, unit: s
     for name, value in more.items():
         file.add_parameter("POINT", name, [value])
     points = np.ones((4, len(names), len(positions_m)))
-    points[:3] = np.moveaxis(positions_m, 2, 0).swapaxes(1, 2) / {"mm": 1e-3, "cm": 1e-2, "m": 1.0}.get(unit, 1.0)
+    points[:3] = np.moveaxis(positions_m, 2, 0).swapaxes(1, 2) / {
+        "mm": 1e-3,
+        "cm": 1e-2,
+        "m": 1.0,
+    }.get(unit, 1.0)
     file["data"]["points"] = points
     file.write(str(path))
     return path
@@ -106,12 +140,16 @@ def walk() -> np.ndarray:
 
 
 @pytest.mark.parametrize(("unit", "prefix"), [("mm", ""), ("cm", "male:"), ("m", "")])
-def test_joints_stand_where_the_table_puts_them(tmp_path: Path, walk: np.ndarray, unit: str, prefix: str) -> None:
+def test_joints_stand_where_the_table_puts_them(
+    tmp_path: Path, walk: np.ndarray, unit: str, prefix: str
+) -> None:
     motion = load_motion(write(tmp_path / "walk.c3d", walk, unit=unit, prefix=prefix))
     assert motion.joints == NODES
     assert motion.rate_hz == RATE
     known = moved(np.array([joint(node) for node in NODES]))
-    np.testing.assert_allclose(motion.positions, known, atol=2e-6)  # float32 in the file: 2 m are kept to 1e-7 m
+    np.testing.assert_allclose(
+        motion.positions, known, atol=2e-6
+    )  # float32 in the file: 2 m are kept to 1e-7 m
     assert to_nodes(motion) is motion
 
 
@@ -155,7 +193,10 @@ def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
         "ANK": (0.015, 0.048 + 0.022, 0.039),
         "TOE": (0.100, 0.048, 0.030),
     }
-    return tuple({name: height * np.array(place) for name, place in places.items()} for places in (markers, joints))  # type: ignore[return-value]
+    return tuple(
+        {name: height * np.array(place) for name, place in places.items()}
+        for places in (markers, joints)
+    )  # type: ignore[return-value]
 
 
 @pytest.mark.parametrize("height", [1.2, 1.77, 2.05])
@@ -173,9 +214,13 @@ def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> N
     expected = moved(np.array([mirrored(joints, node, node[0], node[2:]) for node in known]))
     found = motion.positions[:, [NODES.index(node) for node in known]]
     apart = np.linalg.norm(found - expected, axis=2).max(axis=0) / height
-    assert dict(zip(known, apart.round(3), strict=True)) == {node: pytest.approx(0, abs=0.03) for node in known}
+    assert dict(zip(known, apart.round(3), strict=True)) == {
+        node: pytest.approx(0, abs=0.03) for node in known
+    }
     # The spine rises from bone to bone, from the root to the head.
-    spine = motion.positions[:, [NODES.index(n) for n in ("root", "lowerback", "upperback", "thorax", "neck", "head")]]
+    spine = motion.positions[
+        :, [NODES.index(n) for n in ("root", "lowerback", "upperback", "thorax", "neck", "head")]
+    ]
     rises = np.diff(spine[..., 2], axis=1) / height
     assert rises.min() > 0.03
     assert rises.max() < 0.15
@@ -191,11 +236,20 @@ def test_straight_arms_of_both_sides_mirror_each_other(tmp_path: Path, down: flo
         markers[name] = shoulder + far * way
     markers["WRA"], markers["WRB"] = markers["WRA"] + [0.03, 0, 0], markers["WRB"] - [0.03, 0, 0]
     worn = [name for name in HDM05 if name in NEEDED]
-    points = [markers[n] if n in markers else markers[n[1:]] * [1, 1 if n[0] == "L" else -1, 1] for n in worn]
-    motion = load_motion(write(tmp_path / "straight.c3d", np.repeat([points], FRAMES, axis=0), worn))
-    left, right = ([j for j, node in enumerate(NODES) if node.startswith(side)] for side in ("l_", "r_"))
+    points = [
+        markers[n] if n in markers else markers[n[1:]] * [1, 1 if n[0] == "L" else -1, 1]
+        for n in worn
+    ]
+    motion = load_motion(
+        write(tmp_path / "straight.c3d", np.repeat([points], FRAMES, axis=0), worn)
+    )
+    left, right = (
+        [j for j, node in enumerate(NODES) if node.startswith(side)] for side in ("l_", "r_")
+    )
     assert [NODES[j][2:] for j in left] == [NODES[j][2:] for j in right]
-    np.testing.assert_allclose(motion.positions[:, left], motion.positions[:, right] * [1, -1, 1], atol=2e-6)
+    np.testing.assert_allclose(
+        motion.positions[:, left], motion.positions[:, right] * [1, -1, 1], atol=2e-6
+    )
 
 
 def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.ndarray) -> None:
@@ -206,7 +260,11 @@ def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.nda
         x, y, z, w = motion.rotations[:, j].T
         x0, y0, z0, w0 = motion.rotations[0, j]
         turned = np.stack(
-            [-w * x0 + x * w0 - y * z0 + z * y0, -w * y0 + x * z0 + y * w0 - z * x0, -w * z0 - x * y0 + y * x0 + z * w0]
+            [
+                -w * x0 + x * w0 - y * z0 + z * y0,
+                -w * y0 + x * z0 + y * w0 - z * x0,
+                -w * z0 - x * y0 + y * x0 + z * w0,
+            ]
         )
         np.testing.assert_allclose(np.abs(turned), [0 * half, 0 * half, np.sin(half)], atol=1e-5)
 
@@ -214,7 +272,9 @@ def test_bones_turn_with_the_person_and_do_not_spin(tmp_path: Path, walk: np.nda
 def test_a_file_that_says_y_is_up_is_turned(tmp_path: Path, walk: np.ndarray) -> None:
     upright = load_motion(write(tmp_path / "z.c3d", walk))
     # World (x, y, z) = file (z, x, y).
-    turned = load_motion(write(tmp_path / "y.c3d", walk[..., [1, 2, 0]], X_SCREEN="+X", Y_SCREEN="+Y"))
+    turned = load_motion(
+        write(tmp_path / "y.c3d", walk[..., [1, 2, 0]], X_SCREEN="+X", Y_SCREEN="+Y")
+    )
     np.testing.assert_array_equal(turned.positions, upright.positions)
     with pytest.raises(InputError, match=r"the head is .* POINT:Y_SCREEN"):
         load_motion(write(tmp_path / "silent.c3d", walk[..., [1, 2, 0]]))
@@ -228,7 +288,10 @@ def test_positions_are_those_that_another_reader_finds(tmp_path: Path, walk: np.
     ours = read_markers(path, NEEDED)
     other = ezc3d.c3d(str(path))
     labels = other["parameters"]["POINT"]["LABELS"]["value"]
-    theirs = np.stack([other["data"]["points"][:3, labels.index(name)].T for name in NEEDED], axis=1) / 1000
+    theirs = (
+        np.stack([other["data"]["points"][:3, labels.index(name)].T for name in NEEDED], axis=1)
+        / 1000
+    )
     np.testing.assert_allclose(ours.positions, theirs, rtol=1e-12)
     assert np.isnan(ours.positions).any(axis=2).sum() == 5
 
@@ -252,7 +315,9 @@ def test_short_gaps_are_bridged(tmp_path: Path, walk: np.ndarray, lost: float) -
         ((88, 90), "89 to 90, at an end"),
     ],
 )
-def test_long_gaps_are_refused_by_name(tmp_path: Path, walk: np.ndarray, frames: tuple[int, int], says: str) -> None:
+def test_long_gaps_are_refused_by_name(
+    tmp_path: Path, walk: np.ndarray, frames: tuple[int, int], says: str
+) -> None:
     walk[slice(*frames), HDM05.index("LKNE")] = np.nan
     with pytest.raises(InputError, match=says):
         load_motion(write(tmp_path / "gaps.c3d", walk))
@@ -265,9 +330,17 @@ def test_what_is_no_person_is_refused(tmp_path: Path, walk: np.ndarray) -> None:
     with pytest.raises(InputError, match="knee and ankle markers are 436 m apart"):
         load_motion(write(tmp_path / "c.c3d", walk * 1000))
     with pytest.raises(InputError, match="marker LKNE is missing"):
-        load_motion(write(tmp_path / "d.c3d", walk, [name if name != "LKNE" else "KNEE" for name in HDM05]))
+        load_motion(
+            write(tmp_path / "d.c3d", walk, [name if name != "LKNE" else "KNEE" for name in HDM05])
+        )
     with pytest.raises(InputError, match="marker LKNE is there 2 times"):
-        load_motion(write(tmp_path / "e.c3d", walk, [name if name != "LTHI" else "other:LKNE" for name in HDM05]))
+        load_motion(
+            write(
+                tmp_path / "e.c3d",
+                walk,
+                [name if name != "LTHI" else "other:LKNE" for name in HDM05],
+            )
+        )
     with pytest.raises(InputError, match="holds markers"):
         load_motion(tmp_path / "d.c3d", skeleton="x.asf")
     with pytest.raises(InputError, match="cannot read"):
@@ -277,7 +350,9 @@ def test_what_is_no_person_is_refused(tmp_path: Path, walk: np.ndarray) -> None:
         load_motion(tmp_path / "folder.c3d")
     coinciding = walk.copy()
     coinciding[7, HDM05.index("RANK")] = coinciding[7, HDM05.index("RTOE")] - [0.0, 0.0, 0.001]
-    assert load_motion(write(tmp_path / "f.c3d", coinciding)).joints == NODES  # the offset of the ankle keeps them apart
+    assert (
+        load_motion(write(tmp_path / "f.c3d", coinciding)).joints == NODES
+    )  # the offset of the ankle keeps them apart
     data = (tmp_path / "b.c3d").read_bytes()
     (tmp_path / "cut.c3d").write_bytes(data[: len(data) // 2])
     with pytest.raises(InputError, match=r"ends after \d+ frames where its header promises more"):
@@ -285,7 +360,10 @@ def test_what_is_no_person_is_refused(tmp_path: Path, walk: np.ndarray) -> None:
 
 
 def test_names_of_two_lines_are_told_in_one(tmp_path: Path, walk: np.ndarray) -> None:
-    names = ["two\x1clines" if name == "LKNE" else name for name in ["LKNE", *(name for name in HDM05 if name != "LKNE")]]
+    names = [
+        "two\x1clines" if name == "LKNE" else name
+        for name in ["LKNE", *(name for name in HDM05 if name != "LKNE")]
+    ]
     with pytest.raises(InputError, match="marker LKNE is missing") as caught:
         load_motion(write(tmp_path / "walk.c3d", walk, names))
     assert len(str(caught.value).splitlines()) == 1
@@ -310,16 +388,24 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 
 @given(data=st.data())
-def test_junk_is_refused_in_one_line(tmp_path_factory: pytest.TempPathFactory, good: bytes, data: st.DataObject) -> None:
+def test_junk_is_refused_in_one_line(
+    tmp_path_factory: pytest.TempPathFactory, good: bytes, data: st.DataObject
+) -> None:
     kind = data.draw(st.sampled_from(["noise", "headed noise", "cut", "damaged"]))
     if kind.endswith("noise"):
-        junk = (b"\x02\x50" if kind == "headed noise" else b"") + data.draw(st.binary(max_size=3000))
+        junk = (b"\x02\x50" if kind == "headed noise" else b"") + data.draw(
+            st.binary(max_size=3000)
+        )
     elif kind == "cut":
         junk = good[: data.draw(st.integers(0, len(good) - 1))]
     else:
         changed = bytearray(good)
         for at, value in data.draw(
-            st.lists(st.tuples(st.integers(0, len(good) - 1), st.integers(0, 255)), min_size=1, max_size=40)
+            st.lists(
+                st.tuples(st.integers(0, len(good) - 1), st.integers(0, 255)),
+                min_size=1,
+                max_size=40,
+            )
         ):
             changed[at] = value
         junk = bytes(changed)

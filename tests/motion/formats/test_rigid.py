@@ -21,7 +21,9 @@ def swinging() -> np.ndarray:
     time = np.arange(FRAMES)[:, None] / 60
     rates, phases = random.uniform(1, 4, (2, 21)), random.uniform(0, 6, (2, 21))
     polar, azimuth = 1.5 + 1.3 * np.sin(rates[0] * time + phases[0]), rates[1] * time + phases[1]
-    directions = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=2)
+    directions = np.stack(
+        [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], axis=2
+    )
     bones = directions * random.uniform(0.1, 0.4, 21)[:, None]
     joints = np.zeros((FRAMES, 22, 3))
     for child, parent in enumerate(PARENTS, start=1):
@@ -41,8 +43,13 @@ def test_bones_do_not_spin() -> None:
     bones = joints[:, 1:] - joints[:, PARENTS]
     bones /= np.linalg.norm(bones, axis=2, keepdims=True)
     # The angle of the turn from frame to frame is that between the directions: not more.
-    turned = 2 * np.arccos(np.clip(np.abs(np.sum(motion.rotations[1:, 1:] * motion.rotations[:-1, 1:], axis=2)), 0, 1))
-    between = np.arctan2(np.linalg.norm(np.cross(bones[1:], bones[:-1]), axis=2), np.sum(bones[1:] * bones[:-1], axis=2))
+    turned = 2 * np.arccos(
+        np.clip(np.abs(np.sum(motion.rotations[1:, 1:] * motion.rotations[:-1, 1:], axis=2)), 0, 1)
+    )
+    between = np.arctan2(
+        np.linalg.norm(np.cross(bones[1:], bones[:-1]), axis=2),
+        np.sum(bones[1:] * bones[:-1], axis=2),
+    )
     np.testing.assert_allclose(turned, between, atol=1e-7)  # arccos near 1 keeps half of the digits
 
 
@@ -59,9 +66,12 @@ def test_lengths_are_the_median() -> None:
     joints[:30, NODES.index("head")] += 0.02
     motion = rigid_motion("stretch", joints, STILL, STILL, 60.0)
     head, neck = NODES.index("head"), NODES.index("neck")
-    np.testing.assert_allclose(np.linalg.norm(motion.offsets[head]), np.linalg.norm(joints[100, head] - joints[100, neck]))
     np.testing.assert_allclose(
-        rotate(motion.rotations[:, head], motion.offsets[head]), (motion.positions[:, head] - motion.positions[:, neck])
+        np.linalg.norm(motion.offsets[head]), np.linalg.norm(joints[100, head] - joints[100, neck])
+    )
+    np.testing.assert_allclose(
+        rotate(motion.rotations[:, head], motion.offsets[head]),
+        (motion.positions[:, head] - motion.positions[:, neck]),
     )
 
 

@@ -16,7 +16,9 @@ NODE = NODES.index
 
 
 def speeds(motion: Motion, node: str) -> np.ndarray:
-    return np.linalg.norm(np.gradient(motion.positions[:, NODE(node)], 1 / motion.rate_hz, axis=0), axis=1)
+    return np.linalg.norm(
+        np.gradient(motion.positions[:, NODE(node)], 1 / motion.rate_hz, axis=0), axis=1
+    )
 
 
 subjects = st.fixed_dictionaries(
@@ -42,10 +44,15 @@ def test_feet_never_sink_and_bones_never_stretch(subject: dict) -> None:
     # Between frames the spline may cut a corner, by less.
     at = np.linspace(0, motion.duration_s, 997)
     between = motion.at(at)[0]
-    assert between[:, [NODE("l_toe"), NODE("r_toe")], 2].min() > TOE_HEIGHT * subject["height_m"] - 2e-3
+    assert (
+        between[:, [NODE("l_toe"), NODE("r_toe")], 2].min()
+        > TOE_HEIGHT * subject["height_m"] - 2e-3
+    )
     parents = np.array(motion.parents[1:])
     lengths = np.linalg.norm(between[:, 1:] - between[:, parents], axis=2)
-    np.testing.assert_allclose(lengths, np.linalg.norm(motion.offsets[1:], axis=1)[None].repeat(len(at), 0), rtol=1e-10)
+    np.testing.assert_allclose(
+        lengths, np.linalg.norm(motion.offsets[1:], axis=1)[None].repeat(len(at), 0), rtol=1e-10
+    )
 
 
 @settings(max_examples=25)
@@ -124,7 +131,10 @@ def test_kick(seed: int, side: str) -> None:
     assert 0.9 < toe[:, 2].max() < 1.6
     top = toe[np.argmax(toe[:, 2])]
     assert top[0] < -0.6  # forward is -x
-    hips = motion.positions[:, NODE(f"{kicker}_hip"), 1].mean() - motion.positions[:, NODE(f"{other}_hip"), 1].mean()
+    hips = (
+        motion.positions[:, NODE(f"{kicker}_hip"), 1].mean()
+        - motion.positions[:, NODE(f"{other}_hip"), 1].mean()
+    )
     assert (hips < 0) == (side == "left")
 
 
@@ -141,8 +151,12 @@ def test_punch(seed: int, side: str) -> None:
 
 
 @pytest.mark.parametrize("height_m", [1.3, 1.75, 2.0])
-@pytest.mark.parametrize(("activity", "least_deg", "most_deg"), [("kick", 20.0, 40.0), ("punch", 25.0, 50.0)])
-def test_who_strikes_stands_on_bent_knees(activity: str, least_deg: float, most_deg: float, height_m: float) -> None:
+@pytest.mark.parametrize(
+    ("activity", "least_deg", "most_deg"), [("kick", 20.0, 40.0), ("punch", 25.0, 50.0)]
+)
+def test_who_strikes_stands_on_bent_knees(
+    activity: str, least_deg: float, most_deg: float, height_m: float
+) -> None:
     """How high the root is follows from where the feet stand, how long the legs are and how far a fighter's knees are bent.
 
     Leg lengths are those of Drillis and Contini: thigh 0.245 and shank 0.246 of the standing height, and the root lies 0.04
@@ -157,14 +171,19 @@ def test_who_strikes_stands_on_bent_knees(activity: str, least_deg: float, most_
             np.testing.assert_allclose(ankle[:, 2], 0.039, atol=1e-6)
             aside = np.linalg.norm((hip - ankle)[:, :2], axis=1)
             lowest, highest = (
-                0.039 + np.sqrt(0.245**2 + 0.246**2 + 2 * 0.245 * 0.246 * np.cos(np.radians(bend)) - aside**2)
+                0.039
+                + np.sqrt(
+                    0.245**2 + 0.246**2 + 2 * 0.245 * 0.246 * np.cos(np.radians(bend)) - aside**2
+                )
                 for bend in (most_deg, least_deg)
             )
             assert (lowest < hip[:, 2]).all()
             assert (hip[:, 2] < highest).all()
         # Both hips are level to 15 degrees, so the root is as far above their middle.
         hips = found[:, [NODE("l_hip"), NODE("r_hip")], 2].mean(axis=1)
-        np.testing.assert_allclose(found[:, 0, 2] - hips, 0.04, atol=0.04 * (1 - np.cos(np.radians(15))))
+        np.testing.assert_allclose(
+            found[:, 0, 2] - hips, 0.04, atol=0.04 * (1 - np.cos(np.radians(15)))
+        )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -252,4 +271,6 @@ def test_bend_reaches() -> None:
     reach = rng.normal(0, 1, (50, 3))
     reach *= rng.uniform(0.3, 0.85, (50, 1)) / np.linalg.norm(reach, axis=1, keepdims=True)
     upper, lower = bend(reach, 0.45, 0.42, rng.normal(0, 1, (50, 3)), 1.0)
-    np.testing.assert_allclose(upper.apply([0, 0, -0.45]) + lower.apply([0, 0, -0.42]), reach, atol=1e-12)
+    np.testing.assert_allclose(
+        upper.apply([0, 0, -0.45]) + lower.apply([0, 0, -0.42]), reach, atol=1e-12
+    )

@@ -15,10 +15,14 @@ from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 Array = NDArray[np.float64]
 RADAR = Radar(tx_y=3, tx_z=2, rx_y=2, rx_z=2)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
-SURFACES = dict.fromkeys(SIDES, Surface(material=material("concrete"), thickness_m=0.2, roughness_m=0.0005))
+SURFACES = dict.fromkeys(
+    SIDES, Surface(material=material("concrete"), thickness_m=0.2, roughness_m=0.0005)
+)
 ROOM = Scene(
     walls=room_walls((6.0, 4.5, 2.6), (-4.8, -2.0), SURFACES),
-    furniture=(Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0.5, -1.0, 0)),),
+    furniture=(
+        Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0.5, -1.0, 0)),
+    ),
 )
 
 
@@ -39,7 +43,9 @@ class Ball:
     def at(self, times: Array) -> Poses:
         times = np.asarray(times)
         centres = np.array(self.place) + self.velocity * times[:, None] * [0.0, -1.0, 0.0]
-        return Poses(centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes)
+        return Poses(
+            centres[:, None], np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes
+        )
 
 
 @pytest.fixture(scope="module")
@@ -60,15 +66,21 @@ def covered(offset: Array, radius: Array, ball: float) -> Array:
     """Share of discs of these radii, whose middles are so far from the ball's, that a ball covers: by many random points."""
     rng = np.random.default_rng(0)
     points = np.sqrt(rng.random(4000))[:, None] * np.exp(2j * np.pi * rng.random((4000, 1)))
-    return (np.abs(points * radius.ravel() - offset.ravel()) < ball).mean(axis=0).reshape(offset.shape)
+    return (
+        (np.abs(points * radius.ravel() - offset.ravel()) < ball).mean(axis=0).reshape(offset.shape)
+    )
 
 
 @pytest.mark.parametrize("anchor", [0, 8, 60])
-def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(clutter: Clutter, anchor: int) -> None:
+def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
+    clutter: Clutter, anchor: int
+) -> None:
     ball = Ball()
     shadow = ClutterShadow(clutter, ball, variant="scalar")
     share = _dense(shadow, anchor, clutter)
-    centre = ball.at(np.array([(anchor * shadow.step + 0.5) * RADAR.chirp_duration_s])).centres[0, 0]
+    centre = ball.at(np.array([(anchor * shadow.step + 0.5) * RADAR.chirp_duration_s])).centres[
+        0, 0
+    ]
     rx = RADAR.rx[RADAR.rx_of_tx]
     expected = []
     for own, first in zip(clutter.objects, shadow.starts[:-1], strict=True):
@@ -81,7 +93,9 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(clutter: C
             way = (point - antenna) / np.linalg.norm(point - antenna, axis=-1, keepdims=True)
             along = ((centre - antenna) * way).sum(axis=-1)
             offset = np.linalg.norm(antenna + along[..., None] * way - centre, axis=-1)
-            radius = np.sqrt(RADAR.wavelength_m * np.maximum(along * (length - along), 1e-12) / length)
+            radius = np.sqrt(
+                RADAR.wavelength_m * np.maximum(along * (length - along), 1e-12) / length
+            )
             legs.append(covered(offset, radius, ball.radius))
         expected.append(np.maximum(*legs))
         # Of 24 points spread evenly a straight edge through a disc finds its share to some two of them.
@@ -96,7 +110,9 @@ def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> N
     lost = shadow.hidden(0)
     centre = ball.at(np.array([0.5 * RADAR.chirp_duration_s])).centres[0, 0]
     antennas = np.concatenate([RADAR.tx, RADAR.rx])
-    for own, first, last in zip(clutter.objects, shadow.starts[:-1], shadow.starts[1:], strict=True):
+    for own, first, last in zip(
+        clutter.objects, shadow.starts[:-1], shadow.starts[1:], strict=True
+    ):
         if own.kind == "mirror":
             continue
         nearest = gap(antennas[:, None], own.points[0, 0, :, 0], centre)
@@ -119,7 +135,9 @@ def test_weights_fade_smoothly_from_anchor_to_anchor(clutter: Clutter) -> None:
     before, after = (1 - _dense(shadow, anchor, clutter)[0] for anchor in (0, 1))
     share = smooth(np.array([step // 2 // n_tx * n_tx]), step)
     np.testing.assert_allclose(weights[0], before)
-    np.testing.assert_allclose(weights[step // 2 // n_tx], before + share * (after - before), atol=1e-12)
+    np.testing.assert_allclose(
+        weights[step // 2 // n_tx], before + share * (after - before), atol=1e-12
+    )
     # No jump: the fastest fade goes 1.5 / step a chirp.
     assert np.abs(np.diff(weights, axis=0)).max() < 1.6 * n_tx / step
 

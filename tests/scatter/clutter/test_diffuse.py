@@ -35,7 +35,9 @@ def wall(turn_deg: float = 0.0, roughness_m: float = 0.002) -> Wall:
 
 
 def rough(radar: Radar, *walls: Wall, seed: int = 0) -> list[RoomEchoes]:
-    scene = Scene(walls=tuple(replace(each, name=f"wall {index}") for index, each in enumerate(walls)))
+    scene = Scene(
+        walls=tuple(replace(each, name=f"wall {index}") for index, each in enumerate(walls))
+    )
     return list(rough_returns(radar, scene, RoomTracer(use(select("scalar")), scene), seed))
 
 
@@ -57,7 +59,10 @@ def test_mirrored_and_diffuse_power_are_what_a_smooth_wall_mirrors() -> None:
         (echoes,) = rough(RADAR, wall(0.0, roughness))
         diffuse = echoes.power_m2() * 8**4 / 4
         field, ahead = np.array([0, 0, 1.0 + 0j]), np.array([1.0, 0, 0])
-        smooth, mirrored = (np.abs(reflect(wall(0.0, height), field, ahead, [14e9])[0, 2]) ** 2 for height in (0.0, roughness))
+        smooth, mirrored = (
+            np.abs(reflect(wall(0.0, height), field, ahead, [14e9])[0, 2]) ** 2
+            for height in (0.0, roughness)
+        )
         assert diffuse + mirrored == pytest.approx(smooth, rel=0.03)
 
 
@@ -75,7 +80,13 @@ def test_seed_and_wall_change_them() -> None:
     (reseeded,) = rough(RADAR, wall(), seed=1)
     for different in (other, reseeded):
         assert np.abs(one.points - different.points).max() > 0.01
-        assert np.abs(one.amplitude / np.abs(one.amplitude) - different.amplitude / np.abs(different.amplitude)).max() > 1
+        assert (
+            np.abs(
+                one.amplitude / np.abs(one.amplitude)
+                - different.amplitude / np.abs(different.amplitude)
+            ).max()
+            > 1
+        )
 
 
 def test_sums_over_phases_are_speckle() -> None:

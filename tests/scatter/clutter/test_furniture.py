@@ -22,18 +22,36 @@ ONE = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=(-AWAY, 0, 1), samples_pe
 
 
 def returns(radar: Radar, scene: Scene) -> dict[str, RoomEchoes]:
-    return {echoes.name: echoes for echoes in furniture_returns(use(select("scalar")), radar, scene)}
+    return {
+        echoes.name: echoes for echoes in furniture_returns(use(select("scalar")), radar, scene)
+    }
 
 
-def field(echoes: RoomEchoes, radar: Radar, frequency: np.ndarray, to: float = 2 * AWAY) -> np.ndarray:
+def field(
+    echoes: RoomEchoes, radar: Radar, frequency: np.ndarray, to: float = 2 * AWAY
+) -> np.ndarray:
     """Conjugate of the scattering length relative to the path of that length, times R1 R2: (frequency, tx, rx)."""
     k = 2 * np.pi * frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
-    return (echoes.at_nodes(frequency, radar) * np.exp(1j * k * (echoes.length - to))).sum(axis=-1) * (to / 2) ** 2
+    return (echoes.at_nodes(frequency, radar) * np.exp(1j * k * (echoes.length - to))).sum(
+        axis=-1
+    ) * (to / 2) ** 2
 
 
-def block(folder: Path, name: str, size: tuple[float, float, float], at: tuple[float, float, float], made: str) -> Furniture:
+def block(
+    folder: Path,
+    name: str,
+    size: tuple[float, float, float],
+    at: tuple[float, float, float],
+    made: str,
+) -> Furniture:
     trimesh.creation.box(size).export(folder / f"{name}.ply")
-    return Furniture(name=name, mesh=folder / f"{name}.ply", material=material(made), position_m=at, metres_per_unit=1.0)
+    return Furniture(
+        name=name,
+        mesh=folder / f"{name}.ply",
+        material=material(made),
+        position_m=at,
+        metres_per_unit=1.0,
+    )
 
 
 @pytest.mark.parametrize("made", ["perfect-conductor", "concrete"])
@@ -50,9 +68,19 @@ def test_a_flat_side_returns_as_a_plate(tmp_path: Path, made: str) -> None:
     np.testing.assert_allclose(found, expected, rtol=0.005)
 
 
-@pytest.mark.parametrize(("mesh", "exact", "limit_db"), [("trihedral", 4 / 3, 0.3), ("dihedral", 8.0, 0.15)])
-def test_corner_reflectors_return_what_closed_forms_say(mesh: str, exact: float, limit_db: float) -> None:
-    piece = Furniture(name="corner", mesh=mesh, material=material("perfect-conductor"), position_m=(0, 0, 1), yaw_deg=180)
+@pytest.mark.parametrize(
+    ("mesh", "exact", "limit_db"), [("trihedral", 4 / 3, 0.3), ("dihedral", 8.0, 0.15)]
+)
+def test_corner_reflectors_return_what_closed_forms_say(
+    mesh: str, exact: float, limit_db: float
+) -> None:
+    piece = Furniture(
+        name="corner",
+        mesh=mesh,
+        material=material("perfect-conductor"),
+        position_m=(0, 0, 1),
+        yaw_deg=180,
+    )
     echoes = returns(ONE, Scene(furniture=(piece,)))["corner"]
     frequency = np.array([14e9])
     wavelength = SPEED_OF_LIGHT_MPS / 14e9
@@ -65,7 +93,9 @@ def test_corner_reflectors_return_what_closed_forms_say(mesh: str, exact: float,
 
 
 def test_reflectors_do_nothing_from_behind_but_their_own_plates() -> None:
-    piece = Furniture(name="corner", mesh="trihedral", material=material("metal"), position_m=(0, 0, 1))
+    piece = Furniture(
+        name="corner", mesh="trihedral", material=material("metal"), position_m=(0, 0, 1)
+    )
     assert (returns(ONE, Scene(furniture=(piece,)))["corner"].bounces == 1).all()
 
 
@@ -96,7 +126,9 @@ def test_a_wall_on_the_way_is_passed_twice(tmp_path: Path) -> None:
     np.testing.assert_allclose((behind / free).ravel(), np.conj((through * air) ** 2), rtol=0.02)
 
 
-def test_groups_and_their_frequency_nodes_add_up_to_all_facets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_groups_and_their_frequency_nodes_add_up_to_all_facets(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # Tilted, deep, and near: paths to its facets differ by many range bins.
     piece = block(tmp_path, "block", (0.5, 0.9, 0.7), (0.4, 0.3, 1), "wood")
     scene = Scene(furniture=(Furniture(**{**vars(piece), "yaw_deg": 25.0}),))
@@ -113,7 +145,9 @@ def test_groups_and_their_frequency_nodes_add_up_to_all_facets(tmp_path: Path, m
 def test_too_many_facets_are_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clutter_furniture, "MOST_FACETS", 100)
     with pytest.raises(InputError, match="more than 100 facets"):
-        returns(ONE, Scene(furniture=(block(tmp_path, "block", (0.5, 0.9, 0.7), (0, 0, 1), "wood"),)))
+        returns(
+            ONE, Scene(furniture=(block(tmp_path, "block", (0.5, 0.9, 0.7), (0, 0, 1), "wood"),))
+        )
 
 
 def test_many_pieces_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -125,7 +159,10 @@ def test_many_pieces_show_how_far_they_are(monkeypatch: pytest.MonkeyPatch) -> N
 
     monkeypatch.setattr(clutter_furniture, "tqdm", bar)
     chairs = tuple(
-        Furniture(name=f"chair {k}", mesh="chair", material=material("wood"), position_m=(2.0, k, 0.0)) for k in range(2)
+        Furniture(
+            name=f"chair {k}", mesh="chair", material=material("wood"), position_m=(2.0, k, 0.0)
+        )
+        for k in range(2)
     )
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=128)
     list(furniture_returns(use(select("scalar")), radar, Scene(furniture=chairs)))

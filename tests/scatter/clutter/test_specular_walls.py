@@ -19,7 +19,14 @@ from rtradar.trace.room_tracer import RoomTracer
 SIZE, CORNER = (6.0, 4.5, 2.6), (-4.8, -2.0)
 METAL = Surface(material=material("perfect-conductor"), thickness_m=0.1)
 RADAR = Radar(tx_y=2, tx_z=2, rx_y=3, rx_z=3, samples_per_chirp=1024)
-SIDES = {"near": (0, -4.8), "far": (0, 1.2), "right": (1, -2.0), "left": (1, 2.5), "floor": (2, 0.0), "ceiling": (2, 2.6)}
+SIDES = {
+    "near": (0, -4.8),
+    "far": (0, 1.2),
+    "right": (1, -2.0),
+    "left": (1, 2.5),
+    "floor": (2, 0.0),
+    "ceiling": (2, 2.6),
+}
 
 
 def box(surface: Surface = METAL) -> Scene:
@@ -47,7 +54,9 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
         there = gain(echoes) > 0
         # Sums and differences of a few metres in float64.
         expected = np.linalg.norm(image - rx, axis=-1)
-        np.testing.assert_allclose(echoes.length[..., 0][there], expected[there], rtol=0, atol=1e-13)
+        np.testing.assert_allclose(
+            echoes.length[..., 0][there], expected[there], rtol=0, atol=1e-13
+        )
         opposite = len(names) == 2 and SIDES[names[0]][0] == SIDES[names[1]][0]
         key = echoes.name if opposite else frozenset(names)
         found[key] = found.get(key, 0.0) + gain(echoes)
@@ -80,7 +89,13 @@ def test_a_dielectric_gives_the_conjugate_of_its_slab_coefficient(polarization: 
 
 def test_furniture_hides_a_wall(tmp_path: Path) -> None:
     trimesh.creation.box((0.5, 1.0, 1.0)).export(tmp_path / "box.ply")
-    piece = Furniture(name="box", mesh=tmp_path / "box.ply", material=material("wood"), position_m=(0, 1, 1), metres_per_unit=1.0)
+    piece = Furniture(
+        name="box",
+        mesh=tmp_path / "box.ply",
+        material=material("wood"),
+        position_m=(0, 1, 1),
+        metres_per_unit=1.0,
+    )
     scene = replace(box(), furniture=(piece,))
     names = [{echoes.name for echoes in mirrors(RADAR, each, 1)} for each in (scene, box())]
     assert names[1] - names[0] == {"far"}
@@ -109,20 +124,33 @@ def test_a_wall_on_the_way_is_passed_twice() -> None:
 
 def test_tx_and_rx_may_change_places() -> None:
     surface = Surface(material=material("concrete"), thickness_m=0.15)
-    there = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=80, rx_spacing_wavelengths=3)
-    back = Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=3, rx_spacing_wavelengths=80)
-    first, second = ({echoes.name: echoes for echoes in mirrors(radar, box(surface), 2)} for radar in (there, back))
+    there = Radar(
+        tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=80, rx_spacing_wavelengths=3
+    )
+    back = Radar(
+        tx_y=2, tx_z=0, rx_y=2, rx_z=0, tx_spacing_wavelengths=3, rx_spacing_wavelengths=80
+    )
+    first, second = (
+        {echoes.name: echoes for echoes in mirrors(radar, box(surface), 2)}
+        for radar in (there, back)
+    )
     assert set(first) == {" + ".join(reversed(name.split(" + "))) for name in second}
     frequency = np.array([12.5e9, 14e9, 15.5e9])
     for name, echoes in first.items():
         other = second[" + ".join(reversed(name.split(" + ")))]
         np.testing.assert_allclose(echoes.length, other.length.transpose(1, 0, 2), rtol=1e-12)
-        mine, its = echoes.at_nodes(frequency, there), other.at_nodes(frequency, back).transpose(0, 2, 1, 3)
+        mine, its = (
+            echoes.at_nodes(frequency, there),
+            other.at_nodes(frequency, back).transpose(0, 2, 1, 3),
+        )
         np.testing.assert_allclose(mine, its, rtol=0, atol=1e-9)
 
 
 def test_order_of_images_grows_with_the_order() -> None:
-    counts = [len({frozenset(echoes.name.split(" + ")) for echoes in mirrors(RADAR, box(), order)}) for order in (0, 1, 2)]
+    counts = [
+        len({frozenset(echoes.name.split(" + ")) for echoes in mirrors(RADAR, box(), order)})
+        for order in (0, 1, 2)
+    ]
     assert counts == [0, 6, 6 + 15]
 
 

@@ -13,13 +13,19 @@ from rtradar.signal import synthesize
 
 RADAR = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2)
 SURFACES = {
-    side: Surface(material=material("concrete"), thickness_m=0.2, roughness_m=0.0005 if side == "floor" else 0.0)
+    side: Surface(
+        material=material("concrete"),
+        thickness_m=0.2,
+        roughness_m=0.0005 if side == "floor" else 0.0,
+    )
     for side in ("near", "far", "right", "left", "floor", "ceiling")
 }
 ROOM = Scene(
     name="room",
     walls=room_walls((6.0, 4.5, 2.6), (-4.8, -2.0), SURFACES),
-    furniture=(Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0, 0, 0)),),
+    furniture=(
+        Furniture(name="chair", mesh="chair", material=material("wood"), position_m=(0, 0, 0)),
+    ),
 )
 
 
@@ -76,7 +82,9 @@ def test_the_strongest_cell_is_what_the_range_spectrum_shows(clutter: Clutter) -
 
 
 def test_what_is_too_far_for_the_sampling_is_named() -> None:
-    far = Clutter(replace(RADAR, samples_per_chirp=64), replace(ROOM, furniture=()), variant="scalar", order=1)
+    far = Clutter(
+        replace(RADAR, samples_per_chirp=64), replace(ROOM, furniture=()), variant="scalar", order=1
+    )
     assert {item.name for item in far.dropped} == {"far", "right"}
     assert all("farther than the 2.4 m" in item.reason for item in far.dropped)
     assert "near" in {item.name for item in far.kept}

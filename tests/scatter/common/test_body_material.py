@@ -12,7 +12,12 @@ from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
-from rtradar.scatter.common.body_material import antenna_field, body_material, body_reflection, material_factor
+from rtradar.scatter.common.body_material import (
+    antenna_field,
+    body_material,
+    body_reflection,
+    material_factor,
+)
 from rtradar.scene import material
 
 Array = NDArray[np.float64]
@@ -43,7 +48,9 @@ def test_skin_has_fresnels_coefficients(angle: float) -> None:
     leaving = way + 2 * cosine * normal
     for field, expected in ((across, te * across), (within, tm * np.cross(across, leaving))):
         # Rounding: near the normal the plane of incidence is only as sure as sine^2 does not matter.
-        np.testing.assert_allclose(body_reflection(field[None], way, normal, ETA)[0], expected, atol=1e-9)
+        np.testing.assert_allclose(
+            body_reflection(field[None], way, normal, ETA)[0], expected, atol=1e-9
+        )
 
 
 @given(seeds)

@@ -24,7 +24,9 @@ Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 
 
-def ellipsoid(*axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None) -> rt.Ellipsoids:
+def ellipsoid(
+    *axes: float, centre: object = (0.0, 0.0, 0.0), frame: object = None
+) -> rt.Ellipsoids:
     return rt.Ellipsoids([centre], [np.eye(3) if frame is None else frame], [axes])
 
 
@@ -38,7 +40,9 @@ def both(*meshes: trimesh.Trimesh) -> trimesh.Trimesh:
     return trimesh.util.concatenate(meshes)
 
 
-def field(target: object, tx: Array, rx: Array, frequency: float, **model_options: object) -> NDArray[np.complex128]:
+def field(
+    target: object, tx: Array, rx: Array, frequency: float, **model_options: object
+) -> NDArray[np.complex128]:
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
     return facet_scattering(target, tx, rx, np.full(len(tx), frequency), **model_options)  # type: ignore[arg-type]
 
@@ -57,7 +61,9 @@ def mean_over_triangle(phases: Array, cells: int = 400) -> complex:
     up, down = i + j < cells, i + j < cells - 1
     u = np.concatenate([(i[up] + 1 / 3) / cells, (i[down] + 2 / 3) / cells])
     v = np.concatenate([(j[up] + 1 / 3) / cells, (j[down] + 2 / 3) / cells])
-    return complex(np.exp(1j * (phases[0] + (phases[1] - phases[0]) * u + (phases[2] - phases[0]) * v)).mean())
+    return complex(
+        np.exp(1j * (phases[0] + (phases[1] - phases[0]) * u + (phases[2] - phases[0]) * v)).mean()
+    )
 
 
 @settings(max_examples=40)
@@ -100,10 +106,16 @@ def test_flat_and_steep_facets_of_one_mesh_add_up(seed: int) -> None:
     k = np.array([[20.0]])
 
     def integral(some: Array) -> complex:
-        facets = mesh_facets(some.reshape(-1, 3), np.arange(3 * len(some)).reshape(-1, 3), both_sides=True)
+        facets = mesh_facets(
+            some.reshape(-1, 3), np.arange(3 * len(some)).reshape(-1, 3), both_sides=True
+        )
         shape = np.zeros((1, 2), dtype=int), np.ones((1, len(some)), np.float32)
         carrier = np.array([[100.0]])
-        return complex(facet_integral(facets, np.zeros(1, int), antennas, *shape, np.array([[0, 1]]), carrier, k)[0, 0, 0])
+        return complex(
+            facet_integral(
+                facets, np.zeros(1, int), antennas, *shape, np.array([[0, 1]]), carrier, k
+            )[0, 0, 0]
+        )
 
     each = [integral(one[None]) for one in corners]
     scale = np.sum(np.abs(each))
@@ -113,7 +125,9 @@ def test_flat_and_steep_facets_of_one_mesh_add_up(seed: int) -> None:
     small, steep = corners[sizes < 1e-2], corners[[np.argmax(sizes)]]
     beside = integral(np.concatenate([small, steep])) - integral(steep)
     expected = [integral(one[None]) for one in small]
-    assert abs(beside - np.sum(expected)) <= 1e-6 * np.sum(np.abs(expected)) + 1e-13 * abs(integral(steep))
+    assert abs(beside - np.sum(expected)) <= 1e-6 * np.sum(np.abs(expected)) + 1e-13 * abs(
+        integral(steep)
+    )
 
 
 @given(st.floats(-2, 2), st.floats(-2, 2), st.floats(-2, 2))
@@ -123,7 +137,9 @@ def test_positive_share_of_a_linear_function(a: float, b: float, c: float) -> No
     fold = u + v > 1
     u, v = np.where(fold, 1 - u, u), np.where(fold, 1 - v, v)
     # 20 000 draws of a share have a standard deviation of at most 0.0036.
-    assert positive_share(a, b, c) == pytest.approx(np.mean(a + (b - a) * u + (c - a) * v >= 0), abs=0.02)
+    assert positive_share(a, b, c) == pytest.approx(
+        np.mean(a + (b - a) * u + (c - a) * v >= 0), abs=0.02
+    )
 
 
 @given(seeds)
@@ -144,7 +160,11 @@ def test_clearance_is_the_least_along_the_way(seed: int) -> None:
 def test_a_sphere_has_the_closed_form_of_physical_optics(ka: float) -> None:
     frequency = ka * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
     tx = 1e6 * directions(np.random.default_rng(1), 4)
-    decibel = 20 * np.log10(np.abs(field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency) / rt.rcs.sphere(0.1, frequency, "po")))
+    decibel = 20 * np.log10(
+        np.abs(
+            field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency) / rt.rcs.sphere(0.1, frequency, "po")
+        )
+    )
     np.testing.assert_allclose(decibel, 0, atol=0.1)  # the accuracy promised
 
 
@@ -153,21 +173,31 @@ def test_a_sphere_has_its_phase_over_the_origin() -> None:
     moved = field(ellipsoid(0.1, 0.1, 0.1, centre=-0.3 * tx[0] / 1e6), tx[0], tx[0], 3e9)
     turn = np.exp(-2j * np.pi * 3e9 / SPEED_OF_LIGHT_MPS * 0.6)
     # What is left is the spreading of 1e6 m against 1e6 + 0.3 m, and rounding of 1e6 m.
-    np.testing.assert_allclose(moved / field(ellipsoid(0.1, 0.1, 0.1), tx[0], tx[0], 3e9), turn, atol=1e-5)
+    np.testing.assert_allclose(
+        moved / field(ellipsoid(0.1, 0.1, 0.1), tx[0], tx[0], 3e9), turn, atol=1e-5
+    )
 
 
 @pytest.mark.parametrize("frequency", [1e9, 3e9])
-def test_a_large_plate_returns_four_pi_area_squared_over_wavelength_squared(frequency: float) -> None:
+def test_a_large_plate_returns_four_pi_area_squared_over_wavelength_squared(
+    frequency: float,
+) -> None:
     tx = np.array([[1e7, 0, 0], [-1e7, 0, 0]])  # a sheet has two sides
     wavelength = SPEED_OF_LIGHT_MPS / frequency
     # Waves from 1e7 m bend over 5 m by 1e-4 rad.
-    np.testing.assert_allclose(np.abs(field(square(5.0), tx, tx, frequency)) ** 2, 4 * np.pi * 25**2 / wavelength**2, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.abs(field(square(5.0), tx, tx, frequency)) ** 2,
+        4 * np.pi * 25**2 / wavelength**2,
+        rtol=1e-6,
+    )
 
 
 def test_a_plate_aslant_has_side_lobes_of_a_square() -> None:
     angle, k = np.radians(10), 2 * np.pi * 1e9 / SPEED_OF_LIGHT_MPS
     tx = 1e7 * np.array([np.cos(angle), np.sin(angle), 0])
-    expected = k / np.sqrt(np.pi) * 25 * np.cos(angle) * np.abs(np.sinc(k * 5 * np.sin(angle) / np.pi))
+    expected = (
+        k / np.sqrt(np.pi) * 25 * np.cos(angle) * np.abs(np.sinc(k * 5 * np.sin(angle) / np.pi))
+    )
     np.testing.assert_allclose(np.abs(field(square(5.0), tx, tx, 1e9)), expected, rtol=1e-5)
 
 
@@ -192,7 +222,9 @@ def test_tx_and_rx_may_be_swapped(seed: int) -> None:
     tx = directions(rng, 3) * rng.uniform(1, 10, (3, 1))
     rx = tx + rng.normal(0, 0.5, (3, 3))
     for target in (ellipsoid(0.05, 0.07, 0.2, frame=frame), square(0.3, 0.1, 0.1)):
-        np.testing.assert_allclose(field(target, rx, tx, 5e9), field(target, tx, rx, 5e9), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(
+            field(target, rx, tx, 5e9), field(target, tx, rx, 5e9), rtol=1e-9, atol=1e-12
+        )
 
 
 @settings(max_examples=10)
@@ -205,15 +237,25 @@ def test_everything_may_be_turned(seed: int) -> None:
     rx = tx + rng.normal(0, 0.5, (3, 3))
     frame, centre = Rotation.random(random_state=seed).as_matrix(), np.array([0.1, 0.0, 0.2])
     here = field(ellipsoid(0.05, 0.07, 0.2, centre=centre, frame=frame), tx, rx, 5e9)
-    there = field(ellipsoid(0.05, 0.07, 0.2, centre=turn @ centre, frame=turn @ frame), tx @ turn.T, rx @ turn.T, 5e9)
+    there = field(
+        ellipsoid(0.05, 0.07, 0.2, centre=turn @ centre, frame=turn @ frame),
+        tx @ turn.T,
+        rx @ turn.T,
+        5e9,
+    )
     np.testing.assert_allclose(there, here, rtol=1e-8, atol=1e-12)
 
 
 def test_parts_beside_each_other_add_up() -> None:
     rng = np.random.default_rng(2)
-    one, other = ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)), ellipsoid(0.05, 0.05, 0.2, centre=(0.2, -0.5, 0.1))
+    one, other = (
+        ellipsoid(0.1, 0.1, 0.1, centre=(0, 0.5, 0)),
+        ellipsoid(0.05, 0.05, 0.2, centre=(0.2, -0.5, 0.1)),
+    )
     fields = ("centres", "frames", "semi_axes")
-    together = rt.Ellipsoids(*(np.concatenate([getattr(one, name), getattr(other, name)]) for name in fields))
+    together = rt.Ellipsoids(
+        *(np.concatenate([getattr(one, name), getattr(other, name)]) for name in fields)
+    )
     tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.2, (5, 3))
     rx = tx + np.array([0.0, 0.1, 0.0])
     whole, *parts = (field(target, tx, rx, 6e9, facets=1280) for target in (together, one, other))
@@ -239,15 +281,25 @@ def test_a_plate_in_the_shadow_of_another_shows_its_free_half() -> None:
     # The front one ends at y = 0 as seen from the antenna, in the middle of the one behind.
     tx = np.array([1e5, 0.0, 0.0])
     front, behind = square(1.2, 2.0, -0.6), square(1.0)
-    half = trimesh.Trimesh([[0, 0, -0.5], [0, 0.5, -0.5], [0, 0.5, 0.5], [0, 0, 0.5]], [[0, 1, 2], [0, 2, 3]], process=False)
-    whole, alone, free = (field(target, tx, tx, 3e9) for target in (both(front, behind), front, half))
+    half = trimesh.Trimesh(
+        [[0, 0, -0.5], [0, 0.5, -0.5], [0, 0.5, 0.5], [0, 0, 0.5]],
+        [[0, 1, 2], [0, 2, 3]],
+        process=False,
+    )
+    whole, alone, free = (
+        field(target, tx, tx, 3e9) for target in (both(front, behind), front, half)
+    )
     # The edge is found within a quarter of a wavelength, 25 mm of 500, and by half of that in the mean.
     assert abs(whole - alone - free)[0] < 0.025 * abs(free)[0]
 
 
 def test_a_part_straight_behind_another_returns_nothing() -> None:
     tx = np.array([[-4.0, 0.0, 0.0], [-4.0, 0.1, 0.05]])
-    both_parts = rt.Ellipsoids([[-0.4, 0, 0], [0, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1, 0.2, 0.2], [0.05, 0.05, 0.1]])
+    both_parts = rt.Ellipsoids(
+        [[-0.4, 0, 0], [0, 0, 0]],
+        np.tile(np.eye(3), (2, 1, 1)),
+        [[0.1, 0.2, 0.2], [0.05, 0.05, 0.1]],
+    )
     whole = field(both_parts, tx, tx, 6e9, facets=1280)
     front = field(ellipsoid(0.1, 0.2, 0.2, centre=(-0.4, 0, 0)), tx, tx, 6e9, facets=1280)
     np.testing.assert_allclose(whole, front, rtol=1e-12)
@@ -263,9 +315,13 @@ def test_a_shadow_moves_over_a_body_without_jumps(backend: object) -> None:
     for place in y[:: 10 if kind == "scalar" else 1]:
         sphere = ellipsoid(0.06, 0.06, 0.06, centre=(-0.5, place + 0.06, 0))
         target = rt.Ellipsoids(
-            [[0, 0, 0], *sphere.centres], np.tile(np.eye(3), (2, 1, 1)), [[0.07, 0.07, 0.2], *sphere.semi_axes]
+            [[0, 0, 0], *sphere.centres],
+            np.tile(np.eye(3), (2, 1, 1)),
+            [[0.07, 0.07, 0.2], *sphere.semi_axes],
         )
-        shadowed = field(target, tx, tx, 6e9, facets=1280, variant=kind) - field(sphere, tx, tx, 6e9, facets=1280)
+        shadowed = field(target, tx, tx, 6e9, facets=1280, variant=kind) - field(
+            sphere, tx, tx, 6e9, facets=1280
+        )
         values.append(shadowed[0] / alone)
     # Over 10 mm a fifth of the field comes free; a facet that popped would be a step of 0.02 among those of 0.012.
     assert abs(values[-1] - values[0]) > 0.15
@@ -280,10 +336,15 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
     vertices = ellipsoid_facets(tracer_axes, 2).vertices
     near, outlines, asked = 0, 0, 0
     for _ in range(3):
-        centres, frames = rng.uniform(-0.4, 0.4, (6, 3)), Rotation.random(6, random_state=rng).as_matrix()
+        centres, frames = (
+            rng.uniform(-0.4, 0.4, (6, 3)),
+            Rotation.random(6, random_state=rng).as_matrix(),
+        )
         antennas = np.array([-4.0, 0, 0]) + rng.normal(size=(3, 3)) * 0.3
         parts = np.array([4, 1, 2])
-        hidden = tracer.occluders(centres, frames, antennas, parts, np.swapaxes(vertices, 1, 2).copy(), 0.0)
+        hidden = tracer.occluders(
+            centres, frames, antennas, parts, np.swapaxes(vertices, 1, 2).copy(), 0.0
+        )
         for a, antenna in enumerate(antennas):
             for n, part in enumerate(parts):
                 world = vertices[part] @ frames[part].T + centres[part]
@@ -291,7 +352,13 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
                 for vertex in np.flatnonzero(np.sum(normals * (antenna - world), axis=1) > 0):
                     gaps = np.array(
                         [
-                            clearance(antenna, world[vertex], centres[other], frames[other], tracer_axes[other])
+                            clearance(
+                                antenna,
+                                world[vertex],
+                                centres[other],
+                                frames[other],
+                                tracer_axes[other],
+                            )
                             if other != part
                             else np.inf
                             for other in range(6)
@@ -311,7 +378,9 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
 
 
 def test_what_faces_away_returns_nothing_and_no_nan() -> None:
-    assert field(ellipsoid(0.1, 0.1, 0.1), np.array([4.0, 0, 0]), np.array([-4.0, 0, 0]), 3e9)[0] == 0
+    assert (
+        field(ellipsoid(0.1, 0.1, 0.1), np.array([4.0, 0, 0]), np.array([-4.0, 0, 0]), 3e9)[0] == 0
+    )
     edge_on = np.array([0.0, 4.0, 0.0])
     np.testing.assert_allclose(field(square(0.5), edge_on, edge_on, 3e9), 0, atol=1e-12)
     # From either side of a sheet there is no way through.
@@ -323,13 +392,17 @@ def test_what_faces_away_returns_nothing_and_no_nan() -> None:
 
 def test_too_large_a_part_is_refused_unless_its_facets_are_asked_for() -> None:
     tx, frequency = np.array([4.0, 0, 0]), 420 * SPEED_OF_LIGHT_MPS / (2 * np.pi * 0.1)
-    with pytest.raises(InputError, match=r"ka = 420, above 400, needs \d+ facets an ellipsoid; set facets=\d+"):
+    with pytest.raises(
+        InputError, match=r"ka = 420, above 400, needs \d+ facets an ellipsoid; set facets=\d+"
+    ):
         field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency)
     with pytest.raises(InputError, match="needs"):
         field(ellipsoid(0.1, 0.1, 0.1), tx, tx, frequency, facets=5120)
     with pytest.raises(InputError, match="take 'specular'"):
         field(ellipsoid(1.0, 1.0, 1.0), tx, tx, frequency)
-    with pytest.raises(InputError, match=r"smooth mesh with ka = 420, above 400, needs \d+ facets; it has 1280"):
+    with pytest.raises(
+        InputError, match=r"smooth mesh with ka = 420, above 400, needs \d+ facets; it has 1280"
+    ):
         field(trimesh.creation.icosphere(3, radius=0.1), tx, tx, frequency)
 
 

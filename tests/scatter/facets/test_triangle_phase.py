@@ -35,12 +35,16 @@ def facets(least: float, most: float) -> tuple[NDArray[np.float64], ...]:
     return rng.uniform(-2, 2, 40), u, v, rng.uniform(0, 1, 40)
 
 
-@pytest.mark.parametrize(("add_up", "bounds"), [(sum_small, (0.0, SERIES)), (sum_large, (0.1, 400.0))])
+@pytest.mark.parametrize(
+    ("add_up", "bounds"), [(sum_small, (0.0, SERIES)), (sum_large, (0.1, 400.0))]
+)
 def test_sums_are_those_of_the_integrals(add_up: object, bounds: tuple[float, float]) -> None:
     mean, u, v, strength = facets(*bounds)
     for i in range(len(mean)):
         found = add_up(mean[i : i + 1], u[i : i + 1], v[i : i + 1], strength[i : i + 1], 250.0)  # type: ignore[operator]
         # The series leaves out 2 (p^6 + 10 p^3 q^2 + q^4) / 14!, where q^2 is at most 4 p^3 / 27: 2.4e-7 of a facet for p = 4.
-        assert found == pytest.approx(strength[i] * quadrature(mean[i], u[i], v[i], 250.0), abs=3e-7)
+        assert found == pytest.approx(
+            strength[i] * quadrature(mean[i], u[i], v[i], 250.0), abs=3e-7
+        )
     whole = sum(strength[i] * quadrature(mean[i], u[i], v[i], 250.0) for i in range(len(mean)))
     assert add_up(mean, u, v, strength, 250.0) == pytest.approx(whole, abs=2e-6)  # type: ignore[operator]

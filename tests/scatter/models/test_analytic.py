@@ -40,19 +40,32 @@ class Toy:
 
     def at(self, times: Array) -> tuple[Array, Array, Array]:
         shift = np.asarray(times)[:, None, None] * self.velocity
-        return self.centres + shift, np.broadcast_to(self.frames, (len(times), *self.frames.shape)), self.semi_axes
+        return (
+            self.centres + shift,
+            np.broadcast_to(self.frames, (len(times), *self.frames.shape)),
+            self.semi_axes,
+        )
 
 
-def toy(parts: int = 3, seed: int = 0, at: tuple[float, float, float] = (0.0, 0.0, 1.0), **more: Any) -> Any:
+def toy(
+    parts: int = 3, seed: int = 0, at: tuple[float, float, float] = (0.0, 0.0, 1.0), **more: Any
+) -> Any:
     rng = np.random.default_rng(seed)
     frames = Rotation.random(parts, rng=rng).as_matrix()
-    return Toy(rng.uniform(-0.5, 0.5, (parts, 3)) + np.array(at), frames, rng.uniform(0.04, 0.25, (parts, 3)), **more)
+    return Toy(
+        rng.uniform(-0.5, 0.5, (parts, 3)) + np.array(at),
+        frames,
+        rng.uniform(0.04, 0.25, (parts, 3)),
+        **more,
+    )
 
 
 def one(tx: ArrayLike, rx: ArrayLike, body: Any, **options: bool) -> tuple[Array, Array]:
     """Length and amplitude (part,) for one Tx and one Rx."""
     transmitter, receiver = np.asarray(tx, float)[None], np.asarray(rx, float)[None, None]
-    length, amplitude = far_field_echo(transmitter, receiver, body.centres[None], body.frames[None], body.semi_axes, **options)
+    length, amplitude = far_field_echo(
+        transmitter, receiver, body.centres[None], body.frames[None], body.semi_axes, **options
+    )
     return length[0, 0], amplitude[0, 0]
 
 
@@ -61,13 +74,21 @@ def bisectors(tx: ArrayLike, rx: ArrayLike, body: Any) -> tuple[Array, Array, Ar
     ways = [np.asarray(place) - body.centres for place in (tx, rx)]
     ranges = [np.linalg.norm(way, axis=1) for way in ways]
     both = sum(way / distance[:, None] for way, distance in zip(ways, ranges, strict=True))
-    local = np.stack([frame.T @ direction for frame, direction in zip(body.frames, both, strict=True)])
+    local = np.stack(
+        [frame.T @ direction for frame, direction in zip(body.frames, both, strict=True)]
+    )
     size = np.linalg.norm(both, axis=1)
     return local / size[:, None], size, ranges[0] + ranges[1]
 
 
 directions = st.tuples(st.floats(-1, 1), st.floats(-math.pi, math.pi)).map(
-    lambda at: np.array([math.sqrt(1 - at[0] ** 2) * math.cos(at[1]), math.sqrt(1 - at[0] ** 2) * math.sin(at[1]), at[0]])
+    lambda at: np.array(
+        [
+            math.sqrt(1 - at[0] ** 2) * math.cos(at[1]),
+            math.sqrt(1 - at[0] ** 2) * math.sin(at[1]),
+            at[0],
+        ]
+    )
 )
 seeds = st.integers(0, 999)
 
@@ -77,7 +98,9 @@ seeds = st.integers(0, 999)
 
 @given(to_tx=directions, to_rx=directions, seed=seeds)
 @settings(max_examples=50)
-def test_far_away_the_path_is_shorter_by_the_support_function(to_tx: Array, to_rx: Array, seed: int) -> None:
+def test_far_away_the_path_is_shorter_by_the_support_function(
+    to_tx: Array, to_rx: Array, seed: int
+) -> None:
     # A plane wave meets the surface h(n) = |A n| before the centre, on the way there and on the way back.
     assume(np.linalg.norm(to_tx + to_rx) > 0.1)  # straight on there is no bisector
     body, far = toy(seed=seed), 1e6
@@ -90,7 +113,9 @@ def test_far_away_the_path_is_shorter_by_the_support_function(to_tx: Array, to_r
 
 @given(tx=directions, rx=directions, distance=st.floats(1.5, 8), seed=seeds)
 @settings(max_examples=50)
-def test_the_surface_is_nearer_than_the_centre(tx: Array, rx: Array, distance: float, seed: int) -> None:
+def test_the_surface_is_nearer_than_the_centre(
+    tx: Array, rx: Array, distance: float, seed: int
+) -> None:
     assume(tx @ rx > 0)  # a radar stands on one side
     body = toy(seed=seed)
     origin = np.array([0, 0, 1.0])
@@ -103,7 +128,9 @@ def test_the_surface_is_nearer_than_the_centre(tx: Array, rx: Array, distance: f
 @pytest.mark.parametrize("aspect", [0, 1, 2])
 def test_along_an_axis_the_surface_is_a_semi_axis_nearer(aspect: int) -> None:
     body = toy(parts=1)
-    place = body.centres[0] + 4 * body.frames[0][:, aspect]  # columns are the directions of the semi-axes
+    place = (
+        body.centres[0] + 4 * body.frames[0][:, aspect]
+    )  # columns are the directions of the semi-axes
     length, amplitude = one(place, place, body, spreading=False)
     axes = body.semi_axes[0]
     assert length[0] == pytest.approx(2 * (4 - axes[aspect]), rel=1e-14)
@@ -123,12 +150,18 @@ def test_at_four_metres_it_is_the_shortest_path_but_for_a_millimetre(seed: int) 
 
     def path(angles: Array) -> float:
         theta, phi = angles
-        local = body.semi_axes[0] * [math.sin(theta) * math.cos(phi), math.sin(theta) * math.sin(phi), math.cos(theta)]
+        local = body.semi_axes[0] * [
+            math.sin(theta) * math.cos(phi),
+            math.sin(theta) * math.sin(phi),
+            math.cos(theta),
+        ]
         at = body.centres[0] + body.frames[0] @ local
         return float(np.linalg.norm(tx - at) + np.linalg.norm(rx - at))
 
     grid = [(theta, phi) for theta in np.linspace(0.2, 2.9, 12) for phi in np.linspace(-3, 3, 24)]
-    shortest = minimize(path, min(grid, key=lambda angles: path(np.array(angles))), method="Nelder-Mead", tol=1e-10).fun
+    shortest = minimize(
+        path, min(grid, key=lambda angles: path(np.array(angles))), method="Nelder-Mead", tol=1e-10
+    ).fun
     # Measured: 0.01 to 0.4 mm, most where the part is long and thin.
     assert -1e-9 < length[0] - shortest < 1e-3
 
@@ -155,7 +188,9 @@ def test_power_is_the_cross_section_along_the_bisector(tx: Array, rx: Array, see
     a, b, c = body.semi_axes.T
     assert amplitude.dtype == np.float64  # real and positive: a conductor's specular echo
     assert (amplitude > 0).all()
-    np.testing.assert_allclose(amplitude**2, ellipsoid(a, b, c, theta, phi), rtol=1e-9)  # angles near the poles
+    np.testing.assert_allclose(
+        amplitude**2, ellipsoid(a, b, c, theta, phi), rtol=1e-9
+    )  # angles near the poles
 
 
 @pytest.mark.parametrize("radius", [0.04, 0.1, 1.0])
@@ -188,7 +223,9 @@ def test_spreading_is_one_over_both_legs(seed: int) -> None:
 both_models = pytest.mark.parametrize("paper", [False, True], ids=["specular range", "paper"])
 
 
-def model(paper: bool, tx: Array, rx: Array, body: Any, *, spreading: bool = True) -> tuple[Array, Array]:
+def model(
+    paper: bool, tx: Array, rx: Array, body: Any, *, spreading: bool = True
+) -> tuple[Array, Array]:
     """Length and amplitude (part,) for one Tx and one Rx by either model; the array's centre is the origin."""
     if not paper:
         return one(tx, rx, body, spreading=spreading)
@@ -200,7 +237,11 @@ def model(paper: bool, tx: Array, rx: Array, body: Any, *, spreading: bool = Tru
 @both_models
 def test_reciprocity(paper: bool) -> None:
     body = toy(at=AHEAD)
-    for tx, rx in ((LOW.tx[0], LOW.rx[7]), (LOW.tx[11], LOW.rx[8]), (np.array([0, 3.0, 0]), np.array([0, -1.0, 2.0]))):
+    for tx, rx in (
+        (LOW.tx[0], LOW.rx[7]),
+        (LOW.tx[11], LOW.rx[8]),
+        (np.array([0, 3.0, 0]), np.array([0, -1.0, 2.0])),
+    ):
         there, back = model(paper, tx, rx, body), model(paper, rx, tx, body)
         np.testing.assert_allclose(there[0], back[0], rtol=1e-15)
         np.testing.assert_allclose(there[1], back[1], rtol=1e-13)
@@ -210,10 +251,15 @@ def test_reciprocity(paper: bool) -> None:
 @given(turn=st.integers(0, 999), seed=seeds)
 @settings(max_examples=20)
 def test_turning_everything_changes_nothing(paper: bool, turn: int, seed: int) -> None:
-    body, rotation = toy(seed=seed, at=AHEAD), Rotation.random(rng=np.random.default_rng(turn)).as_matrix()
+    body, rotation = (
+        toy(seed=seed, at=AHEAD),
+        Rotation.random(rng=np.random.default_rng(turn)).as_matrix(),
+    )
     turned: Any = Toy(body.centres @ rotation.T, rotation @ body.frames, body.semi_axes)
     tx, rx = np.array([0, 0.2, -0.1]), np.array([0.1, -0.3, 0])
-    for ours, theirs in zip(model(paper, tx, rx, body), model(paper, rotation @ tx, rotation @ rx, turned), strict=True):
+    for ours, theirs in zip(
+        model(paper, tx, rx, body), model(paper, rotation @ tx, rotation @ rx, turned), strict=True
+    ):
         np.testing.assert_allclose(ours, theirs, rtol=1e-10)
 
 
@@ -222,7 +268,9 @@ def test_naming_the_axes_otherwise_changes_nothing(paper: bool) -> None:
     body = toy(at=AHEAD)
     cycled: Any = Toy(body.centres, body.frames[:, :, [1, 2, 0]], body.semi_axes[:, [1, 2, 0]])
     antennas = FLAT.tx[0], FLAT.rx[7]
-    for ours, theirs in zip(model(paper, *antennas, body), model(paper, *antennas, cycled), strict=True):
+    for ours, theirs in zip(
+        model(paper, *antennas, body), model(paper, *antennas, cycled), strict=True
+    ):
         np.testing.assert_allclose(ours, theirs, rtol=1e-12)
 
 
@@ -286,7 +334,11 @@ def test_far_away_plane_waves_are_exact(place: tuple[float, float, float]) -> No
 @pytest.mark.parametrize("spreading", [True, False])
 def test_the_papers_amplitude_is_that_of_the_line_of_sight(spreading: bool) -> None:
     body = at_angles(4.0, 0.3, -0.2)
-    amplitude = Analytic(FLAT, body, paper=True, spreading=spreading).echoes(np.arange(12)).amplitude[0, ..., 0]
+    amplitude = (
+        Analytic(FLAT, body, paper=True, spreading=spreading)
+        .echoes(np.arange(12))
+        .amplitude[0, ..., 0]
+    )
     local = -body.frames[0].T @ body.centres[0] / 4.0
     sigma = ellipsoid(*body.semi_axes[0], math.acos(local[2]), math.atan2(local[1], local[0]))
     expected = math.sqrt(sigma) / (16.0 if spreading else 1.0)
@@ -317,7 +369,9 @@ def test_each_chirp_has_its_own_transmitter_receivers_and_pose() -> None:
     chirps = np.array([0, 5, 6, 11, 4000, 4007])
     echoes = Analytic(LOW, body).echoes(chirps)
     for m, chirp in enumerate(chirps):
-        moved: Any = Toy(body.centres + (chirp + 0.5) * 62.5e-6 * body.velocity, body.frames, body.semi_axes)
+        moved: Any = Toy(
+            body.centres + (chirp + 0.5) * 62.5e-6 * body.velocity, body.frames, body.semi_axes
+        )
         line = slice(0, 8) if chirp % 12 < 6 else slice(8, 16)
         for r, rx in enumerate(LOW.rx[line]):
             length, amplitude = one(LOW.tx[chirp % 12], rx, moved)
@@ -343,7 +397,9 @@ def test_past_the_end_the_body_rests() -> None:
 
 def test_the_centre_is_a_surface_farther_in_the_papers_model() -> None:
     body = toy()
-    ours, papers = (Analytic(LOW, body, paper=paper).echoes(np.arange(12)) for paper in (False, True))
+    ours, papers = (
+        Analytic(LOW, body, paper=paper).echoes(np.arange(12)) for paper in (False, True)
+    )
     # On the mean over the array: the plane waves lead and lag by up to 0.1 m.
     nearer = (papers.length - ours.length).mean(axis=(0, 1))
     assert (nearer > 2 * 0.04 * 0.9).all()

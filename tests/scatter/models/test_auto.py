@@ -63,7 +63,9 @@ def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
     # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by both ways.
     distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
     assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
-    assert told.true[0, 0] == pytest.approx(np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02)
+    assert told.true[0, 0] == pytest.approx(
+        np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02
+    )
     assert told.wrong[0, SPECULAR, 0] == 0
 
 
@@ -79,7 +81,9 @@ def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
         np.testing.assert_allclose(after, before * expected, rtol=0.05, err_msg=name)
 
 
-def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_point_errs_by_half() -> None:
+def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_point_errs_by_half() -> (
+    None
+):
     # Seen from 4.2 m, the edge of a sphere of 0.2 m that is 1 m nearer touches the line to the middle of the far one.
     distance = np.linalg.norm(np.asarray(RADAR.position_m))
     # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a right triangle.
@@ -92,7 +96,9 @@ def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_poi
     assert told.wrong[0, FRESNEL, 0] < 0.01 * free
 
 
-def forecast_of(wrong: list[list[float]], true: list[float], hidden: list[bool] | None = None) -> Forecast:
+def forecast_of(
+    wrong: list[list[float]], true: list[float], hidden: list[bool] | None = None
+) -> Forecast:
     """One instant: ``wrong`` a part, without reference; powers are off by nothing."""
     squares = np.zeros((1, len(WAYS), len(true)))
     for part, row in enumerate(wrong):
@@ -111,12 +117,17 @@ def forecast_of(wrong: list[list[float]], true: list[float], hidden: list[bool] 
 
 def test_the_cheapest_way_that_will_do_is_chosen_for_each_part() -> None:
     #                        left out, analytic, specular, fresnel, physical-optics
-    told = forecast_of([[1, 1e-6, 1e-6, 1e-6, 1e-6], [1, 0.5, 1e-6, 1e-6, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1, 1])
+    told = forecast_of(
+        [[1, 1e-6, 1e-6, 1e-6, 1e-6], [1, 0.5, 1e-6, 1e-6, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]],
+        [1, 1, 1],
+    )
     assert choose(told, 10.0, 0.1).tolist() == [[ANALYTIC, SPECULAR, FRESNEL]]
     assert choose(told, 10.0, 1.0).tolist() == [[ANALYTIC, ANALYTIC, ANALYTIC]]
 
 
-def test_what_needs_facets_brings_the_edges_along_and_nothing_less_than_all_is_the_reference() -> None:
+def test_what_needs_facets_brings_the_edges_along_and_nothing_less_than_all_is_the_reference() -> (
+    None
+):
     told = forecast_of([[1, 0.5, 0.5, 0.5, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1])
     assert choose(told, 10.0, 0.1).tolist() == [[PHYSICAL_OPTICS, PHYSICAL_OPTICS]]
     told = forecast_of([[1, 0.5, 0.5, 0.5, 0.5]], [1])
@@ -127,13 +138,20 @@ def test_only_what_is_hidden_is_left_out_and_not_where_it_is_seen_next() -> None
     told = forecast_of([[1e-6, 1e-6], [1e-6, 1e-6]], [1, 1], [True, False])
     assert choose(told, 10.0, None).tolist() == [[LEFT_OUT, ANALYTIC]]
     seen = told._replace(hidden=np.array([[False, False]]))
-    both = Forecast(*(np.concatenate([np.asarray(a), np.asarray(a), np.asarray(b)]) for a, b in zip(told, seen, strict=True)))
+    both = Forecast(
+        *(
+            np.concatenate([np.asarray(a), np.asarray(a), np.asarray(b)])
+            for a, b in zip(told, seen, strict=True)
+        )
+    )
     assert choose(both, 10.0, None)[:, 0].tolist() == [LEFT_OUT, ANALYTIC, ANALYTIC]
 
 
 @settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(0.001, 0.5), st.floats(0.001, 0.5))
-def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(seed: int, power_share: float, complex_share: float) -> None:
+def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(
+    seed: int, power_share: float, complex_share: float
+) -> None:
     rng = np.random.default_rng(seed)
     true = rng.random((5, 6))
     scale = np.array([1, 0.3, 0.1, 0.03, 0.01, 0])[:, None]
@@ -191,7 +209,9 @@ def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic_and_nothing_is_
 def test_a_hidden_part_has_no_echo_and_fades_in_smoothly(backend: Backend) -> None:
     model = Auto(passing_radar(), Passing(), variant=backend.kind, tolerance_db=0.1)  # type: ignore[arg-type]
     assert model.echoes(np.array([100])).part.tolist() == [1]
-    strength = [np.abs(model.echoes(np.array([chirp])).amplitude[0, 0, 0]) for chirp in range(100, 400)]
+    strength = [
+        np.abs(model.echoes(np.array([chirp])).amplitude[0, 0, 0]) for chirp in range(100, 400)
+    ]
     parts = [model.echoes(np.array([chirp])).part for chirp in range(100, 400)]
     target = np.array([power[part == 0].sum() for power, part in zip(strength, parts, strict=True)])
     assert target[0] == 0
@@ -248,10 +268,15 @@ def test_what_is_kept_does_not_grow_with_the_capture() -> None:
 @pytest.mark.parametrize("share", [0.2, 0.1, 0.05])
 def test_a_complex_tolerance_is_met_by_a_kick(share: float) -> None:
     body = Body.from_motion(place(rt.synthetic_motion("kick", seed=0, duration_s=0.8)))
-    chirps = (np.linspace(3600, 8000, 12).astype(np.int64)[:, None] // 12 * 12 + np.array([0, 5])).ravel()
+    chirps = (
+        np.linspace(3600, 8000, 12).astype(np.int64)[:, None] // 12 * 12 + np.array([0, 5])
+    ).ravel()
     found, truth = (
         _field(model, chirps)
-        for model in (build_model("auto", RADAR, body, tolerance_complex=share), build_model("reference", RADAR, body))
+        for model in (
+            build_model("auto", RADAR, body, tolerance_complex=share),
+            build_model("reference", RADAR, body),
+        )
     )
     assert np.sqrt((np.abs(found - truth) ** 2).mean() / (np.abs(truth) ** 2).mean()) < share
 
@@ -268,8 +293,14 @@ def _field(model: object, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
 
 def test_bad_tolerances_are_refused_in_one_line() -> None:
     for model_options, word in itertools.chain(
-        (({"tolerance_db": value}, "tolerance_db") for value in (0.0, -1.0, float("nan"), float("inf"))),
-        (({"tolerance_complex": value}, "tolerance_complex") for value in (0.0, -0.1, float("nan"))),
+        (
+            ({"tolerance_db": value}, "tolerance_db")
+            for value in (0.0, -1.0, float("nan"), float("inf"))
+        ),
+        (
+            ({"tolerance_complex": value}, "tolerance_complex")
+            for value in (0.0, -0.1, float("nan"))
+        ),
     ):
         with pytest.raises(InputError, match=word) as caught:
             Auto(passing_radar(), Passing(), **model_options)  # type: ignore[arg-type]

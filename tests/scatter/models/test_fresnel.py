@@ -52,7 +52,14 @@ class Curtain:
 
 def small_radar(**fields: object) -> Radar:
     """One Tx and one Rx in one place, 1 ms a chirp, 12 to 16 GHz."""
-    given = {"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "chirp_duration_s": 1e-3, "position_m": tuple(ANTENNA)}
+    given = {
+        "tx_y": 1,
+        "tx_z": 0,
+        "rx_y": 1,
+        "rx_z": 0,
+        "chirp_duration_s": 1e-3,
+        "position_m": tuple(ANTENNA),
+    }
     return Radar(**(given | fields))  # type: ignore[arg-type]
 
 
@@ -60,11 +67,17 @@ def share_behind_plate(radius: float, frequency: float, edge: float) -> complex:
     """Share left of a sphere's return behind a thin plate half way, whose shadow leaves what lies above z = ``edge``."""
     k = np.array([2 * np.pi * frequency / C])
     below = ANTENNA[0] / 2, 0.0, edge / 2 - 1.0
-    poses = (np.array([[np.zeros(3), below]]), np.tile(np.eye(3), (1, 2, 1, 1)), np.array([[radius] * 3, [1e-4, 20.0, 1.0]]))
+    poses = (
+        np.array([[np.zeros(3), below]]),
+        np.tile(np.eye(3), (1, 2, 1, 1)),
+        np.array([[radius] * 3, [1e-4, 20.0, 1.0]]),
+    )
     point = np.array([[-radius, 0.0, 0.0]])
     ends, zero = ANTENNA[None], np.zeros(1, dtype=np.int64)
     occluders = np.array([[False, True]])
-    share = zone_shares(ends, ends, point, zero, zero, poses, ends[None], np.array([[0, 0]]), occluders, k[None], k)
+    share = zone_shares(
+        ends, ends, point, zero, zero, poses, ends[None], np.array([[0, 0]]), occluders, k[None], k
+    )
     assert share.shape == (1, 1, 1)
     return complex(share[0, 0, 0])
 
@@ -76,7 +89,9 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
     h = 2 / (4 - radius) + 2 / radius
     u = np.linspace(-3, 3, 41)
     edges = u / np.sqrt(k * h / 2)
-    got = np.array([share_behind_plate(radius, frequency, edge / (1 - radius / 4)) for edge in edges])
+    got = np.array(
+        [share_behind_plate(radius, frequency, edge / (1 - radius / 4)) for edge in edges]
+    )
     exact = erfc(np.exp(0.25j * np.pi) * u) / 2
     # The window takes away what is more than RIM away, a wave of 1 / (2 sqrt(pi) RIM) = 4 % at most there; curvature adds 1 %.
     assert np.sqrt(np.mean(np.abs(got - exact) ** 2)) < 0.02
@@ -100,9 +115,13 @@ def test_rays_go_to_lit_points_of_the_surface_over_the_fresnel_zones(seed: int) 
     frame, centre = Rotation.random(random_state=seed).as_matrix(), rng.normal(0, 0.3, 3)
     tx = ANTENNA + rng.normal(0, 0.3, 3)
     rx = tx + rng.normal(0, 0.2, 3)
-    length, _, point = mirror(tx[None], rx[None, None], centre[None, None], frame[None, None], axes[None], points=True)
+    length, _, point = mirror(
+        tx[None], rx[None, None], centre[None, None], frame[None, None], axes[None], points=True
+    )
     k = 2 * np.pi * 14e9 / C
-    rays = zone_rays(tx[None], rx[None], centre[None], frame[None], axes[None], point[0, 0], np.array([k]), 64)[0]
+    rays = zone_rays(
+        tx[None], rx[None], centre[None], frame[None], axes[None], point[0, 0], np.array([k]), 64
+    )[0]
     local = (rays - centre) @ frame
     np.testing.assert_allclose(np.sum((local / axes) ** 2, axis=1), 1, rtol=1e-9)
     normal = (local / axes**2) @ frame.T
@@ -126,7 +145,9 @@ def test_full_view_is_exactly_one_and_full_cover_exactly_nothing(backend: Backen
         specular = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
         np.testing.assert_array_equal(echoes.amplitude[..., 0] != 0, target)
         # The searches begin at different points, and meet within 1e-7.
-        np.testing.assert_allclose(echoes.amplitude, np.broadcast_to(specular.amplitude, (3, 30, 2, 2)), rtol=1e-6)
+        np.testing.assert_allclose(
+            echoes.amplitude, np.broadcast_to(specular.amplitude, (3, 30, 2, 2)), rtol=1e-6
+        )
         np.testing.assert_allclose(echoes.length, specular.length, rtol=1e-12)
 
 
@@ -138,8 +159,12 @@ def test_the_model_and_the_function_agree_phase_and_all(backend: Backend, edge: 
     poses = body.at(np.zeros(1))
     target = rt.Ellipsoids(poses.centres[0], poses.frames[0], poses.semi_axes)
     for frequency, amplitude in zip(echoes.frequency, echoes.amplitude, strict=True):
-        received = np.sum(amplitude[0, 0].conj() * np.exp(-2j * np.pi * frequency / C * echoes.length[0, 0]))
-        field = fresnel_scattering(target, ANTENNA[None], ANTENNA[None], np.array([frequency]), variant=backend.kind)
+        received = np.sum(
+            amplitude[0, 0].conj() * np.exp(-2j * np.pi * frequency / C * echoes.length[0, 0])
+        )
+        field = fresnel_scattering(
+            target, ANTENNA[None], ANTENNA[None], np.array([frequency]), variant=backend.kind
+        )
         there_and_back = np.exp(-2j * np.pi * frequency / C * 8.0) / 16
         # The same search, but zones laid out for each frequency, and for the middle of the sweep in the model.
         np.testing.assert_allclose(received, field[0] * there_and_back, rtol=0.03)
@@ -150,7 +175,10 @@ def test_tx_and_rx_may_be_swapped(backend: Backend) -> None:
     target = rt.Ellipsoids(poses.centres[0], poses.frames[0], poses.semi_axes)
     tx = ANTENNA + np.random.default_rng(0).normal(0, 0.1, (10, 3))
     rx, frequency = tx[::-1].copy(), np.full(10, 14e9)
-    there, back = (fresnel_scattering(target, *pair, frequency, variant=backend.kind) for pair in ((tx, rx), (rx, tx)))
+    there, back = (
+        fresnel_scattering(target, *pair, frequency, variant=backend.kind)
+        for pair in ((tx, rx), (rx, tx))
+    )
     np.testing.assert_allclose(back, there, rtol=1e-6)
 
 
@@ -164,7 +192,9 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
         np.testing.assert_allclose(afresh.echoes(block).amplitude, whole[:, block - 70], rtol=1e-13)
 
 
-def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
     radar, body = small_radar(tx_y=2, rx_y=2), Curtain(speed=1.0)
     chirps = np.arange(85, 115)
     whole = Fresnel(radar, body, variant=backend.kind).shares.at(chirps)  # type: ignore[arg-type]
@@ -204,9 +234,16 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
     exact = []
     for i in range(0, 401, 20):
         target = rt.Ellipsoids(poses.centres[i], poses.frames[i], poses.semi_axes)
-        alone = [rt.Ellipsoids(*(getattr(target, f)[p : p + 1] for f in ("centres", "frames", "semi_axes"))) for p in (0, 1)]
+        alone = [
+            rt.Ellipsoids(
+                *(getattr(target, f)[p : p + 1] for f in ("centres", "frames", "semi_axes"))
+            )
+            for p in (0, 1)
+        ]
         both, free, before = (
-            fresnel_scattering(t, ANTENNA[None], ANTENNA[None], np.array([14e9]), variant=backend.kind)[0]
+            fresnel_scattering(
+                t, ANTENNA[None], ANTENNA[None], np.array([14e9]), variant=backend.kind
+            )[0]
             for t in (target, *alone)
         )
         exact.append((both - before) / free)
@@ -217,15 +254,26 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
 
 
 def test_a_part_inside_another_is_hidden(backend: Backend) -> None:
-    target = rt.Ellipsoids(np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), [[0.05, 0.05, 0.1], [0.1, 0.1, 0.2]])
+    target = rt.Ellipsoids(
+        np.zeros((2, 3)), np.tile(np.eye(3), (2, 1, 1)), [[0.05, 0.05, 0.1], [0.1, 0.1, 0.2]]
+    )
     alone = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], [[0.1, 0.1, 0.2]])
     ends, frequency = ANTENNA[None], np.array([14e9])
-    whole, outer = (fresnel_scattering(t, ends, ends, frequency, variant=backend.kind) for t in (target, alone))
+    whole, outer = (
+        fresnel_scattering(t, ends, ends, frequency, variant=backend.kind) for t in (target, alone)
+    )
     np.testing.assert_array_equal(whole, outer)
 
 
 @pytest.mark.parametrize(
-    "axes", [(0.003, 0.003, 0.3), (0.3, 0.3, 0.0003), (0.3, 0.0003, 0.0003), (1e-4, 1e-4, 1e-4), (1.0, 1.0, 1.0)]
+    "axes",
+    [
+        (0.003, 0.003, 0.3),
+        (0.3, 0.3, 0.0003),
+        (0.3, 0.0003, 0.0003),
+        (1e-4, 1e-4, 1e-4),
+        (1.0, 1.0, 1.0),
+    ],
 )
 @pytest.mark.parametrize("frequency", [1e9, 300e9])
 def test_extremes_stay_numbers(axes: tuple[float, float, float], frequency: float) -> None:
@@ -236,14 +284,20 @@ def test_extremes_stay_numbers(axes: tuple[float, float, float], frequency: floa
         tx = sight * (max(axes) + reach)
         # One just before it, half over the line of sight.
         other = sight[7] * (max(axes) + reach / 2)
-        target = rt.Ellipsoids([np.zeros(3), other], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, reach / 5)])
-        field = fresnel_scattering(target, tx, tx + 0.01 * reach * sight[::-1], np.full(len(tx), frequency))
+        target = rt.Ellipsoids(
+            [np.zeros(3), other], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, reach / 5)]
+        )
+        field = fresnel_scattering(
+            target, tx, tx + 0.01 * reach * sight[::-1], np.full(len(tx), frequency)
+        )
         assert np.isfinite(field).all()
 
 
 def test_a_wide_sweep_takes_three_nodes_and_a_narrow_one_its_middle() -> None:
     wide, narrow = (sweep_nodes(Radar.preset(name)) for name in ("paper-12ghz", "paper-77ghz"))
-    np.testing.assert_allclose(wide, [14e9 - np.sqrt(3) * 1e9, 14e9, 14e9 + np.sqrt(3) * 1e9], rtol=1e-12)
+    np.testing.assert_allclose(
+        wide, [14e9 - np.sqrt(3) * 1e9, 14e9, 14e9 + np.sqrt(3) * 1e9], rtol=1e-12
+    )
     np.testing.assert_allclose(narrow, [79e9], rtol=1e-12)
 
 
@@ -255,9 +309,19 @@ def test_bad_counts_of_rays_are_told_in_one_line(shadow_rays: object) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*radius of curvature:rtradar.errors.ValidityWarning")
-def test_no_share_passes_what_one_open_zone_leaves(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_share_passes_what_one_open_zone_leaves(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
     # Thin parts among others at 3 GHz, where optics is past its end: shares of up to 2.8 came out.
-    axes = [[47, 207, 112], [4, 31, 76], [14, 104, 164], [5, 21, 89], [43, 140, 11], [3, 131, 21], [305, 3, 24]]
+    axes = [
+        [47, 207, 112],
+        [4, 31, 76],
+        [14, 104, 164],
+        [5, 21, 89],
+        [43, 140, 11],
+        [3, 131, 21],
+        [305, 3, 24],
+    ]
     random = np.random.default_rng(1)
     found = []
 
@@ -269,5 +333,7 @@ def test_no_share_passes_what_one_open_zone_leaves(backend: Backend, monkeypatch
     for seed in range(40):
         frames = Rotation.random(len(axes), random_state=seed).as_matrix()
         target = rt.Ellipsoids(random.normal(0, 0.1, (len(axes), 3)), frames, np.array(axes) / 1000)
-        rt.scattering_length(target, [1.4, 0.2, -0.2], [2.3, 0.4, -1.3], 3e9, "fresnel", variant=backend.kind)
+        rt.scattering_length(
+            target, [1.4, 0.2, -0.2], [2.3, 0.4, -1.3], 3e9, "fresnel", variant=backend.kind
+        )
     assert 2 - 1e-12 < max(found) <= 2 + 1e-12

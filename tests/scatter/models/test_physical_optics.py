@@ -40,7 +40,14 @@ class Passing:
     def at(self, times: Array) -> Poses:
         times = np.asarray(times)
         turn = Rotation.from_rotvec(np.outer(0.2 + 1.5 * times, [0.1, 0.97, 0.2])).as_matrix()
-        sphere = np.stack([np.full_like(times, -0.5), 0.17 + self.speed * (times - 0.03), np.full_like(times, 1.0)], axis=-1)
+        sphere = np.stack(
+            [
+                np.full_like(times, -0.5),
+                0.17 + self.speed * (times - 0.03),
+                np.full_like(times, 1.0),
+            ],
+            axis=-1,
+        )
         centres = np.stack([np.broadcast_to([0.0, 0.05, 1.0], sphere.shape), sphere], axis=1)
         frames = np.stack([turn, np.broadcast_to(np.eye(3), turn.shape)], axis=1)
         return Poses(centres, frames, self.semi_axes)
@@ -50,24 +57,38 @@ def small_radar(**changes: object) -> rt.Radar:
     """Two Tx and two Rx a line, the ends of the paper's lines, in 1.5 ms cycles."""
     changes = {"tx_y": 2, "tx_z": 1, "rx_y": 2, "rx_z": 2, "chirp_duration_s": 0.5e-3} | changes
     whole = rt.Radar.preset("paper-12ghz")
-    return dataclasses.replace(whole, tx_spacing_wavelengths=20.0, rx_spacing_wavelengths=3.5, **changes)  # type: ignore[arg-type]
+    return dataclasses.replace(
+        whole, tx_spacing_wavelengths=20.0, rx_spacing_wavelengths=3.5, **changes
+    )  # type: ignore[arg-type]
 
 
 def spectrum(echoes: rt.Echoes, frequency: float) -> NDArray[np.complex128]:
     """H (chirp, rx, echo) = conj(amplitude) exp(-j k length)."""
     nodes = echoes.frequency
     lagrange = [
-        np.prod([(frequency - other) / (node - other) for other in nodes if other != node]) if len(nodes) > 1 else 1.0
+        np.prod([(frequency - other) / (node - other) for other in nodes if other != node])
+        if len(nodes) > 1
+        else 1.0
         for node in nodes
     ]
     amplitude = np.tensordot(lagrange, echoes.amplitude, axes=1)
-    return np.asarray(np.conj(amplitude) * np.exp(-2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * echoes.length))
+    return np.asarray(
+        np.conj(amplitude) * np.exp(-2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * echoes.length)
+    )
 
 
 def error(ours: rt.Echoes, reference: rt.Echoes) -> float:
     """rms|H - Href| / rms|Href| over chirps, receivers and three frequencies, all parts together."""
-    pairs = [(spectrum(ours, f).sum(axis=2), spectrum(reference, f).sum(axis=2)) for f in (12e9, 14e9, 16e9)]
-    return float(np.sqrt(sum(np.sum(np.abs(a - b) ** 2) for a, b in pairs) / sum(np.sum(np.abs(b) ** 2) for _, b in pairs)))
+    pairs = [
+        (spectrum(ours, f).sum(axis=2), spectrum(reference, f).sum(axis=2))
+        for f in (12e9, 14e9, 16e9)
+    ]
+    return float(
+        np.sqrt(
+            sum(np.sum(np.abs(a - b) ** 2) for a, b in pairs)
+            / sum(np.sum(np.abs(b) ** 2) for _, b in pairs)
+        )
+    )
 
 
 # -- reference --------------------------------------------------------------------------------------------------------
@@ -109,7 +130,11 @@ def test_spreading_can_be_left_out() -> None:
     )
     # Nearly monostatic: R_T = R_R = length / 2 at the specular point, and facets that count stand within 2 cm of 3.5 m.
     seen = np.abs(near.amplitude) > 1e-4
-    np.testing.assert_allclose(np.abs(free.amplitude)[seen], (np.abs(near.amplitude) * (near.length / 2) ** 2)[seen], rtol=0.01)
+    np.testing.assert_allclose(
+        np.abs(free.amplitude)[seen],
+        (np.abs(near.amplitude) * (near.length / 2) ** 2)[seen],
+        rtol=0.01,
+    )
 
 
 # -- physical optics --------------------------------------------------------------------------------------------------
@@ -140,7 +165,9 @@ def test_blocks_of_chirps_do_not_matter() -> None:
     model = PhysicalOptics(radar, body, facets=320)  # type: ignore[arg-type]
     for some in (chirps[:7], chirps[20:21], chirps[7:20]):
         part = model.echoes(some)
-        np.testing.assert_allclose(part.amplitude, whole.amplitude[:, some - 15], rtol=1e-9, atol=1e-15)
+        np.testing.assert_allclose(
+            part.amplitude, whole.amplitude[:, some - 15], rtol=1e-9, atol=1e-15
+        )
 
 
 @pytest.mark.parametrize("option", ["anchor_s", "tolerance", "unevenness", "frequencies"])
@@ -152,9 +179,13 @@ def test_options_out_of_range_are_refused(option: str) -> None:
 # -- the array --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("changes", [{}, {"channels": "all"}, {"tx_z": 0}, {"tx_y": 1, "rx_y": 1, "rx_z": 1}])
+@pytest.mark.parametrize(
+    "changes", [{}, {"channels": "all"}, {"tx_z": 0}, {"tx_y": 1, "rx_y": 1, "rx_z": 1}]
+)
 @pytest.mark.parametrize("nodes", [(1, 1), (2, 1), (4, 2)])
-def test_nodes_carry_polynomials_over_the_array(changes: dict[str, object], nodes: tuple[int, int]) -> None:
+def test_nodes_carry_polynomials_over_the_array(
+    changes: dict[str, object], nodes: tuple[int, int]
+) -> None:
     radar = small_radar(**({"tx_y": 6, "tx_z": 6, "rx_y": 8, "rx_z": 8} | changes))
     found = array_nodes(radar, *nodes)
     rng = np.random.default_rng(0)
@@ -163,7 +194,10 @@ def test_nodes_carry_polynomials_over_the_array(changes: dict[str, object], node
     def value(tx: Array, rx: Array) -> Array:
         # As many powers as the nodes of the lines can carry, whatever the line.
         along = (tx - radar.position_m) @ slope_t
-        return np.asarray((1 + along + (along**2 if nodes[0] > 2 else 0)) * (1 + (rx - radar.position_m) @ slope_r))
+        return np.asarray(
+            (1 + along + (along**2 if nodes[0] > 2 else 0))
+            * (1 + (rx - radar.position_m) @ slope_r)
+        )
 
     at_nodes = value(found.antennas[found.pairs[:, 0]], found.antennas[found.pairs[:, 1]])
     for tx in range(radar.n_tx):
@@ -175,13 +209,18 @@ def test_coarse_nodes_spread_to_fine_ones() -> None:
     radar = small_radar(tx_y=6, tx_z=6, rx_y=8, rx_z=8)
     few, many = array_nodes(radar, 2, 1), array_nodes(radar, 4, 2)
     value = few.antennas[few.pairs[:, 0]] @ [1.0, 2.0, 3.0]
-    np.testing.assert_allclose(spread_nodes(radar, (2, 1), (4, 2)) @ value, many.antennas[many.pairs[:, 0]] @ [1.0, 2.0, 3.0])
+    np.testing.assert_allclose(
+        spread_nodes(radar, (2, 1), (4, 2)) @ value,
+        many.antennas[many.pairs[:, 0]] @ [1.0, 2.0, 3.0],
+    )
 
 
 # -- the envelope -----------------------------------------------------------------------------------------------------
 
 
-def envelope_of(law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100) -> tuple[Envelope, list[float]]:
+def envelope_of(
+    law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100
+) -> tuple[Envelope, list[float]]:
     """An envelope of two parts: one follows the law, the other stays at 1; and the places where it was asked."""
     asked: list[float] = []
 
@@ -202,7 +241,9 @@ def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex1
             left, right = stretch(known[:, part], place)
             values = ratio[left], ratio[right], slope[left], slope[right]
             weights = hermite(place, left, right)
-            out[row, part] = sum(weight * value[0, 0, part] for weight, value in zip(weights, values, strict=True))
+            out[row, part] = sum(
+                weight * value[0, 0, part] for weight, value in zip(weights, values, strict=True)
+            )
     return out
 
 
@@ -221,7 +262,9 @@ def test_a_slow_envelope_is_interpolated_from_the_anchors_alone() -> None:
 
 def test_where_it_bends_anchors_come_closer_and_the_error_falls() -> None:
     def law(t: float) -> complex:
-        return complex(1 / (1 + np.exp(-(t - 4.4) / 0.05)))  # from 0 to 1 within a fifth of an interval
+        return complex(
+            1 / (1 + np.exp(-(t - 4.4) / 0.05))
+        )  # from 0 to 1 within a fifth of an interval
 
     share = np.linspace(0, 1, 200, endpoint=False)
     errors = []
@@ -258,7 +301,9 @@ def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
         courses = range(first, first + TOGETHER, step)
         prepared.prepare_courses(courses)
         for index in courses:
-            np.testing.assert_array_equal(between(prepared, index, share), between(plain, index, share))
+            np.testing.assert_array_equal(
+                between(prepared, index, share), between(plain, index, share)
+            )
     assert len(asked) == len(set(asked)) > 21
     assert any(place != round(place) for place in asked)
 
@@ -271,7 +316,9 @@ def test_courses_may_be_asked_for_backwards() -> None:
     envelope, _ = envelope_of(law, tolerance=0.1)
     for index in [*range(40, 0, -1), 40, 20, 1]:
         # As above: a cubic through slopes by neighbours.
-        np.testing.assert_allclose(between(envelope, index, share)[:, 0], [law(index + s) for s in share], atol=1.5e-3)
+        np.testing.assert_allclose(
+            between(envelope, index, share)[:, 0], [law(index + s) for s in share], atol=1.5e-3
+        )
 
 
 @given(st.integers(0, 2**32 - 1))

@@ -29,30 +29,42 @@ def sheet(vertices: object, faces: object) -> trimesh.Trimesh:
 
 def sphere(radius: float = 0.05, *places: tuple[float, float, float]) -> rt.Ellipsoids:
     centres = places or ((0.0, 0.0, 0.0),)
-    return rt.Ellipsoids(centres, np.tile(np.eye(3), (len(centres), 1, 1)), np.full((len(centres), 3), radius))
+    return rt.Ellipsoids(
+        centres, np.tile(np.eye(3), (len(centres), 1, 1)), np.full((len(centres), 3), radius)
+    )
 
 
-def backscatter(target: rt.Ellipsoids | trimesh.Trimesh, tx: object, frequency: float, **model_options: object) -> complex:
+def backscatter(
+    target: rt.Ellipsoids | trimesh.Trimesh, tx: object, frequency: float, **model_options: object
+) -> complex:
     place = np.atleast_2d(np.asarray(tx, dtype=float))
     return complex(rays_scattering(target, place, place, np.array([frequency]), **model_options)[0])  # type: ignore[arg-type]
 
 
-PLATE = sheet([[0, -0.1, -0.2], [0, 0.1, -0.2], [0, 0.1, 0.2], [0, -0.1, 0.2]], [[0, 1, 2], [0, 2, 3]])
+PLATE = sheet(
+    [[0, -0.1, -0.2], [0, 0.1, -0.2], [0, 0.1, 0.2], [0, -0.1, 0.2]], [[0, 1, 2], [0, 2, 3]]
+)
 DIHEDRAL = sheet(
     [[0, 0, -0.1], [0.2, 0, -0.1], [0.2, 0, 0.1], [0, 0, 0.1], [0, 0.2, -0.1], [0, 0.2, 0.1]],
     [[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 3]],
 )
-TRIHEDRAL = sheet([[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0, 0, 0.2]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]])
+TRIHEDRAL = sheet(
+    [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0, 0, 0.2]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
+)
 
 
 @given(st.lists(st.floats(-20, 20), min_size=3, max_size=3), st.sampled_from([1.0, 1e-3, 1e-9]))
-def test_the_mean_phasor_is_the_integral_over_the_triangle(phases: list[float], scale: float) -> None:
+def test_the_mean_phasor_is_the_integral_over_the_triangle(
+    phases: list[float], scale: float
+) -> None:
     u = (np.array(phases) - np.mean(phases)) * scale
     nodes, weights = np.polynomial.legendre.leggauss(40)
     x, y = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, indexing="ij")
     second, third = x, y * (1 - x)
     area = np.outer(weights, weights) / 2 * (1 - x)
-    integral = np.sum(area * np.exp(-1j * (u[0] * (1 - second - third) + u[1] * second + u[2] * third)))
+    integral = np.sum(
+        area * np.exp(-1j * (u[0] * (1 - second - third) + u[1] * second + u[2] * third))
+    )
     # The series ends after its ninth term.
     assert complex(*mean_of_phasor(*u)) == pytest.approx(integral, abs=1e-9)
 
@@ -60,8 +72,19 @@ def test_the_mean_phasor_is_the_integral_over_the_triangle(phases: list[float], 
 def test_facets_of_ellipsoids_have_the_mean_size_of_the_sphere_and_as_many_as_asked_for() -> None:
     axes = np.array([[0.1, 0.1, 0.1], [0.05, 0.05, 0.2]])
     grid = EllipsoidGrid.cover(axes, 0.005)
-    area = np.linalg.norm(np.cross(grid.corners[:, 1] - grid.corners[:, 0], grid.corners[:, 2] - grid.corners[:, 0]), axis=1) / 2
-    for part, surface in ((0, 4 * np.pi * 0.01), (1, 0.10247)):  # the second by the formula of prolate spheroids
+    area = (
+        np.linalg.norm(
+            np.cross(
+                grid.corners[:, 1] - grid.corners[:, 0], grid.corners[:, 2] - grid.corners[:, 0]
+            ),
+            axis=1,
+        )
+        / 2
+    )
+    for part, surface in (
+        (0, 4 * np.pi * 0.01),
+        (1, 0.10247),
+    ):  # the second by the formula of prolate spheroids
         own = grid.part == part
         # 1e-3: the sagitta of the facets, which cancels to its second order in the area.
         assert area[own].sum() == pytest.approx(4 * np.pi, rel=1e-3)
@@ -79,9 +102,13 @@ def test_facets_of_a_mesh_cover_it_and_are_as_small_as_asked_for() -> None:
         sides = cut.corners - np.roll(cut.corners, 1, axis=1)
         across = np.cross(sides[:, 0], sides[:, 1])
         assert np.linalg.norm(sides, axis=-1).max() <= edge
-        np.testing.assert_allclose(np.linalg.norm(across, axis=1).sum() / 2, TRIHEDRAL.area, rtol=1e-12)
+        np.testing.assert_allclose(
+            np.linalg.norm(across, axis=1).sum() / 2, TRIHEDRAL.area, rtol=1e-12
+        )
         normals = TRIHEDRAL.face_normals[cut.face]
-        np.testing.assert_allclose(across / np.linalg.norm(across, axis=1)[:, None], normals, atol=1e-9)
+        np.testing.assert_allclose(
+            across / np.linalg.norm(across, axis=1)[:, None], normals, atol=1e-9
+        )
 
 
 def test_a_sphere_is_that_of_physical_optics(backend: Backend) -> None:
@@ -101,7 +128,9 @@ def test_under_sampled_tubes_degrade_gracefully() -> None:
 def test_a_plate_is_its_closed_form_on_both_sides(backend: Backend) -> None:
     reference = 2 * np.sqrt(np.pi) * 0.08 * 12e9 / SPEED_OF_LIGHT_MPS
     for side in (1, -1):
-        field = backscatter(PLATE, [side * FAR, 0, 0], 12e9, rays_per_wavelength=1.0, variant=backend.kind)
+        field = backscatter(
+            PLATE, [side * FAR, 0, 0], 12e9, rays_per_wavelength=1.0, variant=backend.kind
+        )
         # The wavefront from 1e6 m away bends by 2.5e-8 m, twice, over the plate: 1e-5 rad.
         assert field == pytest.approx(1j * reference, rel=1e-5)
 
@@ -118,9 +147,15 @@ def test_a_closed_box_shows_its_front_alone_wound_either_way() -> None:
 
 
 @pytest.mark.parametrize(("polarization", "turn"), [("v", -1j), ("h", 1j)])
-def test_a_dihedral_turns_over_what_lies_across_its_crease(backend: Backend, polarization: str, turn: complex) -> None:
+def test_a_dihedral_turns_over_what_lies_across_its_crease(
+    backend: Backend, polarization: str, turn: complex
+) -> None:
     tx = FAR * np.array([1.0, 1.0, 0.0]) / np.sqrt(2)
-    model_options = {"polarization": polarization, "variant": backend.kind, "rays_per_wavelength": 1.0}
+    model_options = {
+        "polarization": polarization,
+        "variant": backend.kind,
+        "rays_per_wavelength": 1.0,
+    }
     both = backscatter(DIHEDRAL, tx, 12e9, bounces=2, **model_options) - backscatter(
         DIHEDRAL, tx, 12e9, bounces=1, **model_options
     )
@@ -154,16 +189,28 @@ def test_two_spheres_send_each_other_what_one_of_them_alone_does_not() -> None:
 def test_a_part_behind_another_adds_nothing(backend: Backend) -> None:
     antenna = [4.0, 0.02, 0.01]
     model_options = {"bounces": 1, "variant": backend.kind, "rays_per_wavelength": 1.0}
-    hidden = rt.Ellipsoids([[0, 0, 0], [-0.5, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1] * 3, [0.05] * 3])
-    assert backscatter(hidden, antenna, 12e9, **model_options) == backscatter(sphere(0.1), antenna, 12e9, **model_options)
+    hidden = rt.Ellipsoids(
+        [[0, 0, 0], [-0.5, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.1] * 3, [0.05] * 3]
+    )
+    assert backscatter(hidden, antenna, 12e9, **model_options) == backscatter(
+        sphere(0.1), antenna, 12e9, **model_options
+    )
 
 
 def test_either_leg_alone_is_enough_to_hide_a_part() -> None:
-    tx, rx, frequency = np.array([[-4.0, 0.5, 0.0]]), np.array([[-4.0, -0.5, 0.0]]), np.array([12e9])
+    tx, rx, frequency = (
+        np.array([[-4.0, 0.5, 0.0]]),
+        np.array([[-4.0, -0.5, 0.0]]),
+        np.array([12e9]),
+    )
     screen = rt.Ellipsoids([[-2.0, 0.25, 0]], [np.eye(3)], [[0.01, 0.1, 0.3]])
-    both = rt.Ellipsoids([[-2.0, 0.25, 0], [0, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.01, 0.1, 0.3], [0.05] * 3])
+    both = rt.Ellipsoids(
+        [[-2.0, 0.25, 0], [0, 0, 0]], np.tile(np.eye(3), (2, 1, 1)), [[0.01, 0.1, 0.3], [0.05] * 3]
+    )
     for pair in ((tx, rx), (rx, tx)):
-        with_part, alone = (rays_scattering(target, *pair, frequency, bounces=1) for target in (both, screen))
+        with_part, alone = (
+            rays_scattering(target, *pair, frequency, bounces=1) for target in (both, screen)
+        )
         np.testing.assert_allclose(with_part, alone, rtol=1e-9)
 
 
@@ -178,13 +225,19 @@ def test_tx_and_rx_may_be_swapped(seed: int, polarization: str) -> None:
     rx = tx + rng.normal(0, 0.3, (2, 3))
     model_options = {"bounces": 1, "polarization": polarization, "rays_per_wavelength": 1.0}
     frequency = np.array([12e9, 16e9])
-    there, back = (rays_scattering(target, *pair, frequency, **model_options) for pair in ((tx, rx), (rx, tx)))  # type: ignore[arg-type]
+    there, back = (
+        rays_scattering(target, *pair, frequency, **model_options) for pair in ((tx, rx), (rx, tx))
+    )  # type: ignore[arg-type]
     np.testing.assert_allclose(back, there, rtol=1e-9, atol=1e-9)
 
 
 def test_phase_belongs_to_the_path_over_the_origin() -> None:
-    here, there = (backscatter(sphere(0.05, place), [FAR, 0, 0], 1e10) for place in ((0, 0, 0), (-0.3, 0, 0)))
-    assert there / here == pytest.approx(np.exp(-2j * np.pi * 1e10 / SPEED_OF_LIGHT_MPS * 0.6), abs=1e-5)
+    here, there = (
+        backscatter(sphere(0.05, place), [FAR, 0, 0], 1e10) for place in ((0, 0, 0), (-0.3, 0, 0))
+    )
+    assert there / here == pytest.approx(
+        np.exp(-2j * np.pi * 1e10 / SPEED_OF_LIGHT_MPS * 0.6), abs=1e-5
+    )
 
 
 def test_pairs_keep_their_order_and_their_frequencies() -> None:
@@ -195,7 +248,8 @@ def test_pairs_keep_their_order_and_their_frequencies() -> None:
     together = rays_scattering(target, tx, rx, frequency, bounces=1)
     # Tubes are cut for the highest frequency of a call: two frequencies alone differ by that.
     one_by_one = [
-        rays_scattering(target, t[None], r[None], np.array([f]), bounces=1)[0] for t, r, f in zip(tx, rx, frequency, strict=True)
+        rays_scattering(target, t[None], r[None], np.array([f]), bounces=1)[0]
+        for t, r, f in zip(tx, rx, frequency, strict=True)
     ]
     np.testing.assert_allclose(together[[1, 3]], [one_by_one[1], one_by_one[3]], rtol=1e-9)
     np.testing.assert_allclose(together, one_by_one, rtol=0.02)
@@ -224,8 +278,12 @@ def test_echoes_are_the_scattering_lengths_of_the_pose() -> None:
         path = np.exp(-1j * k[:, None] * echoes.length[index, 3])
         heard = (amplitude[:, index, 3].conj() * path).sum(axis=1)
         same = {"bounces": 2, "rays_per_wavelength": 0.7 * 14 / 16}
-        expected = rays_scattering(pose, np.tile(tx, (3, 1)), np.tile(rx, (3, 1)), frequency, **same)  # type: ignore[arg-type]
-        expected *= np.exp(-1j * k * (np.linalg.norm(tx) + np.linalg.norm(rx))) / (np.linalg.norm(tx) * np.linalg.norm(rx))
+        expected = rays_scattering(
+            pose, np.tile(tx, (3, 1)), np.tile(rx, (3, 1)), frequency, **same
+        )  # type: ignore[arg-type]
+        expected *= np.exp(-1j * k * (np.linalg.norm(tx) + np.linalg.norm(rx))) / (
+            np.linalg.norm(tx) * np.linalg.norm(rx)
+        )
         # The polynomial through the nodes of the sweep; 7 and 13 leave 2 and 5 % of one bounce and of two.
         np.testing.assert_allclose(heard, expected, atol=0.05 * np.abs(expected).max())
 
@@ -241,7 +299,10 @@ def test_one_bounce_is_what_specular_sees() -> None:
     middle = BarycentricInterpolator(rays.frequency, rays.amplitude)(14e9)
     seen = np.abs(specular.amplitude[0]).max(axis=(0, 1)) > 0.02 * np.abs(specular.amplitude).max()
     # A part in full view is within some per cent of geometric optics; one at an occluder's edge may be half off.
-    error = np.abs(middle - specular.amplitude[0])[..., seen] / np.abs(specular.amplitude[0][..., seen]).max()
+    error = (
+        np.abs(middle - specular.amplitude[0])[..., seen]
+        / np.abs(specular.amplitude[0][..., seen]).max()
+    )
     assert np.median(error) < 0.05
 
 
@@ -249,9 +310,14 @@ def test_one_bounce_is_what_specular_sees() -> None:
 def test_between_anchors_echoes_are_nearly_those_of_every_chirp() -> None:
     radar, body = walk()
     chirps = np.array([16000, 16080, 16124])  # an anchor, half way to the next, and nearly there
-    plain, between = (Rays(radar, body, bounces=1, rays_per_wavelength=1.0, anchor_s=s).echoes(chirps) for s in (0.0, 10e-3))
+    plain, between = (
+        Rays(radar, body, bounces=1, rays_per_wavelength=1.0, anchor_s=s).echoes(chirps)
+        for s in (0.0, 10e-3)
+    )
     np.testing.assert_array_equal(between.length, plain.length)
-    np.testing.assert_allclose(between.amplitude[:, 0], plain.amplitude[:, 0], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(
+        between.amplitude[:, 0], plain.amplitude[:, 0], rtol=1e-12, atol=1e-12
+    )
     # Parts come out from behind others meanwhile, by tubes of a wavelength.
     error = np.linalg.norm(between.amplitude - plain.amplitude) / np.linalg.norm(plain.amplitude)
     assert error < 0.05
@@ -266,7 +332,9 @@ def test_between_anchors_echoes_are_nearly_those_of_every_chirp() -> None:
         ({"bounces": 2.5}, "bounces"),
     ],
 )
-def test_options_without_meaning_are_refused(model_options: dict[str, object], message: str) -> None:
+def test_options_without_meaning_are_refused(
+    model_options: dict[str, object], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         backscatter(sphere(), [4, 0, 0], 12e9, **model_options)
 

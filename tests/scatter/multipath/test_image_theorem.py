@@ -49,11 +49,15 @@ class Still:
 
     def at(self, times: Array) -> Poses:
         moved = self.centres + np.asarray(times)[:, None, None] * np.array(self.velocity)
-        return Poses(moved, np.broadcast_to(self.frames, (len(times), *self.frames.shape)), self.axes)
+        return Poses(
+            moved, np.broadcast_to(self.frames, (len(times), *self.frames.shape)), self.axes
+        )
 
 
 def one(
-    axes: tuple[float, float, float] = (0.1, 0.15, 0.3), centre: tuple[float, ...] = (0.0, 0.3, 1.2), **more: object
+    axes: tuple[float, float, float] = (0.1, 0.15, 0.3),
+    centre: tuple[float, ...] = (0.0, 0.3, 1.2),
+    **more: object,
 ) -> Still:
     frame = Rotation.from_euler("xyz", [0.3, -0.2, 0.5]).as_matrix()
     return Still(np.array([centre]), np.array([axes]), frame[None], **more)  # type: ignore[arg-type]
@@ -61,12 +65,21 @@ def one(
 
 def wall(side: str, name: str = "perfect-conductor", thickness: float = 0.1) -> Wall:
     corner, u, v = SIDES[side]
-    return Wall(name=side, corner_m=corner, edge_u_m=u, edge_v_m=v, material=material(name), thickness_m=thickness)
+    return Wall(
+        name=side,
+        corner_m=corner,
+        edge_u_m=u,
+        edge_v_m=v,
+        material=material(name),
+        thickness_m=thickness,
+    )
 
 
 def single(**fields: object) -> Radar:
     """One Tx, one Rx, both at one place."""
-    return Radar(**({"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "chirp_duration_s": 1e-3} | fields))  # type: ignore[arg-type]
+    return Radar(
+        **({"tx_y": 1, "tx_z": 0, "rx_y": 1, "rx_z": 0, "chirp_duration_s": 1e-3} | fields)
+    )  # type: ignore[arg-type]
 
 
 def unit(vector: Array) -> Array:
@@ -101,7 +114,9 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
     (path,) = (p for p in wall_paths(box(), antenna, 2) if p.name == "floor > left > body")
     # Over the floor and the left wall, y = 2.5, in whatever order: both coordinates mirrored.
     np.testing.assert_allclose(images(path.out, antenna), [-4.0, 4.0, -1.0])
-    assert np.linalg.norm(images(path.out, antenna) - point) == pytest.approx(np.sqrt(4.3**2 + 3.8**2 + 2.4**2), abs=1e-12)
+    assert np.linalg.norm(images(path.out, antenna) - point) == pytest.approx(
+        np.sqrt(4.3**2 + 3.8**2 + 2.4**2), abs=1e-12
+    )
 
 
 # -- the image theorem ------------------------------------------------------------------------------------------------
@@ -109,7 +124,9 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("side", ["floor", "left"])
-def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str, polarization: str, backend: Backend) -> None:
+def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
+    side: str, polarization: str, backend: Backend
+) -> None:
     body = one()
     radar = replace(Radar.preset("paper-12ghz"), polarization=polarization)
     model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
@@ -120,7 +137,12 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str,
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     length, amplitude, _ = mirror(
-        at.tx, at.rx, at.centres @ turn + shift, turn @ at.frames, at.semi_axes, polarization=polarization
+        at.tx,
+        at.rx,
+        at.centres @ turn + shift,
+        turn @ at.frames,
+        at.semi_axes,
+        polarization=polarization,
     )
     # Of third order in the distance of a receiver from the middle of its line: 4 cm.
     np.testing.assert_allclose(echoes.length[..., number], length[..., 0], rtol=0, atol=1e-7)
@@ -132,7 +154,9 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(side: str,
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
 @pytest.mark.parametrize("side", ["floor", "left"])
-def test_one_way_over_a_conducting_plane_by_hand(side: str, polarization: str, backend: Backend) -> None:
+def test_one_way_over_a_conducting_plane_by_hand(
+    side: str, polarization: str, backend: Backend
+) -> None:
     body, radar = one(), single(polarization=polarization)
     model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind)  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(1))
@@ -142,7 +166,10 @@ def test_one_way_over_a_conducting_plane_by_hand(side: str, polarization: str, b
     image = turn @ antenna + shift
     poses = chirp_poses(radar, body, np.arange(1))  # type: ignore[arg-type]
     length, strength, point = (
-        value[0, 0, 0] for value in mirror(image[None], antenna[None, None], *poses[3:], polarization="v", points=True)
+        value[0, 0, 0]
+        for value in mirror(
+            image[None], antenna[None, None], *poses[3:], polarization="v", points=True
+        )
     )
     bare = strength / copolar(image - point, antenna - point, "v")
     # The antenna's field along the way it really goes; a conductor turns the part along itself round.
@@ -172,7 +199,9 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     antenna = np.array(radar.position_m)
     tx, rx = antenna * [1, 1, -1], antenna * [1, -1, 1] + [0, 5, 0]
     at = Poses(centre[None, None], np.eye(3)[None, None], np.full((1, 3), radius))
-    length, strength, point = (value[0, 0, 0] for value in mirror(tx[None], rx[None, None], *at, points=True))
+    length, strength, point = (
+        value[0, 0, 0] for value in mirror(tx[None], rx[None, None], *at, points=True)
+    )
     bare = strength / copolar(tx - point, rx - point, "v")
     eta = material("concrete").eta(echoes.frequency[0])
 
@@ -184,7 +213,9 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
         root = np.sqrt(eta - 1 + cosine**2)
         te = (cosine - root) / (cosine + root)
         tm = (eta * cosine - root) / (eta * cosine + root)
-        return te * (field @ across) * across + tm * (field @ np.cross(across, arriving)) * np.cross(across, leaving)
+        return te * (field @ across) * across + tm * (
+            field @ np.cross(across, arriving)
+        ) * np.cross(across, leaving)
 
     up = np.array([0.0, 0.0, 1.0])
     down, aside = (point - tx) * [1, 1, -1], (point - rx) * [1, -1, 1]
@@ -203,7 +234,9 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
 
 
 def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend) -> None:
-    body = rt.Body.from_motion(place(rt.synthetic_motion("kick", seed=1), start_s=0.9, duration_s=0.2))
+    body = rt.Body.from_motion(
+        place(rt.synthetic_motion("kick", seed=1), start_s=0.9, duration_s=0.2)
+    )
     radar = Radar.preset("paper-12ghz")
     scene = Scene(walls=box())
     model = Multipath(radar, body, scene, variant=backend.kind)
@@ -231,14 +264,20 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     model = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
     pieces = [model.echoes(block) for block in np.split(chirps, [7, 8, 30])]
     np.testing.assert_array_equal(np.concatenate([piece.length for piece in pieces]), whole.length)
-    np.testing.assert_array_equal(np.concatenate([piece.amplitude for piece in pieces], axis=1), whole.amplitude)
+    np.testing.assert_array_equal(
+        np.concatenate([piece.amplitude for piece in pieces], axis=1), whole.amplitude
+    )
 
 
 # -- what hides and what lets through ------------------------------------------------------------------------------------
 
 
 def test_an_empty_scene_is_specular_itself(backend: Backend) -> None:
-    body, radar, chirps = one(velocity=(-1.0, 0.0, 0.0)), Radar.preset("paper-12ghz"), np.arange(100)
+    body, radar, chirps = (
+        one(velocity=(-1.0, 0.0, 0.0)),
+        Radar.preset("paper-12ghz"),
+        np.arange(100),
+    )
     ours = Multipath(radar, body, Scene(), variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
     np.testing.assert_array_equal(ours.length, free.length)
@@ -257,7 +296,10 @@ def test_a_slab_before_the_radar_lets_its_square_through(backend: Backend) -> No
         thickness_m=0.003,
     )
     model = Multipath(radar, body, Scene(walls=(plasterboard,)), variant=backend.kind)  # type: ignore[arg-type]
-    echoes, free = model.echoes(np.arange(2)), Specular(radar, body, variant=backend.kind).echoes(np.arange(2))  # type: ignore[arg-type]
+    echoes, free = (
+        model.echoes(np.arange(2)),
+        Specular(radar, body, variant=backend.kind).echoes(np.arange(2)),
+    )  # type: ignore[arg-type]
     # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
     root = np.sqrt(material("plasterboard").eta(echoes.frequency))
     wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
@@ -272,7 +314,12 @@ def test_a_slab_before_the_radar_lets_its_square_through(backend: Backend) -> No
 
 
 def test_behind_metal_there_is_nothing(backend: Backend) -> None:
-    sheet = replace(wall("left", "metal"), corner_m=(-2.0, -2.0, 0.0), edge_u_m=(0.0, 6.0, 0.0), edge_v_m=(0.0, 0.0, 3.0))
+    sheet = replace(
+        wall("left", "metal"),
+        corner_m=(-2.0, -2.0, 0.0),
+        edge_u_m=(0.0, 6.0, 0.0),
+        edge_v_m=(0.0, 0.0, 3.0),
+    )
     model = Multipath(single(), one(), Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
     np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
 
@@ -280,7 +327,9 @@ def test_behind_metal_there_is_nothing(backend: Backend) -> None:
 def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the body passes x = 0.2.
     body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
-    sheet = replace(wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0))
+    sheet = replace(
+        wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0)
+    )
     radar = single()
     model = Multipath(radar, body, Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
     chirps = np.arange(0, 1000, anchor_step(radar, ANCHORS_S))
@@ -290,12 +339,18 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     # Both stand equally far from the wall but for the body's surface: the share of the way by similar triangles.
     tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
     meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)
-    np.testing.assert_array_equal(np.abs(echoes.amplitude[0, :, 0, 1]) > 0, (meets >= -2.4) & (meets <= -1.4))
+    np.testing.assert_array_equal(
+        np.abs(echoes.amplitude[0, :, 0, 1]) > 0, (meets >= -2.4) & (meets <= -1.4)
+    )
     seen = np.abs(echoes.amplitude[0, :, 0, 1]) > 0
     assert 0 < seen.sum() < len(seen)
     # On its way in it fades: between two anchors it is neither all nor nothing.
     first = int(chirps[np.flatnonzero(seen)[0]])
-    fade = np.abs(model.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[0, :, 0, 1])
+    fade = np.abs(
+        model.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[
+            0, :, 0, 1
+        ]
+    )
     assert fade[0] == 0
     assert (np.diff(fade) > 0).all()
 
@@ -304,7 +359,9 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
 def test_furniture_hides_both_legs_and_the_way_to_the_wall(hides: bool, backend: Backend) -> None:
     # A wardrobe between radar and body; the floor before it is free, but what goes over it meets its side.
     place = (-1.0, 1.0, 0.0) if hides else (-1.0, -6.0, 0.0)
-    wardrobe = Furniture(name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place)
+    wardrobe = Furniture(
+        name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place
+    )
     scene = Scene(walls=(wall("floor"), wall("left")), furniture=(wardrobe,))
     body = one(centre=(1.0, 1.0, 1.0))
     model = Multipath(single(), body, scene, variant=backend.kind)  # type: ignore[arg-type]
@@ -323,7 +380,9 @@ def test_another_part_hides_a_leg_over_a_wall(backend: Backend) -> None:
     small, radar = np.array([0.0, 1.0, 1.0]), single()
     image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
     large = small + 0.6 * unit(image - small)
-    body = Still(np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2))
+    body = Still(
+        np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2)
+    )
     model = Multipath(radar, body, Scene(walls=(wall("left"),)), variant=backend.kind)  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(1))
     seen = {
@@ -372,7 +431,12 @@ def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> No
 
 
 def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> None:
-    aside = replace(wall("floor"), corner_m=(20.0, 20.0, 0.0), edge_u_m=(1.0, 0.0, 0.0), edge_v_m=(0.0, 1.0, 0.0))
+    aside = replace(
+        wall("floor"),
+        corner_m=(20.0, 20.0, 0.0),
+        edge_u_m=(1.0, 0.0, 0.0),
+        edge_v_m=(0.0, 1.0, 0.0),
+    )
     model = Multipath(single(), one(), Scene(walls=(aside, wall("left"))), variant=backend.kind)  # type: ignore[arg-type]
     accounts = {account.path: account for account in model.prune(50, 0.0)}
     assert accounts["floor > body"].dropped == ("part 0",)
@@ -407,9 +471,13 @@ def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
     assert model.variant is None
     # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall the field stays vertical.
     point = np.linalg.norm(np.array(radar.position_m) - np.array([0.0, 0.3, 1.2]))
-    assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6)
+    assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(
+        np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6
+    )
     image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
-    assert echoes.length[0, 0, 1] == pytest.approx(point + np.linalg.norm(image - [0.0, 0.3, 1.2]) - 0.2, abs=0.05)
+    assert echoes.length[0, 0, 1] == pytest.approx(
+        point + np.linalg.norm(image - [0.0, 0.3, 1.2]) - 0.2, abs=0.05
+    )
     assert (np.abs(echoes.amplitude[0, 0, 0, 1:]) > 0).all()
 
 
@@ -421,14 +489,20 @@ def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(backend: 
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
         number = by_name(model, name)
-        np.testing.assert_array_equal(amplitude[..., number], np.broadcast_to(amplitude[1, ..., number], amplitude.shape[:3]))
+        np.testing.assert_array_equal(
+            amplitude[..., number], np.broadcast_to(amplitude[1, ..., number], amplitude.shape[:3])
+        )
     number = by_name(model, "left > body")
     assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
 
 
 @pytest.mark.parametrize("name", ["perfect-conductor", "skin"])
 def test_the_person_alone_is_specular_in_free_space(name: str, backend: Backend) -> None:
-    body, radar, chirps = one(velocity=(-1.0, 0.0, 0.0)), Radar.preset("paper-12ghz"), np.arange(100)
+    body, radar, chirps = (
+        one(velocity=(-1.0, 0.0, 0.0)),
+        Radar.preset("paper-12ghz"),
+        np.arange(100),
+    )
     scene = Scene(walls=(wall("floor", "concrete"),))
     room = Multipath(radar, body, scene, variant=backend.kind, material=name)  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
@@ -452,7 +526,9 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(backend: Backend) -> None:
     eta = material("skin").eta(metal.frequency)[0]
     ratio = skin.amplitude[0, 0, 0, 1] / metal.amplitude[0, 0, 0, 1]
     image = np.array([-4.0, 4.0, 1.0])
-    ways = [unit(place - np.array([0.0, 0.3, 1.2])) for place in (image, np.array([-4.0, 1.0, 1.0]))]
+    ways = [
+        unit(place - np.array([0.0, 0.3, 1.2])) for place in (image, np.array([-4.0, 1.0, 1.0]))
+    ]
     cosine = np.sqrt((1 + ways[0] @ ways[1]) / 2)
     root = np.sqrt(eta - 1 + cosine**2)
     # The sphere's radius moves the angle by a degree, and the field is a little out of the plane.

@@ -31,14 +31,18 @@ def pane(made: str | Material, thickness: float, x: float = -2.0) -> Wall:
     """Across the way from a radar at x = -4 to a body at x = 0."""
     own = material(made) if isinstance(made, str) else made
     edges = {"edge_u_m": (0.0, 0.0, 40.0), "edge_v_m": (0.0, 40.0, 0.0)}
-    return Wall(name="pane", corner_m=(x, -20.0, -20.0), material=own, thickness_m=thickness, **edges)  # type: ignore[arg-type]
+    return Wall(
+        name="pane", corner_m=(x, -20.0, -20.0), material=own, thickness_m=thickness, **edges
+    )  # type: ignore[arg-type]
 
 
 def side(made: str | Material, thickness: float) -> Wall:
     """Beside that way, at y = 1.6."""
     own = material(made) if isinstance(made, str) else made
     edges = {"edge_u_m": (40.0, 0.0, 0.0), "edge_v_m": (0.0, 0.0, 40.0)}
-    return Wall(name="side", corner_m=(-20.0, 1.6, -20.0), material=own, thickness_m=thickness, **edges)  # type: ignore[arg-type]
+    return Wall(
+        name="side", corner_m=(-20.0, 1.6, -20.0), material=own, thickness_m=thickness, **edges
+    )  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True)
@@ -59,7 +63,9 @@ class Ball:
         return Poses(centres, np.broadcast_to(np.eye(3), (len(centres), 1, 3, 3)), self.semi_axes)
 
 
-def spectrum(length: Array, amplitude: NDArray[np.complexfloating], nodes: Array) -> NDArray[np.complex128]:
+def spectrum(
+    length: Array, amplitude: NDArray[np.complexfloating], nodes: Array
+) -> NDArray[np.complex128]:
     """Sum of echoes with its phases (frequency, ...), of lengths (..., echo) and amplitudes (node, ..., echo)."""
     weights = np.ones((len(FREQUENCY), len(nodes)))
     for column, node in enumerate(nodes):
@@ -99,7 +105,9 @@ def test_passes_of_a_conductor_and_at_grazing_incidence() -> None:
 
 def test_a_term_without_its_delay_turns_little() -> None:
     wall, cosine = pane("brick", 0.24), np.array(0.8)
-    (_, (first, *_)) = room_series((wall,), PRESET, most_nodes=3, enough=0.015, bounces=1).walls[0].terms
+    (_, (first, *_)) = (
+        room_series((wall,), PRESET, most_nodes=3, enough=0.015, bounces=1).walls[0].terms
+    )
     extra = first.extra_m(0.24, cosine)
     # On a straight way through a slab of index n: n d / cos of the angle inside, less what is lost to the side.
     inside = np.sqrt(1 - (1 - 0.8**2) / 3.91)
@@ -109,9 +117,13 @@ def test_a_term_without_its_delay_turns_little() -> None:
     assert Term(1, rest=True).extra_m(0.24, cosine) == 0
 
 
-@pytest.mark.parametrize(("name", "thickness"), [("perfect-conductor", 0.1), ("concrete", 0.2), ("glass", 0.003)])
+@pytest.mark.parametrize(
+    ("name", "thickness"), [("perfect-conductor", 0.1), ("concrete", 0.2), ("glass", 0.003)]
+)
 def test_what_is_smooth_stays_one_echo(name: str, thickness: float) -> None:
-    (one,), frequency = room_series((pane(name, thickness),), PRESET, most_nodes=3, enough=0.015, bounces=1)
+    (one,), frequency = room_series(
+        (pane(name, thickness),), PRESET, most_nodes=3, enough=0.015, bounces=1
+    )
     assert [term.whole for term in one.terms[0]] == [True]
     # Concrete of 20 cm is as good as a half-space: one node, and what comes through, 107 dB down, asks for none.
     assert len(frequency) == {"perfect-conductor": 1, "concrete": 1, "glass": 3}[name]
@@ -120,8 +132,15 @@ def test_what_is_smooth_stays_one_echo(name: str, thickness: float) -> None:
 
 
 def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
-    for name, thickness, most in (("brick", 0.24, 2), ("brick", 0.1, 4), ("plasterboard", 0.025, 4), ("wood", 0.1, 2)):
-        (one,), frequency = room_series((pane(name, thickness),), PRESET, most_nodes=3, enough=0.015, bounces=1)
+    for name, thickness, most in (
+        ("brick", 0.24, 2),
+        ("brick", 0.1, 4),
+        ("plasterboard", 0.025, 4),
+        ("wood", 0.1, 2),
+    ):
+        (one,), frequency = room_series(
+            (pane(name, thickness),), PRESET, most_nodes=3, enough=0.015, bounces=1
+        )
         assert one.held == (True, True)
         assert max(len(terms) for terms in one.terms) <= most
         assert len(frequency) <= 3
@@ -130,11 +149,17 @@ def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
 # -- the person ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "thickness"), [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125)])
-def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(name: str, thickness: float, backend: Backend) -> None:
+@pytest.mark.parametrize(
+    ("name", "thickness"), [("brick", 0.24), ("glass", 0.02), ("plasterboard", 0.0125)]
+)
+def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
+    name: str, thickness: float, backend: Backend
+) -> None:
     body, radar = Ball((0.0, 0.0, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     wall = pane(name, thickness)
-    behind = Multipath(radar, body, Scene(walls=(wall,)), variant=backend.kind, order=0).echoes(np.arange(1))  # type: ignore[arg-type]
+    behind = Multipath(radar, body, Scene(walls=(wall,)), variant=backend.kind, order=0).echoes(
+        np.arange(1)
+    )  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind).echoes(np.arange(1))  # type: ignore[arg-type]
     way = np.array([4.0, -1.0, 0.0]) - 0.0
     cosine = abs(way[0]) / np.linalg.norm(way)
@@ -142,14 +167,20 @@ def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(name: str, thickness: f
     passed_tm = slab(wall.material.eta(FREQUENCY), thickness, FREQUENCY, cosine, "tm")[1]
     # The antenna is at y = 1, in the plane of the wave and the normal, so v is TE.
     assert not np.allclose(passed, passed_tm, rtol=1e-3)
-    exact = of(free)[:, 0, 0] * (passed * np.exp(2j * np.pi * FREQUENCY / C * thickness * cosine)) ** 2
+    exact = (
+        of(free)[:, 0, 0] * (passed * np.exp(2j * np.pi * FREQUENCY / C * thickness * cosine)) ** 2
+    )
     error = np.abs(of(behind)[:, 0, 0] - exact).max() / np.sqrt((np.abs(exact) ** 2).mean())
     assert error < 0.02
 
 
-def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(backend: Backend) -> None:
+def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
+    backend: Backend,
+) -> None:
     body = Ball((0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
-    model = Multipath(PRESET, body, Scene(walls=(pane("brick", 0.24),)), variant=backend.kind, order=0)  # type: ignore[arg-type]
+    model = Multipath(
+        PRESET, body, Scene(walls=(pane("brick", 0.24),)), variant=backend.kind, order=0
+    )  # type: ignore[arg-type]
     # Between two anchors, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
     echoes, free = model.echoes(chirps), model.person.echoes(chirps)
@@ -175,7 +206,10 @@ def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
     n_chirps = int(0.9 / PRESET.chirp_duration_s)
     (direct, *_) = model.prune(n_chirps, 0.0)
     assert direct.kept == ("ball",)
-    early, late = model.echoes(np.arange(4)), model.echoes(np.arange(n_chirps - 400, n_chirps - 396))
+    early, late = (
+        model.echoes(np.arange(4)),
+        model.echoes(np.arange(n_chirps - 400, n_chirps - 396)),
+    )
     assert early.amplitude.shape[-1] == late.amplitude.shape[-1] == len(model.path_names)
     power = [(np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2)) for echoes in (early, late)]
     # Behind it each wave has a delay, beside it none has.
@@ -186,15 +220,21 @@ def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
 
 
 @pytest.mark.parametrize(("name", "thickness"), [("brick", 0.11), ("plasterboard", 0.025)])
-def test_ghosts_off_a_wall_whose_back_answers(name: str, thickness: float, backend: Backend) -> None:
+def test_ghosts_off_a_wall_whose_back_answers(
+    name: str, thickness: float, backend: Backend
+) -> None:
     body, radar = Ball((2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     found = {}
     for made, depth in ((name, thickness), ("perfect-conductor", 0.1)):
-        model = Multipath(radar, body, Scene(walls=(side(made, depth),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
+        model = Multipath(
+            radar, body, Scene(walls=(side(made, depth),)), variant=backend.kind, order=2
+        )  # type: ignore[arg-type]
         echoes = model.echoes(np.arange(1))
         for path in ("side > body", "side > body > side"):
             own = np.array(model.path_names) == path
-            found[path, made] = spectrum(echoes.length[..., own], echoes.amplitude[..., own], echoes.frequency)[:, 0, 0]
+            found[path, made] = spectrum(
+                echoes.length[..., own], echoes.amplitude[..., own], echoes.frequency
+            )[:, 0, 0]
     for path, power in (("side > body", 1), ("side > body > side", 2)):
         # The image of the antenna, its leg to where the sphere is met, and so the angle on the wall.
         image = np.array([radar.tx[0, 0], 3.2 - radar.tx[0, 1], 1.0])
@@ -222,9 +262,13 @@ def dispersive() -> Material:
 
 def test_a_wall_that_is_not_followed_is_a_limit(tmp_path: Path) -> None:
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.3)
-    radar = replace(PRESET, tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=PRESET.cycle_duration_s)
+    radar = replace(
+        PRESET, tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=PRESET.cycle_duration_s
+    )
     scene = Scene(walls=(pane("concrete", 0.3, x=-3.0),))
-    with pytest.warns(ValidityWarning, match=r"walls whose coefficient over the sweep is not known to 2%.*: pane"):
+    with pytest.warns(
+        ValidityWarning, match=r"walls whose coefficient over the sweep is not known to 2%.*: pane"
+    ):
         result = rt.run(motion, radar, scene, out=tmp_path / "run", order=0, variant="cpu")
     (limit,) = (one for one in result.summary["limits"] if one["name"] == "wall_frequency_response")
     assert limit["share"] == pytest.approx(1.0)
@@ -234,23 +278,38 @@ def test_a_wall_that_is_not_followed_is_a_limit(tmp_path: Path) -> None:
 # -- static clutter -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("name", "thickness"), [("brick", 0.11), ("brick", 0.24), ("concrete", 0.1), ("plasterboard", 0.0125)])
-def test_a_mirror_of_a_thick_wall_is_held_to_a_thousandth(name: str, thickness: float, backend: Backend) -> None:
+@pytest.mark.parametrize(
+    ("name", "thickness"),
+    [("brick", 0.11), ("brick", 0.24), ("concrete", 0.1), ("plasterboard", 0.0125)],
+)
+def test_a_mirror_of_a_thick_wall_is_held_to_a_thousandth(
+    name: str, thickness: float, backend: Backend
+) -> None:
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512)
-    (own,) = Clutter(radar, Scene(walls=(side(name, thickness),)), order=1, variant=backend.kind).objects
+    (own,) = Clutter(
+        radar, Scene(walls=(side(name, thickness),)), order=1, variant=backend.kind
+    ).objects
     ours = spectrum(own.length, own.amplitude, own.frequency)[:, 0, 0]
     distance = 2 * (1.6 - radar.position_m[1])
     reflected = slab(material(name).eta(FREQUENCY), thickness, FREQUENCY, 1.0, "te")[0]
-    exact = -np.sqrt(4 * np.pi) / distance * reflected * np.exp(-2j * np.pi * FREQUENCY / C * distance)
+    exact = (
+        -np.sqrt(4 * np.pi) / distance * reflected * np.exp(-2j * np.pi * FREQUENCY / C * distance)
+    )
     assert np.abs(ours - exact).max() < 1e-3 * np.abs(exact).max()
     # What a polynomial follows stays one echo.
     assert (own.n_echoes == 1) == (name == "plasterboard")
 
 
 def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: Backend) -> None:
-    radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512, position_m=(-4.0, 0.0, 1.0))
+    radar = Radar(
+        tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512, position_m=(-4.0, 0.0, 1.0)
+    )
     corner = Furniture(
-        name="corner", mesh="trihedral", material=material("perfect-conductor"), position_m=(0.0, 0.0, 1.0), yaw_deg=180.0
+        name="corner",
+        mesh="trihedral",
+        material=material("perfect-conductor"),
+        position_m=(0.0, 0.0, 1.0),
+        yaw_deg=180.0,
     )
     rough = replace(
         pane("perfect-conductor", 0.1, x=0.5),
@@ -261,11 +320,18 @@ def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: 
         roughness_m=5e-4,
     )
     wall = pane("brick", 0.24)
-    passed = slab(wall.material.eta(FREQUENCY), 0.24, FREQUENCY, 1.0, "te")[1] * np.exp(2j * np.pi * FREQUENCY / C * 0.24)
+    passed = slab(wall.material.eta(FREQUENCY), 0.24, FREQUENCY, 1.0, "te")[1] * np.exp(
+        2j * np.pi * FREQUENCY / C * 0.24
+    )
     for kind, walls, furniture in (("reflector", (), (corner,)), ("rough", (rough,), ())):
         found = []
         for more in ((), (wall,)):
-            objects = Clutter(radar, Scene(walls=(*walls, *more), furniture=furniture), order=0, variant=backend.kind).objects
+            objects = Clutter(
+                radar,
+                Scene(walls=(*walls, *more), furniture=furniture),
+                order=0,
+                variant=backend.kind,
+            ).objects
             (own,) = (one for one in objects if one.kind == kind)
             found.append(spectrum(own.length, own.amplitude, own.frequency)[:, 0, 0])
         free, behind = found
@@ -276,6 +342,7 @@ def test_a_reflector_behind_brick_is_delayed_and_weakened_on_both_legs(backend: 
 def test_clutter_that_cannot_be_followed_is_refused(backend: Backend) -> None:
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512)
     with pytest.raises(
-        InputError, match=r"^clutter of scene '.*': over the sweep the return 'side' is off by .*allowed is 0\.001"
+        InputError,
+        match=r"^clutter of scene '.*': over the sweep the return 'side' is off by .*allowed is 0\.001",
     ):
         Clutter(radar, Scene(walls=(side(dispersive(), 3.0),)), order=1, variant=backend.kind)

@@ -43,7 +43,10 @@ def wave(seed: int) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("back", [False, True])
 def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> None:
     side = -1 if back else 1
-    tx, rx = (MIDDLE + side * away * WALL.normal + [0.1 * away, 0.2, shift] for away, shift in ((1.5, 0.4), (0.7, -0.3)))
+    tx, rx = (
+        MIDDLE + side * away * WALL.normal + [0.1 * away, 0.2, shift]
+        for away, shift in ((1.5, 0.4), (0.7, -0.3))
+    )
     point, valid = rw.specular_point(WALL, tx, rx, back=back)
     corner = WALL.corners[0] - (WALL.thickness_m if back else 0) * WALL.normal
     u, v = np.array(WALL.edge_u_m), np.array(WALL.edge_v_m)
@@ -52,7 +55,9 @@ def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> Non
         place = corner + share[0] * u + share[1] * v
         return float(np.linalg.norm(tx - place) + np.linalg.norm(rx - place))
 
-    found = minimize(way, [0.5, 0.5], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15})
+    found = minimize(
+        way, [0.5, 0.5], method="Nelder-Mead", options={"xatol": 1e-10, "fatol": 1e-15}
+    )
     assert valid
     # The least way is known to 1e-15 m, its place to the root of that.
     np.testing.assert_allclose(point, corner + found.x[0] * u + found.x[1] * v, atol=1e-6)
@@ -63,9 +68,13 @@ def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> Non
 def test_no_specular_point_on_the_other_side_or_beside_the_rectangle() -> None:
     before, behind = MIDDLE + WALL.normal, MIDDLE - WALL.normal
     up = np.array([0, 0, 6.0])
-    _, valid = rw.specular_point(WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up]))
+    _, valid = rw.specular_point(
+        WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up])
+    )
     np.testing.assert_array_equal(valid, [False, False, False])
-    _, valid = rw.specular_point(WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True)
+    _, valid = rw.specular_point(
+        WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True
+    )
     np.testing.assert_array_equal(valid, [False, True, False])
 
 
@@ -74,7 +83,9 @@ def test_legs_cross_where_they_end_on_both_sides_of_the_slab() -> None:
     beside = np.array([0, 0, 6.0])
     origins = np.stack([before, behind, before, before, before + beside, behind])
     targets = np.stack([behind, before, before + 0.1, front, behind + beside, front])
-    np.testing.assert_array_equal(rw.crossed(WALL, origins, targets), [True, True, False, False, False, True])
+    np.testing.assert_array_equal(
+        rw.crossed(WALL, origins, targets), [True, True, False, False, False, True]
+    )
 
 
 @given(seed=st.integers(0, 1000))
@@ -88,9 +99,19 @@ def test_a_conductor_turns_the_field_as_its_image(seed: int) -> None:
 @given(seed=st.integers(0, 1000))
 def test_a_wall_without_loss_keeps_the_energy(seed: int) -> None:
     glass = own_material("glass without loss", source="made up", low_hz=1e9, high_hz=1e11, a=6.0)
-    wall = Wall(name="pane", corner_m=(0, 0, 0), edge_u_m=(0, 1, 0), edge_v_m=(0.6, 0, 0.8), material=glass, thickness_m=0.004)
+    wall = Wall(
+        name="pane",
+        corner_m=(0, 0, 0),
+        edge_u_m=(0, 1, 0),
+        edge_v_m=(0.6, 0, 0.8),
+        material=glass,
+        thickness_m=0.004,
+    )
     direction, field = wave(seed)
-    powers = [(np.abs(part) ** 2).sum(axis=-1) for part in (rw.reflect(wall, field, direction, [12e9, 14e9]), field)]
+    powers = [
+        (np.abs(part) ** 2).sum(axis=-1)
+        for part in (rw.reflect(wall, field, direction, [12e9, 14e9]), field)
+    ]
     powers.append((np.abs(rw.transmit(wall, field, direction, [12e9, 14e9])) ** 2).sum(axis=-1))
     np.testing.assert_allclose(powers[0] + powers[2], powers[1], rtol=1e-12)
 
@@ -107,16 +128,22 @@ def test_te_and_tm_take_their_own_coefficients() -> None:
     )
     down = np.array([0.8, 0, -0.6])
     te, tm = (slab(floor.material.eta(14e9), 0.05, 14e9, 0.6, kind) for kind in ("te", "tm"))
-    np.testing.assert_allclose(rw.reflect(floor, np.array([0, 1, 0]), down, [14e9])[0], [0, te[0], 0], atol=1e-12)
+    np.testing.assert_allclose(
+        rw.reflect(floor, np.array([0, 1, 0]), down, [14e9])[0], [0, te[0], 0], atol=1e-12
+    )
     # e_TE x k, with e_TE = k x n = -y: down, (0.6, 0, 0.8); up, (-0.6, 0, 0.8).
     e_down, e_up = np.array([0.6, 0, 0.8]), np.array([-0.6, 0, 0.8])
     np.testing.assert_allclose(rw.reflect(floor, e_down, down, [14e9])[0], tm[0] * e_up, atol=1e-12)
     air = np.exp(2j * np.pi * 14e9 / SPEED_OF_LIGHT_MPS * 0.05 * 0.6)
-    np.testing.assert_allclose(rw.transmit(floor, e_down, down, [14e9])[0], tm[1] * air * e_down, atol=1e-12)
+    np.testing.assert_allclose(
+        rw.transmit(floor, e_down, down, [14e9])[0], tm[1] * air * e_down, atol=1e-12
+    )
 
 
 def test_roughness_takes_its_share_off_the_mirrored_field() -> None:
-    rough = Wall(**{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "roughness_m": 0.001})
+    rough = Wall(
+        **{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "roughness_m": 0.001}
+    )
     direction, field = wave(3)
     cosine = abs(direction @ WALL.normal)
     k = 2 * np.pi * 14e9 / SPEED_OF_LIGHT_MPS
@@ -125,13 +152,21 @@ def test_roughness_takes_its_share_off_the_mirrored_field() -> None:
 
 
 def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
-    second = Wall(**{**{key: getattr(WALL, key) for key in WALL.__dataclass_fields__}, "corner_m": (2.0, -2.0, 0.0), "name": "b"})
+    second = Wall(
+        **{
+            **{key: getattr(WALL, key) for key in WALL.__dataclass_fields__},
+            "corner_m": (2.0, -2.0, 0.0),
+            "name": "b",
+        }
+    )
     scene = Scene(walls=(WALL, second))
     origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
     targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
     field, frequency = np.array([0.0, 0, 1.0]), np.array([12e9, 16e9])
     setting_out = rw.setting_out(np.broadcast_to(field, (2, 3, 3)), 2)
-    (wave,) = rw.through_walls(scene, whole_walls(scene.walls), 0, setting_out, origins[:, None], targets, frequency)
+    (wave,) = rw.through_walls(
+        scene, whole_walls(scene.walls), 0, setting_out, origins[:, None], targets, frequency
+    )
     got = wave.field
     assert wave.met == ()
     assert not wave.extra_m.any()

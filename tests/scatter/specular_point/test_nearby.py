@@ -38,7 +38,12 @@ def shortest(rx: Array) -> tuple[float, Array]:
     towards = FRAME.T @ ((TX + rx) / 2 - CENTRE) / AXES
     towards /= np.linalg.norm(towards)
     begin = [np.arccos(towards[2]), np.arctan2(towards[1], towards[0])]
-    found = minimize(length, begin, method="Nelder-Mead", options={"xatol": 1e-8, "fatol": 1e-14, "maxiter": 4000})
+    found = minimize(
+        length,
+        begin,
+        method="Nelder-Mead",
+        options={"xatol": 1e-8, "fatol": 1e-14, "maxiter": 4000},
+    )
     return found.fun, local(found.x)
 
 
@@ -50,7 +55,11 @@ def test_a_start_beside_the_specular_point_leads_to_it(off: list[float]) -> None
     zero = np.zeros(1, dtype=np.int64)
     start = Nearby(near, near, wanted, zero, zero, np.zeros(1), np.array([[1.0, 0.0]]))
     body = CENTRE[None, None], FRAME[None, None], AXES[None]
-    length, amplitude, known = np.empty((1, len(RX), 1)), np.empty((1, len(RX), 1)), np.zeros((1, 1), dtype=bool)
+    length, amplitude, known = (
+        np.empty((1, len(RX), 1)),
+        np.empty((1, len(RX), 1)),
+        np.zeros((1, 1), dtype=bool),
+    )
     antennas = TX[None, None], np.ascontiguousarray(RX.T)[None, None], middle[None, None]
     nearby_echoes(*antennas, zero, zero, zero, zero, *body, start, length, amplitude, known)
     assert known.all()  # else it would be found again, eight times as slowly
@@ -59,4 +68,6 @@ def test_a_start_beside_the_specular_point_leads_to_it(off: list[float]) -> None
     ways = TX - points[0, :, 0], RX - points[0, :, 0]
     # All receivers are given the curvature at the specular point of their middle.
     assert amplitude[0, :, 0] == pytest.approx(returned[0, :, 0] / copolar(*ways, "v"), rel=0.025)
-    assert amplitude[0, 3:5, 0].mean() == pytest.approx((returned[0, :, 0] / copolar(*ways, "v"))[3:5].mean(), rel=0.005)
+    assert amplitude[0, 3:5, 0].mean() == pytest.approx(
+        (returned[0, :, 0] / copolar(*ways, "v"))[3:5].mean(), rel=0.005
+    )

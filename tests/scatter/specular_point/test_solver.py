@@ -14,13 +14,22 @@ Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
 
 
-def solve(tx: Array, rx: Array, axes: Array, frame: Array | None = None, centre: Array | None = None, **how: object) -> tuple:
+def solve(
+    tx: Array,
+    rx: Array,
+    axes: Array,
+    frame: Array | None = None,
+    centre: Array | None = None,
+    **how: object,
+) -> tuple:
     """One ellipsoid, pair by pair: length (n,), amplitude (n,), point (n, 3)."""
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
     n = len(tx)
     frames = np.broadcast_to(np.eye(3) if frame is None else frame, (n, 1, 3, 3))
     centres = np.broadcast_to(np.zeros(3) if centre is None else centre, (n, 1, 3))
-    length, amplitude, point = mirror(tx, rx[:, None], centres, frames, np.array([axes], float), points=True, **how)
+    length, amplitude, point = mirror(
+        tx, rx[:, None], centres, frames, np.array([axes], float), points=True, **how
+    )
     return length[:, 0, 0], amplitude[:, 0, 0], point[:, 0, 0]
 
 
@@ -35,8 +44,13 @@ def somewhere(rng: np.random.Generator, n: int, apart: float = 0.6) -> tuple[Arr
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
-@pytest.mark.parametrize(("distance", "half_angle"), [(0.4, 0.0), (0.4, 0.8), (4.0, 0.1), (4.0, 1.4), (1e3, 0.0), (1e3, 1.5)])
-def test_a_sphere_between_equally_distant_antennas(distance: float, half_angle: float, polarization: str) -> None:
+@pytest.mark.parametrize(
+    ("distance", "half_angle"),
+    [(0.4, 0.0), (0.4, 0.8), (4.0, 0.1), (4.0, 1.4), (1e3, 0.0), (1e3, 1.5)],
+)
+def test_a_sphere_between_equally_distant_antennas(
+    distance: float, half_angle: float, polarization: str
+) -> None:
     a = 0.1
     tx, rx = (distance * np.array([np.cos(x), np.sin(x), 0.0]) for x in (half_angle, -half_angle))
     length, amplitude, point = solve(tx, rx, np.full(3, a), polarization=polarization)
@@ -48,11 +62,15 @@ def test_a_sphere_between_equally_distant_antennas(distance: float, half_angle: 
     np.testing.assert_allclose(point[0], [a, 0, 0], atol=1e-9 * a)
     np.testing.assert_allclose(length, 2 * leg, rtol=1e-14)
     # The point is good to 1e-7 of the radius, or the square of it by Newton's last step.
-    np.testing.assert_allclose(amplitude, 2 * np.sqrt(np.pi) * cosine / np.sqrt(divergence) / leg**2, rtol=1e-7)
+    np.testing.assert_allclose(
+        amplitude, 2 * np.sqrt(np.pi) * cosine / np.sqrt(divergence) / leg**2, rtol=1e-7
+    )
 
 
 @given(seeds, st.tuples(*[st.floats(0.01, 0.5)] * 3))
-def test_the_law_of_reflection_holds_at_a_point_of_the_surface(seed: int, axes: tuple[float, float, float]) -> None:
+def test_the_law_of_reflection_holds_at_a_point_of_the_surface(
+    seed: int, axes: tuple[float, float, float]
+) -> None:
     tx, rx = somewhere(np.random.default_rng(seed), 20)
     length, _, point = solve(tx, rx, np.array(axes))
     np.testing.assert_allclose(((point / axes) ** 2).sum(axis=1), 1, rtol=1e-12)
@@ -68,29 +86,55 @@ def test_no_way_over_the_surface_is_shorter(seed: int, axes: tuple[float, float,
     rng = np.random.default_rng(seed)
     tx, rx = somewhere(rng, 5)
     length, _, point = solve(tx, rx, np.array(axes))
-    others = unit(np.concatenate([rng.normal(size=(200, 3)), point[0] / axes + 0.01 * rng.normal(size=(200, 3))])) * axes
-    ways = np.linalg.norm(tx[:, None] - others, axis=2) + np.linalg.norm(rx[:, None] - others, axis=2)
+    others = (
+        unit(
+            np.concatenate(
+                [rng.normal(size=(200, 3)), point[0] / axes + 0.01 * rng.normal(size=(200, 3))]
+            )
+        )
+        * axes
+    )
+    ways = np.linalg.norm(tx[:, None] - others, axis=2) + np.linalg.norm(
+        rx[:, None] - others, axis=2
+    )
     # Rounding of lengths of up to 20 m.
     assert (ways >= length[:, None] - 1e-13).all()
 
 
 @given(seeds, st.tuples(*[st.floats(0.02, 0.5)] * 3), st.sampled_from(["v", "h"]))
-def test_swapping_tx_and_rx_changes_nothing(seed: int, axes: tuple[float, float, float], polarization: str) -> None:
+def test_swapping_tx_and_rx_changes_nothing(
+    seed: int, axes: tuple[float, float, float], polarization: str
+) -> None:
     tx, rx = somewhere(np.random.default_rng(seed), 10)
     frame = Rotation.random(random_state=seed).as_matrix()
-    there, back = (solve(*pair, np.array(axes), frame, polarization=polarization) for pair in ((tx, rx), (rx, tx)))
+    there, back = (
+        solve(*pair, np.array(axes), frame, polarization=polarization)
+        for pair in ((tx, rx), (rx, tx))
+    )
     np.testing.assert_allclose(back[0], there[0], rtol=1e-14)
     # The last step of the search is at most 1e-7 of the least semi-axis.
     np.testing.assert_allclose(back[1], there[1], rtol=1e-5, atol=1e-9)
 
 
 @given(seeds, st.tuples(*[st.floats(0.02, 0.5)] * 3), st.sampled_from(["v", "h"]))
-def test_moving_and_yawing_everything_changes_nothing(seed: int, axes: tuple[float, float, float], polarization: str) -> None:
+def test_moving_and_yawing_everything_changes_nothing(
+    seed: int, axes: tuple[float, float, float], polarization: str
+) -> None:
     rng = np.random.default_rng(seed)
     tx, rx = somewhere(rng, 10)
-    frame, yaw, shift = Rotation.random(random_state=seed), Rotation.from_euler("z", rng.uniform(0, 6)), rng.normal(0, 5, 3)
+    frame, yaw, shift = (
+        Rotation.random(random_state=seed),
+        Rotation.from_euler("z", rng.uniform(0, 6)),
+        rng.normal(0, 5, 3),
+    )
     here = solve(tx, rx, np.array(axes), frame.as_matrix(), polarization=polarization)
-    moved = (yaw.apply(tx) + shift, yaw.apply(rx) + shift, np.array(axes), (yaw * frame).as_matrix(), shift)
+    moved = (
+        yaw.apply(tx) + shift,
+        yaw.apply(rx) + shift,
+        np.array(axes),
+        (yaw * frame).as_matrix(),
+        shift,
+    )
     there = solve(*moved, polarization=polarization)
     np.testing.assert_allclose(there[0], here[0], atol=1e-13)
     np.testing.assert_allclose(there[1], here[1], rtol=1e-5, atol=1e-9)
@@ -101,7 +145,10 @@ def test_moving_and_yawing_everything_changes_nothing(seed: int, axes: tuple[flo
 def test_everything_scales(seed: int, size: float) -> None:
     tx, rx = somewhere(np.random.default_rng(seed), 10)
     axes = np.array([0.05, 0.08, 0.2])
-    small, large = solve(tx, rx, axes, spreading=False), solve(size * tx, size * rx, size * axes, spreading=False)
+    small, large = (
+        solve(tx, rx, axes, spreading=False),
+        solve(size * tx, size * rx, size * axes, spreading=False),
+    )
     for one, other in zip(small, large, strict=True):
         np.testing.assert_allclose(other, size * one, rtol=1e-6, atol=1e-9 * size)
 
@@ -113,7 +160,9 @@ def test_far_away_it_is_the_cross_section_and_no_turn_of_the_polarisation(seed: 
     sight = unit(rng.normal(size=(10, 3)))
     section = rcs.ellipsoid(*axes, np.arccos(sight[:, 2]), np.arctan2(sight[:, 1], sight[:, 0]))
     for polarization in ("v", "h"):
-        _, amplitude, _ = solve(1e6 * sight, 1e6 * sight, axes, polarization=polarization, spreading=False)
+        _, amplitude, _ = solve(
+            1e6 * sight, 1e6 * sight, axes, polarization=polarization, spreading=False
+        )
         # 4.3 (R1 + R2) / R dB is left of the near field; R1 is at most 0.5^2 / 0.02 m.
         np.testing.assert_allclose(amplitude**2, section, rtol=1e-4)
 
@@ -125,7 +174,9 @@ def test_the_nearer_the_antenna_the_weaker_a_flat_side() -> None:
         _, amplitude, _ = solve(tx, tx, axes, spreading=False)
         radii = np.array([axes[0], axes[2] ** 2 / axes[0]])
         # Monostatic, along an axis: 1/R of the wavefront adds to both curvatures.
-        np.testing.assert_allclose(amplitude**2, np.pi / np.prod(1 / radii + 1 / distance), rtol=1e-12)
+        np.testing.assert_allclose(
+            amplitude**2, np.pi / np.prod(1 / radii + 1 / distance), rtol=1e-12
+        )
 
 
 def test_spreading_is_one_over_both_legs() -> None:
@@ -137,8 +188,13 @@ def test_spreading_is_one_over_both_legs() -> None:
     np.testing.assert_allclose(spread * legs, plain, rtol=1e-13)
 
 
-@given(seeds, st.sampled_from([(0.04, 0.1, 0.25), (0.07, 0.07, 0.21), (0.01, 0.3, 0.3), (0.02, 0.02, 0.4)]))
-def test_where_the_search_begins_does_not_matter(seed: int, lengths: tuple[float, float, float]) -> None:
+@given(
+    seeds,
+    st.sampled_from([(0.04, 0.1, 0.25), (0.07, 0.07, 0.21), (0.01, 0.3, 0.3), (0.02, 0.02, 0.4)]),
+)
+def test_where_the_search_begins_does_not_matter(
+    seed: int, lengths: tuple[float, float, float]
+) -> None:
     # A long or flat body has a shortest way over its dark side too, where the antenna is nearer than its curvature.
     rng = np.random.default_rng(seed)
     tx, rx = somewhere(rng, 20)
@@ -155,17 +211,25 @@ def test_a_capture_is_its_chirps_one_by_one() -> None:
     tx, rx = somewhere(rng, chirps)
     receivers = rx[:, None] + rng.normal(0, 0.05, (1, 8, 3))
     centres = rng.normal(0, 0.3, (chirps, parts, 3))
-    frames = Rotation.random(chirps * parts, random_state=0).as_matrix().reshape(chirps, parts, 3, 3)
+    frames = (
+        Rotation.random(chirps * parts, random_state=0).as_matrix().reshape(chirps, parts, 3, 3)
+    )
     axes = rng.uniform(0.03, 0.2, (parts, 3))
     whole = mirror(tx * 3, receivers * 3, centres, frames, axes, points=True)
     for i in (0, 77, 199):
-        alone = mirror(*(array[i : i + 1] for array in (tx * 3, receivers * 3, centres, frames)), axes, points=True)
+        alone = mirror(
+            *(array[i : i + 1] for array in (tx * 3, receivers * 3, centres, frames)),
+            axes,
+            points=True,
+        )
         for one, many in zip(alone, whole, strict=True):
             np.testing.assert_allclose(one[0], many[i], rtol=1e-13)
     assert mirror(tx, receivers, centres, frames, axes)[2].size == 0
 
 
-@pytest.mark.parametrize("axes", [(0.003, 0.003, 0.3), (0.003, 0.3, 0.3), (0.003, 0.1, 0.3), (0.5, 0.5, 0.5)])
+@pytest.mark.parametrize(
+    "axes", [(0.003, 0.003, 0.3), (0.003, 0.3, 0.3), (0.003, 0.1, 0.3), (0.5, 0.5, 0.5)]
+)
 @pytest.mark.parametrize("distance", [0.3, 5.0, 1000.0])
 def test_needles_and_discs_near_and_far(axes: tuple[float, float, float], distance: float) -> None:
     rng = np.random.default_rng(1)
@@ -183,10 +247,14 @@ def test_needles_and_discs_near_and_far(axes: tuple[float, float, float], distan
 
 
 @given(seeds, st.sampled_from([(0.1, 0.1, 0.1), (0.07, 0.07, 0.21), (0.02, 0.3, 0.4)]))
-def test_there_is_no_mirror_where_the_body_stands_between_the_antennas(seed: int, axes: tuple[float, float, float]) -> None:
+def test_there_is_no_mirror_where_the_body_stands_between_the_antennas(
+    seed: int, axes: tuple[float, float, float]
+) -> None:
     rng = np.random.default_rng(seed)
     tx, through = unit(rng.normal(size=(20, 3))) * 3, rng.uniform(-0.5, 0.5, (20, 3)) * axes
-    _, amplitude, _ = solve(tx, through + (through - tx) * rng.uniform(0.5, 2, (20, 1)), np.array(axes))
+    _, amplitude, _ = solve(
+        tx, through + (through - tx) * rng.uniform(0.5, 2, (20, 1)), np.array(axes)
+    )
     assert (amplitude == 0).all()
 
 

@@ -35,13 +35,22 @@ class Curtain:
     def at(self, times: Array) -> Poses:
         y = self.speed * (np.asarray(times) - 0.1)
         zero = np.zeros_like(y)
-        centres = np.stack([np.stack([zero, zero, zero], -1), np.stack([zero - 1.0, y, zero], -1)], axis=1)
+        centres = np.stack(
+            [np.stack([zero, zero, zero], -1), np.stack([zero - 1.0, y, zero], -1)], axis=1
+        )
         return Poses(centres, np.broadcast_to(np.eye(3), (len(y), 2, 3, 3)), self.semi_axes)
 
 
 def small_radar(**fields: object) -> Radar:
     """Two Tx and two Rx in a line along y, 1 ms a chirp."""
-    given = {"tx_y": 2, "tx_z": 0, "rx_y": 2, "rx_z": 0, "chirp_duration_s": 1e-3, "position_m": (-4.0, 0.0, 0.0)}
+    given = {
+        "tx_y": 2,
+        "tx_z": 0,
+        "rx_y": 2,
+        "rx_z": 0,
+        "chirp_duration_s": 1e-3,
+        "position_m": (-4.0, 0.0, 0.0),
+    }
     return Radar(**(given | fields))  # type: ignore[arg-type]
 
 
@@ -111,12 +120,17 @@ def test_the_fade_meets_the_instant_of_the_edge(backend: Backend) -> None:
 def test_any_block_of_chirps_gets_the_same_weights(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(3.0)
     whole = weights(backend, radar, body, np.arange(150, 260))
-    pieces = [weights(backend, radar, body, block) for block in (np.arange(150, 163), np.arange(163, 164), np.arange(164, 260))]
+    pieces = [
+        weights(backend, radar, body, block)
+        for block in (np.arange(150, 163), np.arange(163, 164), np.arange(164, 260))
+    ]
     np.testing.assert_array_equal(np.concatenate(pieces), whole)
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
-def test_the_model_has_nothing_from_a_hidden_part_and_all_from_a_free_one(backend: Backend, polarization: str) -> None:
+def test_the_model_has_nothing_from_a_hidden_part_and_all_from_a_free_one(
+    backend: Backend, polarization: str
+) -> None:
     radar = small_radar(polarization=polarization)
     chirps = np.arange(0, 20)
     hidden = build_model("specular", radar, Curtain(0.0), variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
@@ -133,10 +147,14 @@ def test_past_the_end_the_last_pose_stays(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(3.0, duration_s=0.1)
     model = build_model("specular", radar, body, variant=backend.kind)  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(90, 130))
-    np.testing.assert_array_equal(echoes.length[12::2], np.broadcast_to(echoes.length[12], (14, 2, 2)))
+    np.testing.assert_array_equal(
+        echoes.length[12::2], np.broadcast_to(echoes.length[12], (14, 2, 2))
+    )
 
 
-def test_anchors_are_the_same_where_only_a_few_are_remembered(backend: Backend, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_anchors_are_the_same_where_only_a_few_are_remembered(
+    backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
     radar, body = small_radar(), Curtain(3.0)
     whole = weights(backend, radar, body, np.arange(150, 260))
     monkeypatch.setattr(occlusion, "_KEPT_ANCHORS", 4)
@@ -176,7 +194,9 @@ def test_starts_are_specular_points_of_the_anchor_before_and_lead_to_the_same_po
     found = starts.at(chirps)
     at = chirp_poses(radar, body, np.array([100, 100, 100, 110, 130]))  # type: ignore[arg-type]
     points = mirror(*at[1:], points=True)[2][:, 0]
-    np.testing.assert_allclose(found, points - at.centres, atol=1e-9)  # its axes are the world's; 1e-7 of the semi-axis squared
+    np.testing.assert_allclose(
+        found, points - at.centres, atol=1e-9
+    )  # its axes are the world's; 1e-7 of the semi-axis squared
     np.testing.assert_array_equal(starts.at(chirps, np.array([1])), found[:, [1]])
     here = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     cold, warm = mirror(*here[1:]), mirror(*here[1:], start=found)
