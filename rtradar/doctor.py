@@ -15,7 +15,6 @@ from typing import Any
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
-from rtradar.system.gpu import gpu_for_ffts
 from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.backends.llvm import candidates
 from rtradar.trace.backends.verdict import judge
@@ -56,8 +55,6 @@ class DoctorReport:
         Each libLLVM in the order of trial: path, origin, version, finding, chosen.
     backends : dict
         ``good``, or what is wrong, for llvm, scalar and cuda.
-    gpu_ffts : str
-        The GPU that FFTs may be done on, or why there is none.
     compiled_code : str
         Where code that is compiled was kept and loaded again, or why not.
     chosen : str or None
@@ -74,7 +71,6 @@ class DoctorReport:
     packages: dict[str, str | None]
     llvm: list[Row]
     backends: dict[Kind, str]
-    gpu_ffts: str
     compiled_code: str
     chosen: str | None
     advice: list[str]
@@ -148,7 +144,6 @@ def examine() -> DoctorReport:
             for library, verdict in zip(libraries, verdicts, strict=True)
         ],
         backends=backends,
-        gpu_ffts=gpu_for_ffts()[1],
         compiled_code=compiled_code,
         chosen=chosen,
         advice=advice,
@@ -179,7 +174,6 @@ def report_text(found: DoctorReport) -> str:
             f"  {'->' if VARIANTS[kind] == found.chosen else '  '} {kind:<8} {finding}"
             for kind, finding in found.backends.items()
         ),
-        f"GPU FFTs  {found.gpu_ffts}",
         f"Compiled  {found.compiled_code}",
         *(f"To do     {line}" for line in found.advice),
         f"Verdict   ready, on {found.chosen}"

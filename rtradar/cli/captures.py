@@ -155,7 +155,7 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
         "--variant",
         choices=("auto", "cpu", "llvm", "scalar", "cuda"),
         default="auto",
-        help="where to compute, and Mitsuba's backend; cpu: llvm or else scalar, auto: a GPU where it is faster (default: auto)",
+        help="Mitsuba's backend for tracing rays; auto and cpu: llvm, or scalar where that does not work (default: auto)",
     )
     run.add_argument(
         "--no-spreading",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -17,7 +16,7 @@ from rtradar.echoes import Echoes
 from rtradar.pipeline.rooms.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import FftDevices, range_spectrum, with_cpu_fallback
+from rtradar.process import range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -54,8 +53,6 @@ class Capture:
         Whole cycles of the capture.
     windows : (window,) int64
         First cycle of each processing window.
-    fft_devices : FftDevices
-        Where FFTs are done.
     title : str
         For pictures and progress.
     stages : Stages
@@ -73,7 +70,6 @@ class Capture:
     noise: Noise
     n_chirps: int
     windows: NDArray[np.int64]
-    fft_devices: FftDevices
     title: str
     stages: Stages
     warmup_s: float
@@ -120,10 +116,7 @@ class Capture:
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
                 apart = separate(received, radar, first)
-                return with_cpu_fallback(
-                    partial(range_spectrum, apart, radar, out=transformed[:n]),
-                    self.fft_devices.range,
-                )
+                return range_spectrum(apart, radar, out=transformed[:n])
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

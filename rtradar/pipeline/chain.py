@@ -111,8 +111,8 @@ def run(
     seed : int
         Of noise and of the cloud's sampling.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend, for models that trace; ``cpu`` is llvm, or scalar where that does not work. ``auto`` takes a GPU, for
-        rays and for FFTs, where it was just measured to be faster, ``cuda`` takes it for rays in any case.
+        Mitsuba's backend, for models that trace rays. ``auto`` and ``cpu`` take llvm, or scalar where that does not
+        work; ``cuda`` traces the rays on a GPU.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2); off as in the paper.
     save_if : bool
@@ -197,7 +197,6 @@ def run(
             title=title,
             removal=removal,
             received=received,
-            doppler_device=capture.fft_devices.doppler,
         )
         try:
             kept = if_array(folder / "if.zarr", capture) if save_if else None

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -20,7 +19,6 @@ from rtradar.process import (
     cell_spectra,
     measures_angle,
     power_map,
-    with_cpu_fallback,
 )
 from rtradar.radar import Radar
 
@@ -70,8 +68,6 @@ class CloudMaker:
         Where the time goes.
     removal : ClutterRemoval
         Applied before Doppler.
-    doppler_device : str
-        Where power over Doppler is computed, as `power_map` names it.
 
     Attributes
     ----------
@@ -87,10 +83,8 @@ class CloudMaker:
         seed: int,
         stages: Stages,
         removal: ClutterRemoval,
-        doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._removal = radar, detect, stages, removal
-        self._doppler_device = doppler_device
         self._sliding = SlidingWindows(radar)
         self._rdt, self._spatial = (
             RdtCloud(radar, CLOUD_POINTS, seed),
@@ -117,7 +111,7 @@ class CloudMaker:
             with stages.time("clutter removal"):
                 cube = self._removal.window(window)
             with stages.time("doppler"):
-                power = with_cpu_fallback(partial(power_map, cube, radar), self._doppler_device)
+                power = power_map(cube, radar)
             with stages.time("cfar"):
                 mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])

@@ -18,17 +18,14 @@ from rtradar.pipeline.rooms.indoors import indoors
 from rtradar.pipeline.survey import survey
 from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
-from rtradar.process import FftDevices, fastest_fft_devices
 from rtradar.radar import Radar
-from rtradar.scatter import EchoModel, build_model, takes_backend
+from rtradar.scatter import EchoModel, build_model
 from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scatter.specular_point.solver import mirror
 from rtradar.scene import Scene
 from rtradar.signal import Noise
-from rtradar.system.gpu import has_nvidia_gpu
 from rtradar.system.seeds import check_seed
-from rtradar.trace.backends.backend import select
 
 _MAX_SNR_DB = 200.0  # more than the samples' float32 can hold beside the echo
 
@@ -66,8 +63,6 @@ def prepare(
             )
         radar.noise_power_w, radar.watts_per_m2  # says what is missing before the work  # noqa: B018
     walled = bool(scene.walls or scene.furniture)
-    if variant == "auto" and has_nvidia_gpu() and (walled or takes_backend(fidelity)):
-        select(variant)  # which times rays, and must not do so beside another process that compiles
     with processing_compiled_beside():
         with stages.time("motion"):
             radar = scene.place(radar)
@@ -121,9 +116,6 @@ def prepare(
         # Not every model has specular points; the report shows them of all.
         mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
     warm_up_processing(echoes, radar)
-    # Who names a backend of the CPU wants the work done there.
-    on_gpu = variant in ("auto", "cuda")
-    fft_devices = fastest_fft_devices(radar, n_chirps, len(windows)) if on_gpu else FftDevices()
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
@@ -163,7 +155,6 @@ def prepare(
         noise=noise,
         n_chirps=n_chirps,
         windows=windows,
-        fft_devices=fft_devices,
         title=f"{motion.name}, {radar.name}, {fidelity}" + (f", {scene.name}" if walled else ""),
         stages=stages,
         warmup_s=warmup_s,

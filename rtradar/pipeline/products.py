@@ -45,8 +45,6 @@ class Products:
         Applied to everything that is made of the spectra.
     received : ReceivedWindow, optional
         A window whose map is kept as it was before the removal.
-    doppler_device : str
-        Where power over Doppler is computed, as `power_map` names it.
 
     Attributes
     ----------
@@ -65,7 +63,6 @@ class Products:
         title: str,
         removal: ClutterRemoval,
         received: ReceivedWindow | None = None,
-        doppler_device: str = "cpu",
     ) -> None:
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
         self._clouds = CloudMaker(
@@ -74,7 +71,6 @@ class Products:
             seed=seed,
             stages=stages,
             removal=removal,
-            doppler_device=doppler_device,
         )
         self._spectrogram = SlidingSpectrogram(radar, removal=removal)
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)

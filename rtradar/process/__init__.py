@@ -14,7 +14,6 @@ from rtradar.process.detection.detectors import (
     build_detector,
     register_detector,
 )
-from rtradar.process.fft_devices import FftDevices, fastest_fft_devices, with_cpu_fallback
 from rtradar.process.frames import SlidingWindows
 from rtradar.process.power_maps import power_map, range_time
 from rtradar.process.sliding_range_time import SlidingRangeTime
@@ -30,7 +29,6 @@ __all__ = [
     "ClutterMap",
     "ClutterRemoval",
     "Detector",
-    "FftDevices",
     "RangeDoppler",
     "SlidingRangeTime",
     "SlidingSpectrogram",
@@ -45,7 +43,6 @@ __all__ = [
     "cell_spectra",
     "clutter_map_scale",
     "clutter_removal",
-    "fastest_fft_devices",
     "measured_angles",
     "measures_angle",
     "os_cfar",
@@ -59,5 +56,4 @@ __all__ = [
     "register_detector",
     "spectrogram",
     "window_cycles",
-    "with_cpu_fallback",
 ]

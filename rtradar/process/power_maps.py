@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
-from rtradar.process import torch_transforms
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
@@ -94,7 +93,6 @@ def power_map(
     *,
     channel: int | None = None,
     doppler_window: ArrayLike | None = None,
-    device: str = "cpu",
 ) -> NDArray[np.floating]:
     """Range-Doppler power of one window: the squared magnitudes of all channels summed, or of one channel.
 
@@ -108,15 +106,13 @@ def power_map(
         Only this channel, tx * n_rx + rx; all of them when left out.
     doppler_window : (cycle,) float, optional
         Instead of the periodic Hann window.
-    device : str
-        ``cpu`` for transforms of our own and SciPy's; any other is torch's, named as torch names it, and of float32.
 
     Returns
     -------
     (range, velocity) float32 or float64
-        Power, in the precision of ``spectra`` where the device is ``cpu``; velocity as in `RangeDoppler`. With complex Gaussian
-        noise a cell follows the Gamma law of as many looks as there are channels in the sum. Under DDM an echo's copies are
-        taken out, but of a single channel.
+        Power in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian noise a cell follows
+        the Gamma law of as many looks as there are channels in the sum. Under DDM the copies of an echo are removed,
+        except from a single channel.
 
     Raises
     ------
@@ -143,13 +139,7 @@ def power_map(
         if channel is None
         else range(channel, channel + 1)
     )
-    power: NDArray[np.floating]
-    if device == "cpu":
-        power = _doppler_power(channels, chosen, scale, radar.n_rx)
-    else:
-        power = torch_transforms.doppler_power(
-            channels[:, chosen.start : chosen.stop], scale.astype(np.float32), device
-        )
+    power = _doppler_power(channels, chosen, scale, radar.n_rx)
     if divided:
         power = without_copies(power, radar, radar.n_rx)
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)

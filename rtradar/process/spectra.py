@@ -18,7 +18,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
-from rtradar.process import torch_transforms
 from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
@@ -107,7 +106,6 @@ def range_spectrum(
     radar: Radar,
     *,
     window: ArrayLike | None = None,
-    device: str = "cpu",
     out: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.complex64]:
     """Range spectrum of each chirp, the part of the work that overlapping windows share.
@@ -120,8 +118,6 @@ def range_spectrum(
         Gives the shape.
     window : (sample,) float, optional
         Instead of the periodic Hann window.
-    device : str
-        ``cpu`` for SciPy's FFTs; any other is torch's, and named as torch names it.
     out : (chirp, rx, range) complex64, optional
         Array to fill, C-contiguous; otherwise a new one is made.
 
@@ -140,9 +136,6 @@ def range_spectrum(
     samples = _checked_if(x, radar)
     scale = weights(window, samples.shape[2], "window").astype(np.float32)
     spectra = array_to_fill("range_spectrum", out, samples.shape, np.complex64)
-    if device != "cpu":
-        spectra[...] = torch_transforms.range_spectra(samples, scale, device)
-        return spectra
 
     def transform(first: int) -> None:
         block = spectra[first : first + _CHIRPS_PER_BATCH]

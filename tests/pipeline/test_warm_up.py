@@ -8,12 +8,8 @@ from typing import Any
 
 import pytest
 
-import rtradar as rt
-from rtradar.motion import synthetic_motion
-from rtradar.pipeline import prepare as preparing
 from rtradar.pipeline import warm_up
 from rtradar.pipeline.warm_up import processing_compiled_beside
-from rtradar.radar import Radar
 from rtradar.system.threads import THREADS_VARIABLE
 
 FIRST_USE = """
@@ -126,34 +122,3 @@ def test_nothing_is_compiled_twice(
     with processing_compiled_beside():
         pass
     assert others == []
-
-
-@pytest.mark.parametrize(
-    ("fidelity", "variant", "order"),
-    [
-        ("specular", "auto", ["timed", "compiles"]),
-        ("specular", "cpu", ["compiles"]),
-        ("analytic", "auto", ["compiles"]),
-    ],
-)
-def test_backends_are_timed_before_another_process_compiles(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, fidelity: str, variant: str, order: list[str]
-) -> None:
-    found = []
-
-    def compiles() -> None:
-        found.append("compiles")
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(preparing, "has_nvidia_gpu", lambda: True)
-    monkeypatch.setattr(preparing, "select", lambda _: found.append("timed"))
-    monkeypatch.setattr(preparing, "processing_compiled_beside", compiles)
-    with pytest.raises(KeyboardInterrupt):
-        rt.run(
-            synthetic_motion("walk", duration_s=0.2),
-            Radar(),
-            out=tmp_path,
-            fidelity=fidelity,
-            variant=variant,
-        )
-    assert found == order

@@ -56,7 +56,6 @@ def summary_of(
         "versions": {"python": platform.python_version(), **_versions()},
         "fidelity": parameters["fidelity"],
         "variant": capture.model.variant,
-        "fft_devices": capture.fft_devices._asdict(),
         **spent,
         "windows": len(capture.windows),
         "chirps": capture.n_chirps,

@@ -10,16 +10,14 @@ import os
 import sys
 import warnings
 from dataclasses import dataclass
-from functools import lru_cache
 from importlib.util import find_spec
 from types import ModuleType
 from typing import Literal
 
 from rtradar.errors import BackendError, InputError
-from rtradar.system.gpu import has_nvidia_gpu
 from rtradar.trace.backends.jit_threads import begin_with_one
 from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
-from rtradar.trace.backends.verdict import Verdict, judge, query_s
+from rtradar.trace.backends.verdict import Verdict, judge
 
 Kind = Literal["llvm", "scalar", "cuda"]
 
@@ -65,8 +63,8 @@ def select(variant: str = "auto") -> Backend:
     Parameters
     ----------
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        ``cpu`` takes llvm with the first libLLVM that works, and else scalar; ``auto`` cuda, where there is a GPU that
-        was found to be faster, and else the same.
+        ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does. A GPU traces rays
+        only where ``cuda`` is named.
 
     Raises
     ------
@@ -101,8 +99,6 @@ def select(variant: str = "auto") -> Backend:
         return Backend("cuda", VARIANTS["cuda"], path, version)
     if variant == "scalar":
         return Backend("scalar", VARIANTS["scalar"], path, version)
-    if variant == "auto" and has_nvidia_gpu() and _gpu_is_faster(library):
-        return Backend("cuda", VARIANTS["cuda"], path, version)
     if library is not None:
         return Backend("llvm", VARIANTS["llvm"], path, version)
     if variant == "llvm":
@@ -181,17 +177,6 @@ def _first_good() -> tuple[Library | None, Verdict | None, str]:
         named = f", named by {ENVIRONMENT_VARIABLE}" if library.origin == "environment" else ""
         refused.append(f"{library.path}{named}, {verdict.finding}")
     return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {cure()}"
-
-
-@lru_cache(maxsize=1)
-def _gpu_is_faster(library: Library | None) -> bool:
-    """Whether the GPU works, and tells of rays sooner than what would trace them instead; asked once in a process."""
-    on_gpu_s = query_s(VARIANTS["cuda"], library)
-    if on_gpu_s is None:
-        return False
-    on_cpu_s = query_s(VARIANTS["llvm" if library else "scalar"], library)
-    # What was measured may be of long ago.
-    return (on_cpu_s is None or on_gpu_s < on_cpu_s) and judge(VARIANTS["cuda"], library).good
 
 
 def _loaded_before(loaded: str | None) -> str:

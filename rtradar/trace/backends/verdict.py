@@ -17,14 +17,10 @@ from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, temporary_folder
-from rtradar.system.gpu import gpu_name
 from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
 
 TIMEOUT_S = 120.0
 """A probe takes half a second; a cold disk, or a GPU that compiles its kernels for the first time, takes longer."""
-
-QUERY_TIMEOUT_S = 30.0
-"""Where it serves to choose the faster; who takes longer to begin is not chosen."""
 
 _PROBE = Path(__file__).with_name("probe.py")
 
@@ -45,13 +41,10 @@ class Verdict:
         ``good``, or in a few words what went wrong.
     version : str or None
         Of the libLLVM in use; None where there is none or it does not tell.
-    query_s : float or None
-        How long it takes to ask about some rays [s], the same for all variants; None where that was not asked.
     """
 
     finding: str
     version: str | None = None
-    query_s: float | None = None
 
     @property
     def good(self) -> bool:
@@ -92,39 +85,7 @@ def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verd
     return verdict
 
 
-def query_s(variant: str, library: Library | None) -> float | None:
-    """How long ``variant`` takes to tell of some rays, the same for all variants.
-
-    It is measured once and kept on the disk, until a package, the library, the GPU or its driver changes: so runs do not differ
-    in what they compute on.
-
-    Parameters
-    ----------
-    variant : str
-        Mitsuba's name of it.
-    library : Library or None
-        The libLLVM for Dr.Jit.
-
-    Returns
-    -------
-    float or None
-        [s]; None where it does not work, or takes too long to tell.
-    """
-    known = _key(variant, library)
-    key = f"{known}; {gpu_name()}; seconds of a query by one thread"
-    kept = _read_cache()
-    if known is not None and key in kept:
-        return kept[key]["query_s"]
-    try:
-        verdict, ended = _probe(variant, library, timed=True)
-    except subprocess.TimeoutExpired:
-        verdict, ended = Verdict("hangs"), 0
-    if known is not None and ended not in _STOPPED:
-        _write_cache({**_read_cache(), key: {"query_s": verdict.query_s}})
-    return verdict.query_s
-
-
-def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[Verdict, int]:
+def _probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
     """What it found, and the status with which it ended."""
     with temporary_folder() as kernels:
         # An empty kernel cache: the verdict must come from compiling, not from what another libLLVM compiled.
@@ -132,15 +93,14 @@ def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[
         if library is not None:
             environment[ENVIRONMENT_VARIABLE] = library.path
         # -P keeps the modules beside the script from shadowing others.
-        command = [sys.executable, "-P", str(_PROBE), variant, *(["--timed"] if timed else [])]
-        limit_s = QUERY_TIMEOUT_S if timed else TIMEOUT_S
+        command = [sys.executable, "-P", str(_PROBE), variant]
         done = subprocess.run(
             command,
             env=environment,
             capture_output=True,
             text=True,
             errors="replace",
-            timeout=limit_s,
+            timeout=TIMEOUT_S,
         )
     said: dict[str, Any] = {}
     for line in done.stdout.splitlines():
@@ -149,7 +109,7 @@ def _probe(variant: str, library: Library | None, timed: bool = False) -> tuple[
     told = said.get("llvm_version", [-1])
     version = ".".join(map(str, told)) if told[0] > 0 else (library.version if library else None)
     if done.returncode == 0 and said.get("works"):
-        return Verdict("good", version, said.get("query_s")), 0
+        return Verdict("good", version), 0
     return Verdict(_what_went_wrong(done, said), version), done.returncode
 
 
