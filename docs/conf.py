@@ -22,12 +22,10 @@ project, author, release = "rtradar", "rtradar developers", rtradar.__version__
 extensions = ["myst_parser", "sphinx.ext.autodoc", "numpydoc", "sphinx_gallery.gen_gallery"]
 exclude_patterns = ["gallery"]
 default_role = "py:obj"
-html_theme = "alabaster"
-html_theme_options = {
-    "description": rtradar.__doc__.splitlines()[0],
-    "page_width": "1100px",
-    "fixed_sidebar": True,
-}
+html_theme = "furo"
+html_title = f"rtradar {release}"
+html_static_path = ["static"]
+html_css_files = ["pages.css"]
 html_math_renderer = "mathml"
 html_show_sourcelink = False
 numpydoc_show_class_members = False

@@ -15,6 +15,9 @@ from typing import Any
 import pytest
 
 ROOT = Path(__file__).parents[1]
+LOADED = re.compile(
+    r'src="((?:https?:)?//[^"]*)|<link(?=[^>]*stylesheet)[^>]*href="((?:https?:)?//[^"]*)'
+)
 PAGES = runpy.run_path(str(ROOT / "docs" / "api_pages.py"))
 
 
@@ -121,9 +124,14 @@ def test_the_pages_can_be_built(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     page = (tmp_path / "pages" / "theory.html").read_text(encoding="utf-8")
     assert page.count("<math") > 100
-    sources = [
+    outside = [
         found
         for path in (tmp_path / "pages").rglob("*.html")
-        for found in re.findall(r'src="(https?:[^"]*)', path.read_text())
+        for found in LOADED.findall(path.read_text(encoding="utf-8"))
+    ] + [
+        found
+        for path in (tmp_path / "pages").rglob("*.css")
+        for found in re.findall(r"(?:@import|url\()\W*(?:https?:)?//[^)]*", path.read_text())
     ]
-    assert sources == []  # the pages open without the internet
+    assert outside == []  # the pages open without the internet
+    assert (tmp_path / "pages" / "searchindex.js").is_file()
