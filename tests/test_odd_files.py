@@ -219,8 +219,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     from rtradar.classify.plan import write_plan
     from rtradar.classify.recipes import RECIPES
     from rtradar.clouds import Sample
-    from rtradar.clouds.collection_index import write_index
-    from rtradar.clouds.sample import write_sample
+    from rtradar.clouds.dataset_store import write_index, write_sample
 
     root = tmp_path_factory.mktemp("folders")
     radar = rt.Radar(

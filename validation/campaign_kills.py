@@ -24,8 +24,7 @@ from pathlib import Path
 import psutil
 from rows import Row, judged, main, reported
 
-from rtradar.clouds.collection_index import INDEX
-from rtradar.clouds.sample import is_whole
+from rtradar.clouds.dataset_store import INDEX, is_whole
 
 RADAR = """
 tx_y = 2

@@ -24,8 +24,7 @@ from rtradar.classify.outcome import load_outcome
 from rtradar.classify.recipes import LEAN
 from rtradar.classify.study import load_network, load_study
 from rtradar.clouds import Collection
-from rtradar.clouds.collection_index import write_index
-from rtradar.clouds.sample import Sample, write_sample
+from rtradar.clouds.dataset_store import Sample, write_index, write_sample
 from rtradar.errors import InputError
 from rtradar.motion import Motion, load_motion
 from rtradar.radar import Radar

@@ -18,8 +18,7 @@ from rtradar.campaign.plan import counts, recipes
 from rtradar.campaign.sample import Recipe, make
 from rtradar.campaign.spec_file import read_spec
 from rtradar.campaign.work import Outcome, work
-from rtradar.clouds.collection_index import sweep, write_index
-from rtradar.clouds.sample import is_whole, sample_path
+from rtradar.clouds.dataset_store import is_whole, sample_path, sweep, write_index
 from rtradar.errors import InputError
 from rtradar.system.files import unfinished
 from rtradar.system.output_folder import alone_in

@@ -15,8 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.sample import Sample
-from rtradar.clouds.sample_file import FORMAT
+from rtradar.clouds.dataset_store import FORMAT, Sample
 from rtradar.errors import ValidityWarning
 from rtradar.motion import Motion, cut, synthetic_motion
 from rtradar.pipeline import clouds_of

@@ -12,7 +12,7 @@ from tqdm import tqdm
 
 from rtradar import __version__
 from rtradar.campaign.sample import Made, Recipe
-from rtradar.clouds.sample import write_sample
+from rtradar.clouds.dataset_store import write_sample
 from rtradar.errors import CampaignError, InputError
 
 if TYPE_CHECKING:

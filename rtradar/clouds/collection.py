@@ -1,9 +1,4 @@
-"""A collection: a folder of clouds with labels, a file a sample, each whole or not there, read when it is asked for.
-
-A sample's file is named by its id. It is a NumPy archive of ``points``, ``spatial`` and ``about`` (label and provenance, as
-JSON), not compressed and with fixed dates, so that the same sample is the same bytes everywhere; the last 64 bytes, which are
-the archive's comment, are the SHA-256 of all before. ``collection.json`` names the samples that belong.
-"""
+"""Collection: the labelled clouds of one or several data sets, each read when it is asked for."""
 
 from __future__ import annotations
 
@@ -13,24 +8,24 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.collection_index import read_index
-from rtradar.clouds.sample import Sample, sample_path
-from rtradar.clouds.sample_file import read_sample
+from rtradar.clouds.dataset_store import Sample, read_index, read_sample, sample_path
 from rtradar.errors import InputError
 
 
 class Collection:
-    """Clouds of a folder, or of several; each is read when it is asked for. They stand folder by folder, by their ids.
+    """Labelled clouds of one or several folders, ordered by folder and then by id.
+
+    A cloud is read from its file when it is asked for (`rtradar.clouds.dataset_store`).
 
     Parameters
     ----------
     *folders : path
-        As `rtradar dataset build` leaves them; at least one.
+        At least one folder made by ``rtradar dataset build``.
 
     Raises
     ------
     InputError
-        Where there is none, samples are missing or damaged, or one is in two folders.
+        If no folder is given, samples are missing or damaged, or a sample is in two folders.
     """
 
     def __init__(self, *folders: str | Path) -> None:
@@ -54,7 +49,8 @@ class Collection:
                 )
         if len(once := set(self._ids)) < len(self._ids):
             raise InputError(
-                f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; leave one out"
+                f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; "
+                "leave one out"
             )
         self._about = [read_sample(path, "about") for path in self._paths]
 
@@ -67,7 +63,7 @@ class Collection:
 
     @property
     def ids(self) -> tuple[str, ...]:
-        """What each sample is called."""
+        """Id of each sample."""
         return self._ids
 
     @property
@@ -76,21 +72,22 @@ class Collection:
         return np.array([about["label"] for about in self._about], dtype=np.str_)
 
     def column(self, name: str) -> NDArray[Any]:
-        """One entry of the provenance of each sample, (sample,); None where a sample has it not. No cloud is read.
+        """Return one entry of the provenance of each sample, without reading the clouds.
 
         Parameters
         ----------
         name : str
-            Such as ``subject`` or ``snr_db``.
+            Name of the entry, such as ``subject`` or ``snr_db``.
 
         Returns
         -------
         (sample,) ndarray
+            Values of the entry, None for a sample that lacks it.
 
         Raises
         ------
         InputError
-            Where no sample has such an entry.
+            If no sample has such an entry.
         """
         if not any(name in about["provenance"] for about in self._about):
             known = sorted({key for about in self._about for key in about["provenance"]})
@@ -100,48 +97,48 @@ class Collection:
         values = [about["provenance"].get(name) for about in self._about]
         if all(isinstance(value, int | float | str) for value in values):
             return np.array(values)
-        column = np.empty(
-            len(values), dtype=object
-        )  # else lists of one length would become an axis
+        # Assigned to an object array, because lists of equal length would become a second axis.
+        column = np.empty(len(values), dtype=object)
         column[:] = values
         return column
 
     def points(self, index: int) -> NDArray[np.float64]:
-        """The RDT cloud of a sample (n, 3): time [s], range [m], velocity [m/s].
+        """Read the RDT cloud of a sample.
 
         Parameters
         ----------
         index : int
-            Of the sample.
+            Number of the sample, from 0.
 
         Returns
         -------
         (n, 3) float64
+            Time [s], range [m] and velocity [m/s] of each point.
 
         Raises
         ------
         InputError
-            Where its file is damaged.
+            If its file is damaged.
         """
         return np.asarray(read_sample(self._paths[index], "points"))
 
     def spatial(self, index: int) -> NDArray[np.float64]:
-        """The spatial cloud of the same capture (m, 3): x, y, z [m], in the order of time; m may be 0.
-
-        NaN throughout in a coordinate that the radar has not measured, as of `SpatialCloud`.
+        """Read the spatial cloud of the same capture.
 
         Parameters
         ----------
         index : int
-            Of the sample.
+            Number of the sample, from 0.
 
         Returns
         -------
         (m, 3) float64
+            World coordinates x, y and z [m] in the order of time; m may be 0. A coordinate that the
+            radar does not measure is NaN in every point (`SpatialCloud`).
 
         Raises
         ------
         InputError
-            Where its file is damaged.
+            If its file is damaged.
         """
         return np.asarray(read_sample(self._paths[index], "spatial"))

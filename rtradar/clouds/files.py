@@ -1,4 +1,4 @@
-"""Point clouds to files that are whole or not there: written beside their place, then moved into it."""
+"""Writers of point cloud files. A file is written beside its place and then renamed."""
 
 from __future__ import annotations
 
@@ -11,26 +11,28 @@ from rtradar.errors import InputError
 from rtradar.system.files import atomic_file
 
 RDT_AXES = ("time", "range", "velocity")
-"""Names of the coordinates of an RDT cloud."""
+"""Coordinate names of an RDT cloud."""
 
 RDT_UNITS = ("s", "m", "m/s")
-"""Their units."""
+"""Units of `RDT_AXES`."""
 
 
 def save_cloud_npz(path: str | os.PathLike[str], points: ArrayLike) -> None:
-    """Write an RDT cloud as a NumPy archive with ``points (n, 3) float64``, ``axes (3,)`` and ``units (3,)``.
+    """Write an RDT cloud as a NumPy archive.
+
+    The archive holds ``points (n, 3) float64``, ``axes (3,)`` and ``units (3,)``.
 
     Parameters
     ----------
     path : path
-        Replaced if it is there.
+        Output file, which is replaced if it exists.
     points : (n, 3) float
-        May be empty.
+        Time [s], range [m] and velocity [m/s] of each point; n may be 0.
 
     Raises
     ------
     InputError
-        Where the shape does not fit or the file cannot be written.
+        If the shape is wrong, a coordinate is not finite, or the file cannot be written.
     """
     places = _checked(points)
     with atomic_file(path) as file:
@@ -38,17 +40,21 @@ def save_cloud_npz(path: str | os.PathLike[str], points: ArrayLike) -> None:
 
 
 def save_ply(path: str | os.PathLike[str], points: ArrayLike) -> None:
-    """Write an RDT cloud as a binary little-endian PLY; a comment line says what x, y and z are.
+    """Write an RDT cloud as a binary little-endian PLY file with coordinates of type double.
+
+    A comment line of the header states what x, y and z are.
 
     Parameters
     ----------
-    path, points
-        As in `save_cloud_npz`; coordinates are written as double.
+    path : path
+        Output file, which is replaced if it exists.
+    points : (n, 3) float
+        Time [s], range [m] and velocity [m/s] of each point; n may be 0.
 
     Raises
     ------
     InputError
-        As in `save_cloud_npz`.
+        If the shape is wrong, a coordinate is not finite, or the file cannot be written.
     """
     places = _checked(points)
     meaning = ", ".join(
@@ -56,7 +62,8 @@ def save_ply(path: str | os.PathLike[str], points: ArrayLike) -> None:
         for letter, axis, unit in zip("xyz", RDT_AXES, RDT_UNITS, strict=True)
     )
     header = (
-        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {meaning}\nelement vertex {len(places)}\n"
+        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {meaning}\n"
+        f"element vertex {len(places)}\n"
         "property double x\nproperty double y\nproperty double z\nend_header\n"
     )
     with atomic_file(path) as file:

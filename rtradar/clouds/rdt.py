@@ -1,12 +1,14 @@
-"""Range-Doppler-time (RDT) volume to point cloud: isosurface, triangle centres, a random sample of them.
+"""RDT point clouds: random triangle centres of the isosurface of a range-Doppler-time volume.
 
-The detections of the successive windows stacked are a volume of zeros and ones; its surface at level 0.5 is triangulated by
-marching cubes and the cloud is drawn from the centres of the triangles (paper, section 3.2 II). One layer of empty cells
-is put round the volume, one hop before and after it in time and one bin in range and velocity, so the surface is closed
-where detections reach the edge.
+The detections of successive frames form a volume of zeros and ones. Its isosurface at level 0.5 is
+triangulated by marching cubes, and the cloud is a random sample of the centres of the triangles
+(paper, section 3.2 II). The volume is padded with one layer of empty cells, one hop before and
+after it in time and one bin in range and velocity, so that the surface is closed where detections
+reach the edge.
 
-A cube of the marching knows two neighbouring slices alone, so the surface is made slab by slab as the slices come, and the
-triangles are those of the whole volume, in the same order. Memory does not grow with the recording.
+Marching cubes needs two neighbouring slices at a time, so the surface is made slab by slab as the
+slices arrive. The triangles are those of the whole volume, in the same order, and the memory does
+not grow with the length of the recording.
 """
 
 from __future__ import annotations
@@ -17,24 +19,93 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.measure import marching_cubes
 
-from rtradar.clouds.sampling import UniformSample
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.system.seeds import check_seed, stream
+
+_WITH_REPLACEMENT = 1  # selects a random stream apart from that of the keys
+
+
+class UniformSample:
+    """Reservoir sample: a uniform random subset of the rows of a stream too long to keep.
+
+    Each row gets a random key, and the rows with the smallest keys are kept, so that every subset
+    is equally likely. All memory is allocated at the start.
+
+    Parameters
+    ----------
+    n_rows : int
+        Number of rows to keep, at least 1.
+    seed : int
+        Seed of the random keys. The same stream and seed give the same sample, however the stream
+        is divided into calls of `add`.
+    columns : int
+        Number of columns of a row.
+
+    Attributes
+    ----------
+    n_seen : int
+        Number of rows added so far.
+
+    Raises
+    ------
+    InputError
+        If ``n_rows`` or ``seed`` is out of its range.
+    """
+
+    def __init__(self, n_rows: int, seed: int, columns: int = 3) -> None:
+        if isinstance(n_rows, bool) or not isinstance(n_rows, int | np.integer) or n_rows < 1:
+            raise InputError(f"cloud: n_points = {n_rows!r}; it must be a whole number, at least 1")
+        self._n_rows = int(n_rows)
+        self._seed = check_seed("cloud: ", seed)
+        self._random = np.random.default_rng(stream(self._seed))
+        self._keys = np.full(self._n_rows, np.inf)  # infinite where no row is kept yet
+        self._rows = np.full((self._n_rows, columns), np.nan)
+        self.n_seen = 0
+
+    def add(self, rows: NDArray[np.float64]) -> None:
+        """Add the next rows of the stream.
+
+        Parameters
+        ----------
+        rows : (row, column) float64
+            Rows in the order of the stream.
+        """
+        keys = np.concatenate([self._keys, self._random.random(len(rows))])
+        least = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
+        is_new = least >= self._n_rows
+        free = np.ones(self._n_rows, dtype=bool)
+        free[least[~is_new]] = False
+        self._keys[free] = keys[least[is_new]]
+        self._rows[free] = rows[least[is_new] - self._n_rows]
+        self.n_seen += len(rows)
+
+    def rows(self) -> NDArray[np.float64]:
+        """Return the rows kept, at most ``n_rows``, in random order: any first k are a sample."""
+        return np.asarray(self._rows[np.argsort(self._keys)[: self.n_seen]])
+
+    def filled(self) -> NDArray[np.float64]:
+        """Return exactly ``n_rows`` rows, drawn with replacement if too few were added."""
+        rows = self.rows()
+        if not 0 < len(rows) < self._n_rows:
+            return rows
+        random = np.random.default_rng(stream(self._seed, _WITH_REPLACEMENT))
+        return rows[random.integers(len(rows), size=self._n_rows)]
 
 
 @dataclass(frozen=True)
 class RdtCloudResult:
-    """The cloud of one recording.
+    """RDT cloud of one recording.
 
     Parameters
     ----------
     points : (n, 3) float64
-        Time [s], range [m], velocity [m/s]; in random order, so that any first part is a sample too. Empty where there are
-        no triangles.
+        Time [s], range [m] and velocity [m/s] of each point, in random order, so that the first k
+        points are a random sample too. The array is empty if there are no triangles.
     n_triangles : int
-        Triangles that the points were drawn from.
+        Number of triangles from which the points were drawn.
     n_voxels : int
-        Detections in the volume.
+        Number of detections in the volume.
     """
 
     points: NDArray[np.float64]
@@ -43,25 +114,24 @@ class RdtCloudResult:
 
 
 class RdtCloud:
-    """Builds the cloud from the detections of one window after the other.
+    """Builder of an RDT cloud from the detections of one frame after another.
 
-    Points are drawn without replacement where there are enough triangles, else with. Every triangle gets a random key and
-    those with the least keys stay, so each subset is equally likely however many are still to come. The same
-    slices and seed give the same cloud.
+    Points are drawn without replacement if there are enough triangles, otherwise with it
+    (`UniformSample`). The same slices and seed give the same cloud.
 
     Parameters
     ----------
     radar : Radar
-        Gives the axes.
+        Radar that defines the range and velocity axes and the hop.
     n_points : int
-        Points in the cloud.
+        Number of points in the cloud.
     seed : int
-        Of the sampling.
+        Seed of the random sample.
 
     Raises
     ------
     InputError
-        Where ``n_points`` or ``seed`` is out of its range.
+        If ``n_points`` or ``seed`` is out of its range.
     """
 
     def __init__(self, radar: Radar, n_points: int = 3000, seed: int = 0) -> None:
@@ -72,26 +142,26 @@ class RdtCloud:
         self._n_voxels = 0
 
     def push(self, mask: ArrayLike, time_s: float) -> None:
-        """Add the detections of the next window.
+        """Add the detections of the next frame.
 
         Parameters
         ----------
         mask : (range, velocity) bool
             True where a cell is detected.
         time_s : float
-            Centre of the window [s], later than that of the last.
+            Centre of the frame [s], later than that of the last.
 
         Raises
         ------
         InputError
-            Where the mask is no two-dimensional array of booleans or not of the shape of the last, or time does not advance.
+            If the mask is not a two-dimensional Boolean array of the shape of the last one, or if
+            time does not advance.
         """
-        cells = np.array(
-            mask
-        )  # a copy: the slab to come needs it after the caller may have reused the array
+        cells = np.array(mask)  # a copy, as the caller may reuse the array before the next slab
         if cells.ndim != 2 or cells.dtype != np.bool_ or 0 in cells.shape:
             raise InputError(
-                f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; it must be (range, velocity) bool"
+                f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; "
+                "it must be (range, velocity) bool"
             )
         if not np.isfinite(time_s):
             raise InputError(f"RDT cloud: time_s = {time_s!r}; it must be finite")
@@ -103,7 +173,8 @@ class RdtCloud:
             )
         elif time_s <= self._last_time:
             raise InputError(
-                f"RDT cloud: time_s = {time_s}; it must be later than that of the last mask, {self._last_time}"
+                f"RDT cloud: time_s = {time_s}; "
+                f"it must be later than that of the last mask, {self._last_time}"
             )
         else:
             self._slab(self._last, cells, self._last_time, time_s)
@@ -111,23 +182,18 @@ class RdtCloud:
         self._n_voxels += int(np.count_nonzero(cells))
 
     def finish(self) -> RdtCloudResult:
-        """Close the surface behind the last window and give the cloud."""
+        """Close the surface after the last frame and return the cloud."""
         if self._last is not None:
-            self._slab(
-                self._last,
-                np.zeros_like(self._last),
-                self._last_time,
-                self._last_time + self._radar.frame_hop_s,
-            )
+            end_s = self._last_time + self._radar.frame_hop_s
+            self._slab(self._last, np.zeros_like(self._last), self._last_time, end_s)
             self._last = None
         return RdtCloudResult(self._sample.filled(), self._sample.n_seen, self._n_voxels)
 
     def _slab(
         self, first: NDArray[np.bool_], second: NDArray[np.bool_], start_s: float, end_s: float
     ) -> None:
-        vertices, faces = _surface(
-            np.stack([first, second]), np.array([start_s, end_s]), self._radar
-        )
+        times = np.array([start_s, end_s])
+        vertices, faces = _surface(np.stack([first, second]), times, self._radar)
         if len(faces):
             self._sample.add(_centres(vertices, faces))
 
@@ -135,33 +201,34 @@ class RdtCloud:
 def rdt_isosurface(
     volume: ArrayLike, times: ArrayLike, radar: Radar
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Closed surface of a whole volume of detections.
+    """Return the closed isosurface of a whole volume of detections.
 
     Parameters
     ----------
     volume : (time, range, velocity) bool
-        Detections of the successive windows.
+        Detections of successive frames.
     times : (time,) float
-        Centres of the windows [s], ascending.
+        Centres of the frames [s], ascending.
     radar : Radar
-        Gives the range and velocity axes and the hop.
+        Radar that defines the range and velocity axes and the hop.
 
     Returns
     -------
     vertices : (vertex, 3) float64
         Time [s], range [m], velocity [m/s].
     faces : (triangle, 3) int64
-        Indices into ``vertices``. No detections: both are empty.
+        Indices into ``vertices``. Both arrays are empty if there are no detections.
 
     Raises
     ------
     InputError
-        Where the volume is no three-dimensional array of booleans or the times do not fit it.
+        If the volume is not a three-dimensional Boolean array or the times do not fit it.
     """
     cells, centres = np.asarray(volume), np.asarray(times, dtype=np.float64)
     if cells.ndim != 3 or cells.dtype != np.bool_ or 0 in cells.shape:
         raise InputError(
-            f"RDT volume has shape {cells.shape}, type {cells.dtype}; it must be (time, range, velocity) bool"
+            f"RDT volume has shape {cells.shape}, type {cells.dtype}; "
+            "it must be (time, range, velocity) bool"
         )
     if (
         centres.shape != cells.shape[:1]
@@ -169,7 +236,8 @@ def rdt_isosurface(
         or (np.diff(centres) <= 0).any()
     ):
         raise InputError(
-            f"RDT volume of {cells.shape[0]} windows: times must be as many finite, ascending numbers"
+            f"RDT volume of {cells.shape[0]} windows: "
+            "times must be as many finite, ascending numbers"
         )
     empty = np.zeros_like(cells[:1])
     hop = radar.frame_hop_s
@@ -183,28 +251,28 @@ def rdt_isosurface(
 def sample_centres(
     vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, seed: int = 0
 ) -> NDArray[np.float64]:
-    """A uniform random sample of the centres of triangles; the same as `RdtCloud` draws of the same triangles.
+    """Draw a uniform random sample of triangle centres, as `RdtCloud` does.
 
     Parameters
     ----------
     vertices : (vertex, 3) float
-        Places of the corners.
+        Positions of the corners.
     faces : (triangle, 3) int
         Indices into ``vertices``.
     n_points : int
-        Points wanted; drawn with replacement where there are fewer triangles.
+        Number of points, drawn with replacement if there are fewer triangles.
     seed : int
-        Of the sampling.
+        Seed of the random sample.
 
     Returns
     -------
     (point, 3) float64
-        ``n_points`` centres, or none where there are no triangles.
+        ``n_points`` centres, or none if there are no triangles.
 
     Raises
     ------
     InputError
-        Where ``n_points`` or ``seed`` is out of its range.
+        If ``n_points`` or ``seed`` is out of its range.
     """
     sample = UniformSample(n_points, seed)
     sample.add(
@@ -223,12 +291,12 @@ def _centres(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray
 def _surface(
     cells: NDArray[np.bool_], times: NDArray[np.float64], radar: Radar
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Isosurface of slices at these times, closed in range and velocity but not in time, in physical coordinates."""
+    """Isosurface of slices, closed in range and velocity but not in time, in physical units."""
     occupied: NDArray[np.bool_] = np.any(cells, axis=0)
     rows, columns = np.flatnonzero(occupied.any(axis=1)), np.flatnonzero(occupied.any(axis=0))
     if rows.size == 0:
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
-    # Only the cubes that touch a detection have triangles: march over their bounding box, one empty cell round it.
+    # Only cubes that touch a detection have triangles: march over the padded box of detections.
     box = cells[:, rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1]
     padded = np.pad(box, ((0, 0), (1, 1), (1, 1))).astype(np.float32)
     indices, faces, _, _ = marching_cubes(padded, 0.5)

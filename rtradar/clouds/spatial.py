@@ -1,4 +1,4 @@
-"""Spatial point cloud: detected cells placed in the room by their range and angles (paper, eq. 19)."""
+"""Spatial point clouds: detected cells placed in space by range and angles (paper, eq. 19)."""
 
 from __future__ import annotations
 
@@ -15,38 +15,40 @@ from rtradar.radar import Radar
 from rtradar.system.files import atomic_file
 
 SPATIAL_AXES = ("x", "y", "z")
-"""Names of the coordinates of a spatial cloud, world axes."""
+"""Coordinate names of a spatial cloud, along the world axes."""
 
 SPATIAL_UNITS = ("m", "m", "m")
-"""Their units."""
+"""Units of `SPATIAL_AXES`."""
 
 SHOWN_DB = 40.0
-"""Farther below the strongest point lie most of those that are of no body."""
+"""Dynamic range of pictures [dB]. Most points that no body causes are weaker than that."""
 
 
 @dataclass(frozen=True)
 class SpatialCloud:
-    """Points in the room, each with what the radar knows of it.
+    """Points in world coordinates with velocity, power and time.
 
     Parameters
     ----------
     points : (n, 3) float64
-        World axes [m]. An array on one line does not measure the coordinate across it, which is NaN in every point: z of a
-        line along y, y of a line along z. Its x then holds the distance from the line of the array, added to the radar's x:
-        all that is known of an echo is its range and the cone about that line on which it lies. For a line along y that is
-        the true x only at the height of the radar (sqrt(x^2 + z^2) elsewhere, x and z from the radar), for a line along z the
-        horizontal distance.
+        World coordinates x, y and z [m]. A linear array does not measure the coordinate across it,
+        which is NaN in every point: z for an array along y, y for an array along z. Such an array
+        knows only the range of an echo and the cone about its line on which the echo lies, so that
+        x holds the distance from that line, added to the radar's x. For an array along y that is
+        sqrt(x^2 + z^2), with x and z from the radar, hence the true x only at the radar's height;
+        for an array along z it is the horizontal distance.
     velocity : (n,) float64
         Range rate [m/s], positive receding.
     power : (n,) float64
-        Power of one channel, in the unit of the IF squared: an echo of amplitude 1 reads 1.
+        Power of one channel in squared units of the IF signal; an echo of amplitude 1 has power 1.
     time : (n,) float64
-        Centre of the window [s].
+        Centre of the frame [s].
 
     Raises
     ------
     InputError
-        Where the shapes do not fit each other or a value is not finite, but for a y or a z that is NaN throughout.
+        If the shapes do not fit each other or a value is not finite, except for y or z that is NaN
+        in all points.
     """
 
     points: NDArray[np.float64]
@@ -58,24 +60,25 @@ class SpatialCloud:
         for field in ("points", "velocity", "power", "time"):
             values = np.asarray(getattr(self, field), dtype=np.float64)
             object.__setattr__(self, field, values)
-            if values.shape != (
-                (len(self.points), 3) if field == "points" else (len(self.points),)
-            ):
+            count = len(self.points)
+            if values.shape != ((count, 3) if field == "points" else (count,)):
                 raise InputError(
-                    f"spatial cloud: {field} has shape {values.shape}; give points (n, 3) and all else (n,)"
+                    f"spatial cloud: {field} has shape {values.shape}; "
+                    "give points (n, 3) and all else (n,)"
                 )
             if not (measured_alone(values) if field == "points" else np.isfinite(values).all()):
                 raise InputError(
-                    f"spatial cloud: {field} holds NaN or infinity; every value must be finite, but for y or z not measured"
+                    f"spatial cloud: {field} holds NaN or infinity; "
+                    "every value must be finite, but for y or z not measured"
                 )
 
     @property
     def measured(self) -> NDArray[np.bool_]:
-        """Which of x, y and z (3,) the radar has measured; all of them where there is no point."""
+        """Whether the radar measured x, y and z, (3,) bool; all True if there is no point."""
         return np.asarray(~np.isnan(self.points).any(axis=0))
 
     def strongest(self) -> SpatialCloud:
-        """Points at most `SHOWN_DB` below the strongest, which pictures show."""
+        """Return the points at most `SHOWN_DB` below the strongest one, for pictures."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
         return SpatialCloud(
             self.points[kept], self.velocity[kept], self.power[kept], self.time[kept]
@@ -83,7 +86,7 @@ class SpatialCloud:
 
 
 def measured_alone(points: NDArray[np.float64]) -> bool:
-    """Whether ``points (n, 3)`` are finite but for one coordinate, y or z, that is NaN in all of them: not measured."""
+    """Return whether ``points (n, 3)`` are finite, or NaN throughout only in y or only in z."""
     finite = np.isfinite(points)
     if finite.all():
         return True
@@ -92,26 +95,27 @@ def measured_alone(points: NDArray[np.float64]) -> bool:
 
 
 def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> SpatialCloud:
-    """Points of one window: for each cell the peaks of both lines, put together.
+    """Make the points of one frame from the angle peaks of each detected cell.
 
-    The lines know nothing of each other: which peak of the one belongs to which of the other is not measured. They are paired by
-    the rank of their power, and where one line has fewer peaks its strongest stands in. Two echoes of equal power in a cell
-    may so exchange their elevations. A pair that is no direction at all (u^2 + w^2 > 1) is left out. A radar with one line
-    alone measures the cone about that line on which an echo lies: the coordinate across is NaN (see `SpatialCloud`).
+    Azimuth and elevation are measured by two separate linear arrays, so that it is unknown which
+    peak of one belongs to which peak of the other. Peaks are paired by the rank of their power, and
+    if one array has fewer peaks, its strongest is used again. Two echoes of equal power in a cell
+    may therefore exchange their elevations. Pairs with u^2 + w^2 > 1 are no direction and dropped.
+    For a radar with one linear array the coordinate across is NaN (see `SpatialCloud`).
 
     Parameters
     ----------
     spectra : AngleSpectra
-        Of the detected cells.
+        Angle spectra of the detected cells.
     radar : Radar
-        Its axes are parallel to the world's.
+        Radar whose axes are parallel to the world axes.
     time_s : float
-        Centre of the window [s].
+        Centre of the frame [s].
 
     Returns
     -------
     SpatialCloud
-        Cell by cell, the strongest pair first; the power of a point is the mean of its two peaks.
+        Points cell by cell, the strongest pair first. The power is the mean of the two peaks.
     """
     y, z = _peaks(spectra)
     forward = 1 - y.sine**2 - z.sine**2
@@ -131,21 +135,22 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
 
 
 def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
-    """Write a cloud as a NumPy archive: ``points (n, 3)``, ``velocity``, ``power``, ``time (n,)``, ``axes``, ``units (3,)``.
+    """Write a spatial cloud as a NumPy archive.
 
-    A coordinate that is not measured is NaN in every point.
+    The archive holds ``points (n, 3)``, ``velocity``, ``power`` and ``time (n,)``, ``axes`` and
+    ``units (3,)``. A coordinate that is not measured is NaN in every point.
 
     Parameters
     ----------
     path : path
-        Replaced if it is there, whole or not at all.
+        Output file, which is replaced if it exists.
     cloud : SpatialCloud
-        May be empty.
+        Cloud to write, which may be empty.
 
     Raises
     ------
     InputError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     with atomic_file(path) as file:
         np.savez_compressed(
@@ -160,7 +165,7 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
 
 
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:
-    """Peaks of both lines; a line that is not there has sine 0 and the power of the other."""
+    """Peaks of both arrays; an array that is absent has sine 0 and the power of the other."""
     y, z = (
         None if power is None else find_peaks(spectra.sines, power)
         for power in (spectra.y, spectra.z)

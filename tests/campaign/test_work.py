@@ -24,8 +24,7 @@ from rtradar.campaign.cluster import dask_client
 from rtradar.campaign.sample import Made, Recipe
 from rtradar.campaign.work import make_and_store, work
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.collection_index import sweep, write_index
-from rtradar.clouds.sample import sample_path
+from rtradar.clouds.dataset_store import sample_path, sweep, write_index
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.output_folder import alone_in
 

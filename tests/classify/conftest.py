@@ -78,8 +78,7 @@ def made_up() -> Callable[..., MadeUpClouds]:
 @pytest.fixture(scope="session")
 def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The made-up clouds in a folder, as a data set leaves them."""
-    from rtradar.clouds.collection_index import write_index
-    from rtradar.clouds.sample import Sample, write_sample
+    from rtradar.clouds.dataset_store import Sample, write_index, write_sample
 
     folder, clouds = tmp_path_factory.mktemp("clouds"), MadeUpClouds(views=2)
     names = [f"{index:03d}" for index in range(len(clouds))]

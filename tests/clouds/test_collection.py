@@ -1,4 +1,4 @@
-"""Collections: read as they were written, the same bytes for the same sample, and no damage goes unseen."""
+"""Collections are read as written, equal samples give equal bytes, and damage is noticed."""
 
 from __future__ import annotations
 
@@ -11,8 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from rtradar.clouds import Collection, Sample
-from rtradar.clouds.collection_index import INDEX, sweep, write_index
-from rtradar.clouds.sample import is_whole, sample_path, write_sample
+from rtradar.clouds.dataset_store import (
+    INDEX,
+    is_whole,
+    sample_path,
+    sweep,
+    write_index,
+    write_sample,
+)
 from rtradar.errors import InputError
 
 SPATIAL = np.arange(12.0).reshape(4, 3)

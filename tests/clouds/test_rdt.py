@@ -1,4 +1,4 @@
-"""RDT clouds: the streamed surface is the surface of the whole volume, closed and in the right place; fair sampling."""
+"""The streamed RDT surface equals that of the whole volume; the cloud is a fair sample of it."""
 
 import numpy as np
 import pytest
@@ -111,7 +111,7 @@ def test_too_few_triangles_are_drawn_with_replacement() -> None:
 
 
 def test_sampling_is_uniform() -> None:
-    # 200 triangles along a line, 60 kept, drawn by 400 seeds: each is expected 120 times, early or late alike.
+    # 200 triangles, 60 kept, 400 seeds: each triangle is expected 120 times, early or late.
     vertices = np.repeat(np.arange(200.0), 3)[:, None] * np.ones(3)
     faces = np.arange(600).reshape(-1, 3)
     draws = np.concatenate([sample_centres(vertices, faces, 60, seed)[:, 0] for seed in range(400)])

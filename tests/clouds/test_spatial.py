@@ -19,7 +19,7 @@ SINES = np.linspace(-0.85, 0.85, 341)  # steps of 0.005
 
 
 def hills(*spectra: dict[float, float]) -> np.ndarray:
-    """Spectra (cell, sine) with Gaussian hills, sine: power; a parabola through the logarithms finds them exactly."""
+    """Spectra (cell, sine) with Gaussian peaks, which a parabola in dB finds exactly."""
     total = [
         sum(power * np.exp(-(((SINES - sine) / 0.02) ** 2)) for sine, power in hill.items())
         for hill in spectra

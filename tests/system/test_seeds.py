@@ -11,7 +11,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.clouds import RdtCloud
-from rtradar.clouds.sampling import UniformSample
+from rtradar.clouds.rdt import UniformSample
 from rtradar.errors import InputError
 from rtradar.signal import Noise
 from rtradar.system.seeds import MOST_SEED, check_seed, stream, word

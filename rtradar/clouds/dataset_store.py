@@ -1,0 +1,274 @@
+"""Files of a data set: one archive for each sample, and an index of the samples that belong to it.
+
+A sample's file is a NumPy archive of ``points``, ``spatial`` and ``about`` (label and provenance as
+JSON). It is not compressed and has fixed dates, so that the same sample gives the same bytes
+everywhere. Its last 64 bytes, the archive's comment, are the SHA-256 of all bytes before them.
+Every file is written beside its place and then renamed, so that it is either complete or absent. A
+file that is read may be damaged or come from a stranger, so its contents are checked before use.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import re
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.errors import InputError
+from rtradar.system.checks import shown
+from rtradar.system.files import atomic_file, open_regular, read_json, remove_parts
+
+FORMAT = 1
+"""Format number of sample files and of the index; files with another number are refused."""
+
+INDEX = "collection.json"
+"""Name of the file that lists the samples of a data set."""
+
+_DIGEST = 64  # hexadecimal digits of SHA-256
+_MAX_BYTES = 200_000_000
+_DTYPES = {"points": np.dtype("<f8"), "spatial": np.dtype("<f8"), "about": np.dtype("u1")}
+_IDENTITY = re.compile(r"[A-Za-z0-9_-]{1,100}")  # a plain name, which cannot lead to another folder
+
+
+@dataclass(frozen=True)
+class Sample:
+    """One RDT cloud with its label and its provenance.
+
+    Parameters
+    ----------
+    points : (n, 3) float64
+        Time [s], range [m] and velocity [m/s] of each point, in random order, so that the first k
+        points are a random sample too. The array is empty if nothing was detected.
+    label : str
+        Activity of the person.
+    provenance : mapping
+        Plain JSON values: recording, subject, source ("synthetic" or "recorded"), start_s,
+        duration_s, radar, scene, fidelity, snr_db, heading_deg, seed, licence, version, and more.
+    """
+
+    points: NDArray[np.float64]
+    label: str
+    provenance: Mapping[str, Any]
+
+
+def sample_path(folder: Path, identity: str) -> Path:
+    """Path of a sample's file."""
+    return folder / f"{identity}.npz"
+
+
+def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike) -> int:
+    """Write the file of a sample and flush it to disk; equal samples give equal bytes.
+
+    Parameters
+    ----------
+    folder : path
+        Existing folder of the data set.
+    identity : str
+        Name of the sample.
+    sample : Sample
+        RDT cloud, label and provenance.
+    spatial : (m, 3) float
+        Spatial cloud of the same capture [m].
+
+    Returns
+    -------
+    int
+        Size of the file in bytes.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written. The folder is then unchanged.
+    """
+    about = json.dumps(
+        {"format": FORMAT, "label": sample.label, "provenance": sample.provenance},
+        sort_keys=True,
+        allow_nan=False,
+    )
+    arrays = {
+        "points": np.asarray(sample.points, dtype="<f8").reshape(-1, 3),
+        "spatial": np.asarray(spatial, dtype="<f8").reshape(-1, 3),
+        "about": np.frombuffer(about.encode(), dtype=np.uint8),
+    }
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+        for name, values in arrays.items():
+            entry = io.BytesIO()
+            np.lib.format.write_array(entry, values, version=(1, 0), allow_pickle=False)
+            archive.writestr(zipfile.ZipInfo(f"{name}.npy"), entry.getvalue())  # always dated 1980
+        archive.comment = b"0" * _DIGEST
+    body = buffer.getvalue()[:-_DIGEST]
+    content = body + hashlib.sha256(body).hexdigest().encode()
+    _write_durably(sample_path(folder, identity), content)
+    return len(content)
+
+
+def is_whole(path: Path) -> bool:
+    """Return whether a sample's file exists and its digest matches its content."""
+    try:
+        with open_regular(path) as file:
+            content = file.read()
+    except OSError:
+        return False
+    digest = hashlib.sha256(content[:-_DIGEST]).hexdigest().encode()
+    return len(content) > _DIGEST and digest == content[-_DIGEST:]
+
+
+def read_sample(path: Path, name: str) -> Any:
+    """Read one entry of a sample's file, without reading the others.
+
+    The archive holds a checksum for each entry, and its comment marks the end of the file.
+
+    Parameters
+    ----------
+    path : path
+        File of the sample.
+    name : {"points", "spatial", "about"}
+        Entry to read.
+
+    Returns
+    -------
+    (n, 3) float64, or a dict with ``label`` and ``provenance`` for ``about``
+
+    Raises
+    ------
+    InputError
+        If the file is damaged or larger than 200 MB.
+    """
+    try:
+        with open_regular(path) as file:
+            size = os.fstat(file.fileno()).st_size
+            if size <= _MAX_BYTES:
+                array = _read_array(file, name)
+                if name == "about":
+                    return _parse_about(array)
+                return array.reshape(-1, 3).astype(np.float64)
+    except Exception:  # readers of archives and headers raise any type if the file is damaged
+        raise InputError(
+            f"sample '{path}' is damaged; mend the collection with: rtradar dataset build"
+        ) from None
+    raise InputError(
+        f"sample '{path}' has {size / 1e6:.0f} MB; {_MAX_BYTES / 1e6:.0f} MB are allowed: "
+        "it is none of rtradar's"
+    )
+
+
+def _read_array(file: BinaryIO, name: str) -> NDArray[Any]:
+    with zipfile.ZipFile(file) as archive:
+        entry = archive.getinfo(f"{name}.npy")
+        # Our archives are not compressed, so that no entry is larger than the file.
+        if len(archive.comment) != _DIGEST or entry.compress_type != zipfile.ZIP_STORED:
+            raise ValueError
+        data = io.BytesIO(archive.read(entry))
+    if np.lib.format.read_magic(data) != (1, 0):
+        raise ValueError
+    shape, _, dtype = np.lib.format.read_array_header_1_0(data)
+    if dtype != _DTYPES[name] or (name != "about" and shape[1:] != (3,)):
+        raise ValueError
+    return np.frombuffer(data.getvalue(), dtype, offset=data.tell()).reshape(shape)
+
+
+def _parse_about(data: NDArray[np.uint8]) -> dict[str, Any]:
+    about: dict[str, Any] = json.loads(data.tobytes())
+    if (
+        about["format"] != FORMAT
+        or not isinstance(about["label"], str)
+        or not isinstance(about["provenance"], dict)
+    ):
+        raise ValueError
+    return about
+
+
+def sweep(folder: Path) -> int:
+    """Remove the partial files of interrupted writers and return their number.
+
+    No writer may be at work in the folder.
+    """
+    return remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
+
+
+def write_index(folder: Path, identities: Iterable[str]) -> None:
+    """Write the index, the list of samples that belong to the data set.
+
+    The samples need not exist yet.
+
+    Raises
+    ------
+    InputError
+        If the index cannot be written, or its name belongs to a file that is not an index.
+    """
+    path = folder / INDEX
+    if os.path.lexists(path) and not _is_index(path):
+        raise InputError(
+            f"'{path}' is there, and no index of a collection; "
+            "move it away, or give another folder (--out)"
+        )
+    content = json.dumps({"format": FORMAT, "samples": sorted(identities)}, indent=0)
+    _write_durably(path, content.encode() + b"\n")
+
+
+def read_index(folder: Path) -> tuple[str, ...]:
+    """Read the ids of the samples that belong to the data set, in ascending order.
+
+    Raises
+    ------
+    InputError
+        If the folder holds no index, a damaged one, or one of another format.
+    """
+    path = folder / INDEX
+    try:
+        content = read_json(path)
+    except OSError as error:
+        raise InputError(
+            f"'{folder}' holds no collection ({INDEX}: {error.strerror}); "
+            "make one with: rtradar dataset build"
+        ) from None
+    except ValueError:
+        raise InputError(
+            f"'{path}' is damaged; move it away and mend the collection with: rtradar dataset build"
+        ) from None
+    if not _has_index_keys(content) or content["format"] != FORMAT:
+        raise InputError(
+            f"'{path}' is no index of format {FORMAT}; "
+            "build the collection anew with: rtradar dataset build"
+        )
+    identities = content["samples"]
+    for identity in identities:
+        if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
+            raise InputError(
+                f"'{path}' names {shown(identity)}, which is no sample; "
+                "mend the collection with: rtradar dataset build"
+            )
+    return tuple(sorted(identities))
+
+
+def _is_index(path: Path) -> bool:
+    """Return whether a file looks like an index, whatever its format number."""
+    try:
+        return _has_index_keys(read_json(path))
+    except (OSError, ValueError):
+        return False
+
+
+def _has_index_keys(content: Any) -> bool:
+    return (
+        isinstance(content, dict)
+        and "format" in content
+        and isinstance(content.get("samples"), list)
+    )
+
+
+def _write_durably(path: Path, content: bytes) -> None:
+    with atomic_file(path) as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
