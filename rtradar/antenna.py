@@ -1,4 +1,4 @@
-"""Antenna elements: how much of what they radiate goes where, and how much they gain at most."""
+"""Antenna elements: their patterns and peak gains."""
 
 from __future__ import annotations
 
@@ -21,21 +21,24 @@ _MOST_EXPONENT = 1e4
 
 @dataclass(frozen=True, kw_only=True)
 class Antenna:
-    """One element, in the radar's axes: boresight along x, y to the left, z up.
+    """One antenna element, in the radar's axes: boresight along x, y to the left, z up.
 
     Parameters
     ----------
     pattern : {"isotropic", "cosine", "dipole", "table"}
-        ``cosine``: power falls as cos^exponent of the angle from boresight, and nothing goes behind. ``dipole``: half a
-        wavelength along the polarisation, z for v and y for h. ``table``: the cuts below, one over azimuth and one over
-        elevation; their decibels add up, and beyond their ends they stay as they are there.
+        ``cosine``: the power falls as cos^exponent of the angle from boresight, and is 0 behind the
+        antenna. ``dipole``: half a wavelength along the polarisation, z for v and y for h.
+        ``table``: the cuts below, one over azimuth and one over elevation; their decibels are
+        added, and beyond its ends a cut keeps its last value.
     exponent : float, optional
-        Of ``cosine``.
+        Exponent of ``cosine``.
     gain_dbi : float, optional
-        At the peak of the pattern; where left out, what follows from the pattern without losses: 0 for ``isotropic``,
-        2 (exponent + 1) for ``cosine``, 2.15 dBi for ``dipole``. Needed by ``table``.
+        Gain at the peak of the pattern [dBi]. The default follows from the pattern without losses:
+        0 dBi for ``isotropic``, a ratio of 2 (exponent + 1) for ``cosine``, 2.15 dBi for
+        ``dipole``. A ``table`` needs it.
     azimuth_deg, azimuth_db, elevation_deg, elevation_db : sequence of float, optional
-        Of ``table``: angles, ascending, and power below the peak there (so 0 or less). A cut that is left out is flat.
+        Cuts of ``table``: ascending angles [deg] and the power there relative to the peak [dB], 0
+        or less. A cut that is left out is flat.
 
     Raises
     ------
@@ -58,7 +61,8 @@ class Antenna:
             )
         if (self.exponent is not None) != (self.pattern == "cosine"):
             raise InputError(
-                f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only 'cosine' has one, and needs it"
+                f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only "
+                "'cosine' has one, and needs it"
             )
         if self.exponent is not None:
             object.__setattr__(
@@ -76,7 +80,8 @@ class Antenna:
             values = getattr(self, cut)
             if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
                 raise InputError(
-                    f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is {shown(values)}"
+                    f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is "
+                    f"{shown(values)}"
                 )
             limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
             object.__setattr__(
@@ -90,17 +95,18 @@ class Antenna:
                 )
         if self.pattern == "table" and not (self.azimuth_deg or self.elevation_deg):
             raise InputError(
-                "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and elevation_db"
+                "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and "
+                "elevation_db"
             )
 
     @classmethod
     def of(cls, table: Mapping[str, Any]) -> Antenna:
-        """From a table of a TOML file.
+        """Make an antenna from a table of a TOML file.
 
         Parameters
         ----------
         table : mapping
-            Its keys are the fields of this class.
+            Table whose keys are the fields of this class.
 
         Returns
         -------
@@ -127,19 +133,19 @@ class Antenna:
         return _HALF_WAVE_DIRECTIVITY if self.pattern == "dipole" else 1.0
 
     def relative(self, directions: NDArray[np.float64], polarization: str) -> NDArray[np.float64]:
-        """Power in these directions over that at the peak.
+        """Compute the power in some directions relative to that at the peak.
 
         Parameters
         ----------
         directions : (..., 3) float64
-            From the antenna, of any length.
+            Vectors of any length that point away from the antenna.
         polarization : {"v", "h"}
-            Of the radar.
+            Polarisation of the radar.
 
         Returns
         -------
         (...) float64
-            0 to 1.
+            Ratio of powers, 0 to 1.
         """
         unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
         if self.exponent is not None:
@@ -147,21 +153,14 @@ class Antenna:
             return np.where(ahead > 0, np.maximum(ahead, 0) ** self.exponent, 0.0)
         if self.pattern == "dipole":
             along = unit[..., 2] if polarization == "v" else unit[..., 1]
-            across = np.maximum(
-                1 - along**2, 1e-12
-            )  # on the axis itself it is 0 / 0, and its limit 0
+            # On the axis itself the ratio is 0 / 0, and its limit is 0.
+            across = np.maximum(1 - along**2, 1e-12)
             return np.asarray(np.cos(np.pi / 2 * along) ** 2 / across)
         level = np.zeros(unit.shape[:-1])
         if self.azimuth_deg:
-            level += np.interp(
-                np.degrees(np.arctan2(unit[..., 1], unit[..., 0])),
-                self.azimuth_deg,
-                self.azimuth_db,
-            )
+            azimuth_deg = np.degrees(np.arctan2(unit[..., 1], unit[..., 0]))
+            level += np.interp(azimuth_deg, self.azimuth_deg, self.azimuth_db)
         if self.elevation_deg:
-            level += np.interp(
-                np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1))),
-                self.elevation_deg,
-                self.elevation_db,
-            )
+            elevation_deg = np.degrees(np.arcsin(np.clip(unit[..., 2], -1, 1)))
+            level += np.interp(elevation_deg, self.elevation_deg, self.elevation_db)
         return np.asarray(10 ** (level / 10))

@@ -6,10 +6,10 @@ from rtradar.radar import Radar
 
 
 def paper_12ghz() -> Radar:
-    """The paper's Table 1."""
+    """Make the radar of the paper's Table 1."""
     return Radar(start_frequency_hz=12e9, chirp_duration_s=62.5e-6)
 
 
 def paper_77ghz() -> Radar:
-    """Its sister at 77 GHz, with chirps five times shorter."""
+    """Make the paper's radar at 77 GHz, whose chirps are five times shorter."""
     return Radar(start_frequency_hz=77e9, chirp_duration_s=12.5e-6)

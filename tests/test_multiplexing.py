@@ -296,7 +296,7 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
             {"multiplexing": "ddm", "channels": "all", "doppler_bands": 12},
             "above 12, the number of Tx",
         ),
-        ({"multiplexing": "ddm"}, "every Rx hears all Tx; set channels = 'all'"),
+        ({"multiplexing": "ddm"}, "every Rx receives all Tx; set channels = 'all'"),
         (
             {"multiplexing": "ddm", "channels": "all", "frame_duration_s": 900e-6},
             "no whole DDM cycle of 0.001 s",

@@ -1,4 +1,4 @@
-"""The radar: waveform, array, schedule of its Tx, and every limit that follows from them (the paper's Tables 1 and 2)."""
+"""The radar and every limit that follows from its fields (the paper's Tables 1 and 2)."""
 
 from rtradar.radar.radar import PRESETS, Radar, register_radar
 

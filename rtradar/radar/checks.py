@@ -1,9 +1,9 @@
-"""What the fields of a radar may be: each by itself, and those that must fit each other."""
+"""Rules for the fields of a radar: what each may be, and how fields must fit each other."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,203 +11,28 @@ from rtradar.antenna import Antenna
 from rtradar.errors import InputError
 from rtradar.system.checks import shown
 
-_POSITIVE = (
-    "start_frequency_hz",
-    "bandwidth_hz",
-    "chirp_duration_s",
-    "frame_duration_s",
-    "frame_hop_s",
-    "tx_spacing_wavelengths",
-    "rx_spacing_wavelengths",
-)
-_COUNTS = {"samples_per_chirp": 1, "tx_y": 0, "tx_z": 0, "rx_y": 0, "rx_z": 0}
-_CHOICES = {
-    "channels": ("pairs", "all"),
-    "polarization": ("v", "h"),
-    "multiplexing": ("tdm", "fdm", "ddm"),
-}
-_POWERS = (
-    ("transmit_power_dbm", -200, 200),
-    ("noise_figure_db", 0, 100),
-    ("noise_temperature_k", 0, 1e6),
-)
-_MAY_BE_UNKNOWN = ("transmit_power_dbm", "noise_figure_db")
+if TYPE_CHECKING:
+    from rtradar.radar.radar import Radar
+
 # Far outside every radar; inside, no product or ratio of two of them leaves the range of float64.
 _LEAST, _LARGEST, _MOST = 1e-15, 1e15, 65536
+_MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
 
 
-def checked_values(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Fields of a `Radar` that have a meaning by themselves, in their types.
+class FieldRule(NamedTuple):
+    """Rule for the value of one field: a test, the type it is converted to, and the complaint."""
 
-    Parameters
-    ----------
-    values : mapping
-        Every field by its name.
-
-    Returns
-    -------
-    dict
-        Those that were checked.
-
-    Raises
-    ------
-    InputError
-        Where a value has no physical meaning; the message names the field and what is allowed.
-    """
-    if not (isinstance(values["name"], str) and values["name"].isprintable()):
-        raise InputError(f"radar: name = {shown(values['name'])}; it must be one line of text")
-    radar = f"radar '{values['name']}'"
-    found: dict[str, Any] = {}
-    for field in _POSITIVE:
-        value = values[field]
-        if not (_is_number(value) and _LEAST < value < _LARGEST):
-            raise InputError(
-                f"{radar}: {field} = {shown(value)}; it must be a positive, finite number"
-            )
-        found[field] = float(value)
-    for field, lowest in _COUNTS.items():
-        value = values[field]
-        if not (_is_count(value) and lowest <= value <= _MOST):
-            raise InputError(
-                f"{radar}: {field} = {shown(value)}; it must be a whole number from {lowest} to {_MOST}"
-            )
-        found[field] = int(value)
-    for field, allowed in _CHOICES.items():
-        if values[field] not in allowed:
-            raise InputError(
-                f"{radar}: {field} = {shown(values[field])}; allowed: {', '.join(allowed)}"
-            )
-    position = values["position_m"]
-    if (
-        not isinstance(position, list | tuple | np.ndarray)
-        or len(position) != 3
-        or not all(map(_is_number, position))
-    ):
-        raise InputError(
-            f"{radar}: position_m = {shown(position)}; it must be three finite numbers [m]"
-        )
-    found["position_m"] = tuple(float(value) for value in position)
-    for field, least, most in _POWERS:
-        value = values[field]
-        if value is None and field in _MAY_BE_UNKNOWN:
-            continue
-        if not (_is_number(value) and least <= value <= most):
-            raise InputError(
-                f"{radar}: {field} = {shown(value)}; it must lie between {least} and {most:g}"
-            )
-        found[field] = float(value)
-    # What they may be hangs on other fields; `check_multiplexing` says.
-    if _is_number(values["carrier_step_hz"]):
-        found["carrier_step_hz"] = float(values["carrier_step_hz"])
-    if _is_count(values["doppler_bands"]):
-        found["doppler_bands"] = int(values["doppler_bands"])
-    return found | {
-        field: _antenna(radar, field, values[field]) for field in ("tx_antenna", "rx_antenna")
-    }
+    allows: Callable[[Any], bool]
+    convert: Callable[[Any], Any]
+    requirement: str
 
 
-def _antenna(radar: str, field: str, value: object) -> Antenna | None:
-    try:
-        made = Antenna.of(value) if isinstance(value, Mapping) else value
-    except InputError as error:
-        raise InputError(f"{radar}: {field}: {error}") from None
-    if made is not None and not isinstance(made, Antenna):
-        raise InputError(
-            f"{radar}: {field} = {shown(value)}; it must be a table of an antenna's fields"
-        )
-    return made
+class Rule(NamedTuple):
+    """Rule for fields that must fit each other: a test, and the complaint where it fails."""
 
-
-def check_array(name: str, tx_lines: Sequence[int], rx_lines: Sequence[int], channels: str) -> None:
-    """Refuse an array without Tx or Rx, and pairs of lines that have different numbers of Rx.
-
-    Parameters
-    ----------
-    name : str
-        Of the radar.
-    tx_lines, rx_lines : (2,) int
-        Antennas along y and along z.
-    channels : {"pairs", "all"}
-
-    Raises
-    ------
-    InputError
-    """
-    if sum(tx_lines) == 0 or sum(rx_lines) == 0:
-        raise InputError(f"radar '{name}': the array has no Tx or no Rx; give at least one of each")
-    used = {rx for tx, rx in zip(tx_lines, rx_lines, strict=True) if tx}
-    if channels == "pairs" and (0 in used or len(used) > 1):
-        raise InputError(
-            f"radar '{name}': channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
-            f"{rx_lines[0]} and {rx_lines[1]}; make them equal or set channels = 'all'"
-        )
-
-
-def check_multiplexing(
-    name: str,
-    multiplexing: str,
-    *,
-    carrier_step_hz: Any,
-    start_frequency_hz: float,
-    sample_rate_hz: float,
-    doppler_bands: Any,
-    n_tx: int,
-    all_heard: bool,
-) -> None:
-    """Refuse carriers and bands that do not part the Tx, or belong to another kind of multiplexing.
-
-    Parameters
-    ----------
-    name : str
-        Of the radar.
-    multiplexing : {"tdm", "fdm", "ddm"}
-    carrier_step_hz, doppler_bands : number or None
-        As given.
-    start_frequency_hz : float
-        Where the sweep begins, in the middle of all carriers [Hz].
-    sample_rate_hz : float
-        Width of an IF band [Hz].
-    n_tx : int
-    all_heard : bool
-        Whether every Rx hears all Tx.
-
-    Raises
-    ------
-    InputError
-    """
-    for field, value, owner in (
-        ("carrier_step_hz", carrier_step_hz, "fdm"),
-        ("doppler_bands", doppler_bands, "ddm"),
-    ):
-        if value is not None and multiplexing != owner:
-            raise InputError(
-                f"radar '{name}': {field} belongs to multiplexing = '{owner}'; leave it out"
-            )
-    if carrier_step_hz is not None and not (
-        _is_number(carrier_step_hz) and sample_rate_hz <= carrier_step_hz
-    ):
-        raise InputError(
-            f"radar '{name}': carrier_step_hz = {shown(carrier_step_hz)}; bands of the IF are {sample_rate_hz:g} Hz wide "
-            "(samples_per_chirp / chirp_duration_s), so carriers must be at least that far apart"
-        )
-    if multiplexing == "fdm":
-        step = sample_rate_hz if carrier_step_hz is None else carrier_step_hz
-        below = (n_tx - 1) / 2 * step
-        if below >= start_frequency_hz:
-            raise InputError(
-                f"radar '{name}': {n_tx} carriers {step:g} Hz apart begin {below:g} Hz below start_frequency_hz = "
-                f"{start_frequency_hz:g}, at no positive frequency; raise that, or set them nearer (carrier_step_hz)"
-            )
-    if doppler_bands is not None and not (
-        _is_count(doppler_bands) and n_tx < doppler_bands <= _MOST
-    ):
-        raise InputError(
-            f"radar '{name}': doppler_bands = {shown(doppler_bands)}; it must be a whole number above {n_tx}, the number of Tx"
-        )
-    if multiplexing == "ddm" and not all_heard:
-        raise InputError(
-            f"radar '{name}': under multiplexing = 'ddm' every Rx hears all Tx; set channels = 'all', or give Tx on one line"
-        )
+    name: str
+    holds: Callable[[Radar], Any]
+    complaint: Callable[[Radar], str]
 
 
 def _is_number(value: Any) -> bool:
@@ -218,3 +43,200 @@ def _is_number(value: Any) -> bool:
 
 def _is_count(value: Any) -> bool:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def _is_position(value: Any) -> bool:
+    sequence = isinstance(value, list | tuple | np.ndarray)
+    return sequence and len(value) == 3 and all(map(_is_number, value))
+
+
+_POSITIVE = FieldRule(
+    lambda value: _is_number(value) and value > _LEAST,
+    float,
+    "it must be a positive, finite number",
+)
+_POSITION = FieldRule(
+    _is_position,
+    lambda value: tuple(map(float, value)),
+    "it must be three finite numbers [m]",
+)
+_ANTENNA = FieldRule(
+    lambda value: value is None or isinstance(value, Antenna),
+    lambda value: value,
+    "it must be a table of an antenna's fields",
+)
+
+
+def _count(least: int) -> FieldRule:
+    return FieldRule(
+        lambda value: _is_count(value) and least <= value <= _MOST,
+        int,
+        f"it must be a whole number from {least} to {_MOST}",
+    )
+
+
+def _choice(*allowed: str) -> FieldRule:
+    return FieldRule(
+        lambda value: value in allowed, lambda value: value, f"allowed: {', '.join(allowed)}"
+    )
+
+
+def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
+    return FieldRule(
+        lambda value: (
+            (optional and value is None) or (_is_number(value) and least <= value <= most)
+        ),
+        lambda value: None if value is None else float(value),
+        f"it must lie between {least} and {most:g}",
+    )
+
+
+def _if(allows: Callable[[Any], bool], convert: type) -> FieldRule:
+    """Convert values of the right kind; whether others are allowed depends on other fields."""
+    return FieldRule(lambda _: True, lambda value: convert(value) if allows(value) else value, "")
+
+
+FIELD_RULES: dict[str, FieldRule] = {
+    "start_frequency_hz": _POSITIVE,
+    "bandwidth_hz": _POSITIVE,
+    "chirp_duration_s": _POSITIVE,
+    "frame_duration_s": _POSITIVE,
+    "frame_hop_s": _POSITIVE,
+    "tx_spacing_wavelengths": _POSITIVE,
+    "rx_spacing_wavelengths": _POSITIVE,
+    "samples_per_chirp": _count(1),
+    "tx_y": _count(0),
+    "tx_z": _count(0),
+    "rx_y": _count(0),
+    "rx_z": _count(0),
+    "channels": _choice("pairs", "all"),
+    "polarization": _choice("v", "h"),
+    "multiplexing": _choice("tdm", "fdm", "ddm"),
+    "position_m": _POSITION,
+    "transmit_power_dbm": _between(-200, 200),
+    "noise_figure_db": _between(0, 100),
+    "noise_temperature_k": _between(0, 1e6, optional=False),
+    "carrier_step_hz": _if(_is_number, float),
+    "doppler_bands": _if(_is_count, int),
+    "tx_antenna": _ANTENNA,
+    "rx_antenna": _ANTENNA,
+}
+"""The rule of each field by itself, in the order in which they are checked."""
+
+RULES: tuple[Rule, ...] = (
+    Rule(
+        "the array has antennas",
+        lambda r: r.tx_y + r.tx_z and r.rx_y + r.rx_z,
+        lambda _: "the array has no Tx or no Rx; give at least one of each",
+    ),
+    Rule(
+        "pairs keep as many Rx for every Tx",
+        lambda r: (
+            r.channels == "all"
+            or {rx for tx, rx in ((r.tx_y, r.rx_y), (r.tx_z, r.rx_z)) if tx} == {r.n_rx} != {0}
+        ),
+        lambda r: (
+            "channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
+            f"{r.rx_y} and {r.rx_z}; make them equal or set channels = 'all'"
+        ),
+    ),
+    Rule(
+        "carrier_step_hz belongs to fdm",
+        lambda r: r.carrier_step_hz is None or r.multiplexing == "fdm",
+        lambda _: "carrier_step_hz belongs to multiplexing = 'fdm'; leave it out",
+    ),
+    Rule(
+        "doppler_bands belongs to ddm",
+        lambda r: r.doppler_bands is None or r.multiplexing == "ddm",
+        lambda _: "doppler_bands belongs to multiplexing = 'ddm'; leave it out",
+    ),
+    Rule(
+        "bands of the IF do not overlap",
+        lambda r: (
+            r.carrier_step_hz is None
+            or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz)
+        ),
+        lambda r: (
+            f"carrier_step_hz = {shown(r.carrier_step_hz)}; bands of the IF are "
+            f"{r.sample_rate_hz:g} Hz wide (samples_per_chirp / chirp_duration_s), so carriers "
+            "must be at least that far apart"
+        ),
+    ),
+    Rule(
+        "carriers are positive",
+        lambda r: -r.tx_offset_hz[0] < r.start_frequency_hz,
+        lambda r: (
+            f"{r.n_tx} carriers {r.carrier_step_hz or r.sample_rate_hz:g} Hz apart begin "
+            f"{-r.tx_offset_hz[0]:g} Hz below start_frequency_hz = {r.start_frequency_hz:g}, at "
+            "no positive frequency; raise that, or set them nearer (carrier_step_hz)"
+        ),
+    ),
+    Rule(
+        "some Doppler bands stay empty",
+        lambda r: (
+            r.doppler_bands is None
+            or (_is_count(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST)
+        ),
+        lambda r: (
+            f"doppler_bands = {shown(r.doppler_bands)}; it must be a whole number above {r.n_tx}, "
+            "the number of Tx"
+        ),
+    ),
+    Rule(
+        "every Rx receives all Tx of ddm",
+        lambda r: r.multiplexing != "ddm" or r.channels == "all" or not (r.tx_y and r.tx_z),
+        lambda _: (
+            "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx "
+            "on one line"
+        ),
+    ),
+    Rule(
+        "a frame holds a cycle",
+        lambda r: r.cycles_per_frame >= 1,
+        lambda r: (
+            f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} "
+            f"cycle of {r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or "
+            "shorten the chirp"
+        ),
+    ),
+    Rule(
+        "a frame fits in memory",
+        lambda r: r.chirps_per_frame * r.n_rx * r.samples_per_chirp <= _MOST_SAMPLES_PER_FRAME,
+        lambda r: (
+            f"frame_duration_s = {r.frame_duration_s} holds "
+            f"{r.chirps_per_frame * r.n_rx * r.samples_per_chirp:.2g} samples, more than "
+            f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer "
+            "chirps"
+        ),
+    ),
+)
+"""The rules for fields that must fit each other, in the order in which they are checked."""
+
+
+def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Check each field of a `Radar` by itself; return the fields in their types, the name left out.
+
+    The message of an `InputError` names the field and what is allowed.
+    """
+    if not (isinstance(values["name"], str) and values["name"].isprintable()):
+        raise InputError(f"radar: name = {shown(values['name'])}; it must be one line of text")
+    radar = f"radar '{values['name']}'"
+    found: dict[str, Any] = {}
+    for field, rule in FIELD_RULES.items():
+        value = values[field]
+        if rule is _ANTENNA and isinstance(value, Mapping):
+            try:
+                value = Antenna.of(value)
+            except InputError as error:
+                raise InputError(f"{radar}: {field}: {error}") from None
+        if not rule.allows(value):
+            raise InputError(f"{radar}: {field} = {shown(value)}; {rule.requirement}")
+        found[field] = rule.convert(value)
+    return found
+
+
+def check_rules(radar: Radar) -> None:
+    """Refuse a radar whose fields do not fit each other, by the first rule that fails."""
+    for rule in RULES:
+        if not rule.holds(radar):
+            raise InputError(f"radar '{radar.name}': {rule.complaint(radar)}")

@@ -1,18 +1,25 @@
-"""The whole radar: how it is made, by name or from a file, what is checked, and its powers in watts."""
+"""The radar: its fields, how it is loaded, and every quantity that follows from the fields."""
 
 from __future__ import annotations
 
 import dataclasses
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rtradar.antenna import Antenna
-from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K
+from rtradar.conventions import (
+    BOLTZMANN_J_PER_K,
+    NOISE_FIGURE_TEMPERATURE_K,
+    SPEED_OF_LIGHT_MPS,
+)
 from rtradar.errors import InputError
-from rtradar.radar.checks import check_array, check_multiplexing, checked_values
-from rtradar.radar.schedule import Schedule
+from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.system.checks import printable
 from rtradar.system.registry import Registry
 from rtradar.system.toml_tables import check_keys, read_toml
@@ -22,67 +29,105 @@ PRESETS = Registry(
     "radar",
     {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"},
 )
-"""Radars that have a name: what makes them, called without arguments."""
+"""Radars that have a name: each is made by a function without arguments."""
 
 register_radar = PRESETS.register
 
-_MOST_SAMPLES_PER_FRAME = 2**31  # 17 GB; the paper's have 3.3 and 16.4 million
-
 
 @dataclass(frozen=True, kw_only=True)
-class Radar(Schedule):
-    """A MIMO FMCW radar with a cross of two linear arrays.
+class Radar:
+    r"""A MIMO FMCW radar with a cross of two linear arrays.
 
-    Antennas are numbered y-line first, then z-line; the index rises with y or z. Chirp m comes from Tx ``m mod n_tx``. Under
-    TDM the Tx take turns chirp by chirp, without a gap. Under FDM and DDM all of them transmit at once: chirps 0 to
-    ``n_tx - 1`` are those that are on the air together first, and so on.
+    Antennas are numbered along the y-line first, then along the z-line; the index rises with y or
+    z. Chirp m comes from Tx ``m mod n_tx``. Under TDM the Tx transmit one after the other, chirp by
+    chirp, without a gap. Under FDM and DDM all of them transmit at once: chirps 0 to ``n_tx - 1``
+    are those that are transmitted together first, and so on.
 
     Parameters
     ----------
     name : str
-        Shown in reports.
+        Name that reports show.
     start_frequency_hz, bandwidth_hz : float
-        The sweep runs from ``start_frequency_hz`` up by ``bandwidth_hz``.
+        Frequency at which the sweep starts, and the width by which it rises [Hz].
     chirp_duration_s : float
-        One chirp; the next begins as it ends.
+        Duration of one chirp [s]; the next begins as it ends.
     samples_per_chirp : int
-        Complex IF samples in one chirp.
-    frame_duration_s, frame_hop_s : float
-        Length of one coherent processing window and the step between windows.
+        Number of complex IF samples in one chirp.
     tx_y, tx_z, rx_y, rx_z : int
-        Antennas along y and along z.
+        Numbers of Tx and Rx along y and along z.
     tx_spacing_wavelengths, rx_spacing_wavelengths : float
-        In wavelengths of the START frequency, as in the paper's Table 1.
+        Spacings of neighbours on a line, in wavelengths of the START frequency, as in the paper's
+        Table 1.
     position_m : tuple of float
-        Centre of both lines, world axes.
+        Centre of both lines, in world axes [m].
     channels : {"pairs", "all"}
-        ``pairs``: y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper). ``all``: every Tx with every Rx (192).
-    polarization : {"v", "h"}
-        Co-polar: v is world z, h is world y.
+        ``pairs`` keeps y-Tx with y-Rx and z-Tx with z-Rx (96 channels in the paper); ``all`` keeps
+        every Tx with every Rx (192).
+    frame_duration_s, frame_hop_s : float
+        Length of one frame, the coherent processing interval, and the step between frames [s].
     multiplexing : {"tdm", "fdm", "ddm"}
-        What tells the Tx apart: their time (TDM), their carrier (FDM: Tx k sweeps ``tx_offset_hz[k]`` higher, and the receiver
-        parts the bands), or their Doppler (DDM, Doppler division: the IF of Tx k is turned by exp(j 2 pi k p / D) from chirp to
-        chirp p, which moves it k of D bands of the Doppler axis up; some bands stay empty and tell where the axis begins).
+        What tells the Tx apart: their time (TDM), their carrier (FDM: the sweep of Tx k lies
+        ``tx_offset_hz[k]`` higher, and the receiver separates the bands), or their Doppler (DDM,
+        Doppler division: the IF of Tx k is multiplied by exp(j 2 pi k p / D) at chirp p, which
+        shifts it up by k of the D bands of the Doppler axis; some bands stay empty and show where
+        the axis begins).
     carrier_step_hz : float, optional
-        Of FDM: from one Tx's carrier to the next; the sample rate if left out, the least that keeps the bands apart.
+        Spacing of the carriers of FDM [Hz]; by default the sample rate, the least that keeps the
+        bands apart.
     doppler_bands : int, optional
-        Of DDM: D, more than there are Tx; a third more than Tx if left out.
+        Number D of Doppler bands of DDM, more than there are Tx; by default a third more than Tx.
+    polarization : {"v", "h"}
+        Co-polar polarisation of Tx and Rx: v is along world z, h along world y.
     transmit_power_dbm : float, optional
-        Of one Tx, at its antenna. With it powers are known in watts.
+        Power of one Tx at its antenna [dBm]. With it powers are known in watts.
     noise_figure_db : float, optional
-        Of the receiver, everything from the antenna to the IF samples. With the transmit power it says how strong noise is.
+        Noise figure of the receiver, from the antenna to the IF samples [dB]. With the transmit
+        power it says how strong the noise is.
     noise_temperature_k : float
-        Of what the antennas see. The noise of the receiver itself follows from its noise figure, which is defined for a source
-        at 290 K, and does not change with it.
+        Noise temperature of the scene that the antennas see [K]. The noise of the receiver itself
+        follows from its noise figure, which is defined for a source at 290 K, and does not change
+        with it.
     tx_antenna, rx_antenna : Antenna, optional
-        Of each Tx and Rx, a table in TOML; isotropic if left out.
+        Elements of each Tx and Rx, a table in TOML; isotropic by default.
 
     Raises
     ------
     InputError
         Where a value has no physical meaning; the message names the field and what is allowed.
+
+    Notes
+    -----
+    Derived quantities; each is a property of the radar, documented below.
+
+    - waveform: `centre_frequency_hz`, `wavelength_m`, `start_wavelength_m`, `slope_hz_per_s`,
+      `sample_rate_hz`, `occupied_bandwidth_hz`, `receiver_rate_hz`
+    - array: `n_tx`, `n_rx`, `n_channels`, `tx` and `rx` [m], `rx_of_tx`
+    - schedule: `at_once`, `cycle_duration_s`, `chirp_interval_s`, `tx_delay_s`, `tx_offset_hz`,
+      `n_doppler_bands`, `cycles_per_frame`, `hop_cycles`, `chirps_per_frame`
+    - limits: `range_bin_m`, `max_range_m`, `velocity_bin_mps`, `max_velocity_mps`,
+      `angle_resolution_deg`, `max_angle_deg`
+    - axes: `range_m`; `velocity_mps`, `chirp_times` [s] and `window_times` [s] are methods
+    - powers: `watts_per_m2` [W/m^2] and `noise_power_w`
     """
 
+    name: str = "custom"
+    start_frequency_hz: float = 12e9
+    bandwidth_hz: float = 4e9
+    chirp_duration_s: float = 62.5e-6
+    samples_per_chirp: int = 256
+    tx_y: int = 6
+    tx_z: int = 6
+    rx_y: int = 8
+    rx_z: int = 8
+    tx_spacing_wavelengths: float = 4.0
+    rx_spacing_wavelengths: float = 0.5
+    position_m: tuple[float, float, float] = (-4.0, 1.0, 1.0)
+    channels: Literal["pairs", "all"] = "pairs"
+    frame_duration_s: float = 0.1
+    frame_hop_s: float = 0.025
+    multiplexing: Literal["tdm", "fdm", "ddm"] = "tdm"
+    carrier_step_hz: float | None = None
+    doppler_bands: int | None = None
     polarization: Literal["v", "h"] = "v"
     transmit_power_dbm: float | None = None
     noise_figure_db: float | None = None
@@ -91,37 +136,14 @@ class Radar(Schedule):
     rx_antenna: Antenna | None = None
 
     def __post_init__(self) -> None:
-        for field, value in checked_values(
-            {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        ).items():
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for field, value in checked_fields(given).items():
             object.__setattr__(self, field, value)
-        check_array(self.name, (self.tx_y, self.tx_z), (self.rx_y, self.rx_z), self.channels)
-        check_multiplexing(
-            self.name,
-            self.multiplexing,
-            carrier_step_hz=self.carrier_step_hz,
-            start_frequency_hz=self.start_frequency_hz,
-            sample_rate_hz=self.sample_rate_hz,
-            doppler_bands=self.doppler_bands,
-            n_tx=self.n_tx,
-            all_heard=self.channels == "all" or not (self.tx_y and self.tx_z),
-        )
-        if self.cycles_per_frame < 1:
-            raise InputError(
-                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds no whole "
-                f"{self.multiplexing.upper()} cycle of {self.cycle_duration_s * self.n_doppler_bands:.3g} s; "
-                "lengthen the frame or shorten the chirp"
-            )
-        samples = self.chirps_per_frame * self.n_rx * self.samples_per_chirp
-        if samples > _MOST_SAMPLES_PER_FRAME:
-            raise InputError(
-                f"radar '{self.name}': frame_duration_s = {self.frame_duration_s} holds {samples:.2g} samples, more than "
-                f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps"
-            )
+        check_rules(self)
 
     @classmethod
     def preset(cls, name: str) -> Radar:
-        """The radar of that name; `PRESETS` lists them.
+        """Make the preset of a name; `PRESETS` lists the names.
 
         Parameters
         ----------
@@ -137,7 +159,7 @@ class Radar(Schedule):
         InputError
             Where there is no such preset.
         ExtensionError
-            Where it is of another package, and fails.
+            Where the preset comes from another package, and fails.
         """
         make = PRESETS.find(name, instead=", or the path of a TOML file")
         with PRESETS.guarded(name):
@@ -148,7 +170,7 @@ class Radar(Schedule):
 
     @classmethod
     def load(cls, source: str | Path) -> Radar:
-        """A preset by its name, or a TOML file whose keys are the fields of this class.
+        """Make a preset by its name, or read a TOML file whose keys are the fields of this class.
 
         Parameters
         ----------
@@ -162,25 +184,335 @@ class Radar(Schedule):
         Raises
         ------
         InputError
-            Where the file cannot be read, is not TOML, or has an unknown key or a value without meaning.
+            Where the file cannot be read, is not TOML, or has an unknown key or a value without
+            meaning.
         """
-        if str(source) in PRESETS:
-            return cls.preset(str(source))
         path = Path(source)
-        if path.suffix != ".toml":
+        if str(source) in PRESETS or path.suffix != ".toml":
             return cls.preset(str(source))
         table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
+        keys = tuple(sorted(field.name for field in dataclasses.fields(cls)))
         try:
-            check_keys(
-                "", table, (), tuple(sorted(field.name for field in dataclasses.fields(cls)))
-            )
+            check_keys("", table, (), keys)
             return cls(**{"name": printable(path.stem), **table})
         except InputError as error:
             raise InputError(f"radar file '{path}': {error}") from None
 
+    # -- waveform and range (derived) --------------------------------------------------------------
+
+    @property
+    def centre_frequency_hz(self) -> float:
+        """Frequency at the middle of the sweep [Hz]; the phase at a range bin changes with it."""
+        return self.start_frequency_hz + self.bandwidth_hz / 2
+
+    @property
+    def wavelength_m(self) -> float:
+        """Wavelength at the sweep centre [m]."""
+        return SPEED_OF_LIGHT_MPS / self.centre_frequency_hz
+
+    @property
+    def start_wavelength_m(self) -> float:
+        """Wavelength at the sweep start [m], the unit of the antenna spacings."""
+        return SPEED_OF_LIGHT_MPS / self.start_frequency_hz
+
+    @property
+    def slope_hz_per_s(self) -> float:
+        """Sweep rate [Hz/s]."""
+        return self.bandwidth_hz / self.chirp_duration_s
+
+    @property
+    def sample_rate_hz(self) -> float:
+        """Rate of the complex IF samples [Hz]."""
+        return self.samples_per_chirp / self.chirp_duration_s
+
+    @property
+    def range_bin_m(self) -> float:
+        """Range resolution and width of one range bin, c / 2B [m] (paper, eq. 2).
+
+        Equation :eq:`range-axis` of the theory page.
+        """
+        return SPEED_OF_LIGHT_MPS / (2 * self.bandwidth_hz)
+
+    @property
+    def max_range_m(self) -> float:
+        """Range whose beat frequency equals the sample rate, c Fs / 2s [m] (paper, eq. 1).
+
+        Equation :eq:`range-axis` of the theory page.
+        """
+        return self.range_bin_m * self.samples_per_chirp
+
+    @cached_property
+    def range_m(self) -> NDArray[np.float64]:
+        """Range of each range bin (range,) [m], half the length of the path from Tx to Rx."""
+        return np.arange(self.samples_per_chirp, dtype=np.float64) * self.range_bin_m
+
+    # -- array and angle (derived) -----------------------------------------------------------------
+
+    @property
+    def n_tx(self) -> int:
+        """Number of transmitters, and of chirps in one cycle."""
+        return self.tx_y + self.tx_z
+
+    @property
+    def n_rx(self) -> int:
+        """Length of the rx axis: the number of receivers that are kept in one chirp."""
+        if self.channels == "all":
+            return self.rx_y + self.rx_z
+        return self.rx_y if self.tx_y else self.rx_z
+
+    @property
+    def n_channels(self) -> int:
+        """Number of virtual channels, ``n_tx * n_rx``; channel = tx * n_rx + rx."""
+        return self.n_tx * self.n_rx
+
+    @cached_property
+    def tx(self) -> NDArray[np.float64]:
+        """Positions of the transmitters (tx, 3) [m], world: the y-line, then the z-line."""
+        return self._lines(self.tx_y, self.tx_z, self.tx_spacing_wavelengths)
+
+    @cached_property
+    def rx(self) -> NDArray[np.float64]:
+        """Positions of the receivers (rx, 3) [m], world: the y-line, then the z-line."""
+        return self._lines(self.rx_y, self.rx_z, self.rx_spacing_wavelengths)
+
+    def _lines(self, n_y: int, n_z: int, spacing_wavelengths: float) -> NDArray[np.float64]:
+        spacing_m = spacing_wavelengths * self.start_wavelength_m
+        positions = np.zeros((n_y + n_z, 3))
+        positions[:n_y, 1] = (np.arange(n_y) - (n_y - 1) / 2) * spacing_m
+        positions[n_y:, 2] = (np.arange(n_z) - (n_z - 1) / 2) * spacing_m
+        return positions + np.asarray(self.position_m)
+
+    @cached_property
+    def rx_of_tx(self) -> NDArray[np.int64]:
+        """Indices into `rx` of the receivers kept while each Tx transmits, (tx, rx)."""
+        if self.channels == "all":
+            return np.tile(np.arange(self.n_rx), (self.n_tx, 1))
+        first = np.repeat([0, self.rx_y], [self.tx_y, self.tx_z])
+        return first[:, None] + np.arange(self.n_rx)
+
+    @property
+    def max_angle_deg(self) -> float:
+        """Unambiguous azimuth and elevation, asin(lambda / 2d) at the sweep centre [deg].
+
+        The paper's eq. 5, and equation :eq:`angle-axis` of the theory page.
+        """
+        return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
+
+    @property
+    def angle_resolution_deg(self) -> float:
+        """Half-power beam width of one uniform virtual line at broadside, 0.886 lambda / N d [deg].
+
+        It is that of the far field. Where the spacings of Tx and Rx do not fill a line without
+        gaps, it is the width for a line of as many elements.
+
+        Equation :eq:`angle-axis` of the theory page.
+        """
+        elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
+        if elements < 2:
+            return 180.0
+        return min(180.0, math.degrees(0.886 / (elements * self._virtual_spacing_wavelengths)))
+
+    @property
+    def _virtual_spacing_wavelengths(self) -> float:
+        return self.rx_spacing_wavelengths * self.start_wavelength_m / self.wavelength_m
+
+    # -- schedule and velocity (derived) -----------------------------------------------------------
+
+    @property
+    def at_once(self) -> bool:
+        """Whether all Tx transmit at once."""
+        return self.multiplexing != "tdm"
+
+    @property
+    def cycle_duration_s(self) -> float:
+        """Time until the same Tx transmits again [s]: all chirps of a cycle under TDM, else one."""
+        return self.chirp_duration_s if self.at_once else self.n_tx * self.chirp_duration_s
+
+    @property
+    def chirp_interval_s(self) -> float:
+        """Mean time from one chirp to the next, counted over all Tx [s]."""
+        return self.chirp_duration_s / self.n_tx if self.at_once else self.chirp_duration_s
+
+    @cached_property
+    def tx_delay_s(self) -> NDArray[np.float64]:
+        """Delay of each Tx after the first Tx of a cycle, (tx,) [s]."""
+        step_s = 0.0 if self.at_once else self.chirp_duration_s
+        return np.arange(self.n_tx, dtype=np.float64) * step_s
+
+    @cached_property
+    def tx_offset_hz(self) -> NDArray[np.float64]:
+        """Height of the sweep of each Tx above `start_frequency_hz`, (tx,) [Hz]; the mean is 0."""
+        if self.multiplexing != "fdm":
+            return np.zeros(self.n_tx)
+        step = self.sample_rate_hz if self.carrier_step_hz is None else self.carrier_step_hz
+        return np.asarray((np.arange(self.n_tx) - (self.n_tx - 1) / 2) * step)
+
+    @property
+    def occupied_bandwidth_hz(self) -> float:
+        """Width from the lowest to the highest frequency transmitted [Hz]; larger under FDM."""
+        return self.bandwidth_hz + float(np.ptp(self.tx_offset_hz))
+
+    @property
+    def receiver_rate_hz(self) -> float:
+        """Complex sample rate of a receiver before it separates the bands of FDM [Hz].
+
+        Without FDM it is the `sample_rate_hz`.
+        """
+        return self.sample_rate_hz + float(np.ptp(self.tx_offset_hz))
+
+    @property
+    def n_doppler_bands(self) -> int:
+        """Number of bands of the Doppler axis under DDM, else 1."""
+        if self.multiplexing != "ddm":
+            return 1
+        default = self.n_tx + math.ceil(self.n_tx / 3)
+        return default if self.doppler_bands is None else self.doppler_bands
+
+    @property
+    def cycles_per_frame(self) -> int:
+        """Number of whole cycles in one frame (133 of the paper's 133.3).
+
+        Under DDM it is a multiple of `n_doppler_bands`.
+        """
+        cycles = math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
+        return cycles - cycles % self.n_doppler_bands
+
+    @property
+    def hop_cycles(self) -> float:
+        """Number of cycles from one frame to the next, not rounded, and at least 1."""
+        return max(1.0, self.frame_hop_s / self.cycle_duration_s)
+
+    @property
+    def chirps_per_frame(self) -> int:
+        """Number of chirps in the whole cycles of one frame."""
+        return self.cycles_per_frame * self.n_tx
+
+    def tx_of_chirp(self, chirp: NDArray[np.integer]) -> NDArray[np.int64]:
+        """Find the transmitter of each chirp; equation :eq:`tdm` of the theory page.
+
+        Parameters
+        ----------
+        chirp : (chirp,) int
+            Numbers of chirps, from 0 at the start of the capture.
+
+        Returns
+        -------
+        (chirp,) int64
+            Index into `tx`.
+        """
+        return np.asarray(chirp, dtype=np.int64) % self.n_tx
+
+    def chirp_times(self, n: int, first: int = 0) -> NDArray[np.float64]:
+        """Give the centres of ``n`` successive chirps; equation :eq:`tdm` of the theory page.
+
+        Parameters
+        ----------
+        n : int
+            Number of chirps.
+        first : int
+            Number of the first chirp.
+
+        Returns
+        -------
+        (chirp,) float64
+            Time since the start of the capture [s].
+        """
+        return self.centres_of(np.arange(first, first + n))
+
+    def centres_of(self, chirps: NDArray[np.integer]) -> NDArray[np.float64]:
+        """Give the centres of some chirps.
+
+        Parameters
+        ----------
+        chirps : (chirp,) int
+            Numbers of chirps, from 0 at the start of the capture.
+
+        Returns
+        -------
+        (chirp,) float64
+            Time since the start of the capture [s].
+        """
+        slots = np.asarray(chirps) // self.n_tx if self.at_once else np.asarray(chirps)
+        return np.asarray((slots + 0.5) * self.chirp_duration_s, dtype=np.float64)
+
+    def window_starts(self, n_chirps: int) -> NDArray[np.int64]:
+        """Find the first cycle of each frame in a capture of ``n_chirps``.
+
+        A frame starts at the cycle boundary nearest to a multiple of ``frame_hop_s`` and holds
+        ``cycles_per_frame``.
+
+        Parameters
+        ----------
+        n_chirps : int
+            Number of chirps in the capture.
+
+        Returns
+        -------
+        (window,) int64
+            Numbers of cycles; empty where the capture is shorter than one frame.
+        """
+        last = n_chirps // self.n_tx - self.cycles_per_frame
+        if last < 0:
+            return np.zeros(0, dtype=np.int64)
+        candidates = np.arange(math.floor((last + 0.5) / self.hop_cycles) + 1)
+        starts = np.rint(candidates * self.hop_cycles).astype(np.int64)
+        return np.unique(starts[starts <= last])
+
+    def window_times(self, starts: NDArray[np.int64]) -> NDArray[np.float64]:
+        """Give the centres of frames.
+
+        Parameters
+        ----------
+        starts : (window,) int
+            First cycle of each frame, as `window_starts` gives them.
+
+        Returns
+        -------
+        (window,) float64
+            Time since the start of the capture [s].
+        """
+        centres = np.asarray(starts) + self.cycles_per_frame / 2
+        return np.asarray(centres * self.cycle_duration_s, dtype=np.float64)
+
+    @property
+    def max_velocity_mps(self) -> float:
+        """Unambiguous velocity, lambda / (4 cycle), at the sweep centre [m/s] (paper, eq. 3).
+
+        Equation :eq:`doppler-axis` of the theory page.
+        """
+        return self.wavelength_m / (4 * self.cycle_duration_s)
+
+    @property
+    def velocity_bin_mps(self) -> float:
+        """Velocity resolution and width of one Doppler bin at the sweep centre [m/s].
+
+        The paper's eq. 4, and equation :eq:`doppler-axis` of the theory page.
+        """
+        return self.wavelength_m / (2 * self.cycles_per_frame * self.cycle_duration_s)
+
+    def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
+        """Give the velocity of each Doppler bin, ascending, zero at index ``n_cycles // 2``.
+
+        Parameters
+        ----------
+        n_cycles : int
+            Number of cycles in the frame that is transformed.
+
+        Returns
+        -------
+        (velocity,) float64
+            Velocity [m/s].
+        """
+        bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
+        return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))
+
+    # -- powers (derived) --------------------------------------------------------------------------
+
     @property
     def watts_per_m2(self) -> float:
-        r"""P_t G_t G_r lambda^2 / (4 pi)^3: what turns \|amplitude\|^2 [m^2] into received power [W]; `conventions` has the rest.
+        r"""Received power [W] of an echo with \|amplitude\|^2 = 1 m^2.
+
+        P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest.
 
         Raises
         ------
@@ -189,27 +521,21 @@ class Radar(Schedule):
         """
         if self.transmit_power_dbm is None:
             raise InputError(
-                f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are not known; give it"
+                f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are "
+                "not known; give it"
             )
-        gains = math.prod(
-            antenna.peak_gain
-            for antenna in (self.tx_antenna, self.rx_antenna)
-            if antenna is not None
-        )
-        return float(
-            1e-3
-            * 10 ** (self.transmit_power_dbm / 10)
-            * gains
-            * self.wavelength_m**2
-            / (4 * math.pi) ** 3
-        )
+        antennas = (self.tx_antenna, self.rx_antenna)
+        gains = math.prod(antenna.peak_gain for antenna in antennas if antenna is not None)
+        power_w = 1e-3 * 10 ** (self.transmit_power_dbm / 10)
+        return float(power_w * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
 
     @property
     def noise_power_w(self) -> float:
-        """K (T + 290 K (F - 1)) B of one complex IF sample [W].
+        """Noise power of one complex IF sample, K (T + 290 K (F - 1)) B [W].
 
-        T is the `noise_temperature_k` of what the antennas see, F the noise factor and B the sample rate. Noise factors are
-        defined for a source at 290 K, so the receiver itself adds the noise of 290 K (F - 1), whatever the antennas see.
+        T is the `noise_temperature_k` of what the antennas see, F the noise factor and B the sample
+        rate. Noise factors are defined for a source at 290 K, so the receiver itself adds the noise
+        of 290 K (F - 1), whatever the antennas see.
 
         Raises
         ------
@@ -218,7 +544,8 @@ class Radar(Schedule):
         """
         if self.noise_figure_db is None:
             raise InputError(
-                f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; give it"
+                f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; "
+                "give it"
             )
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
         return float(
