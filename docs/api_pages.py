@@ -11,20 +11,33 @@ from types import ModuleType
 PACKAGES = {
     "rtradar": "What most need",
     "rtradar.motion": "Motion",
-    "rtradar.body": "Bodies",
-    "rtradar.rcs": "Closed forms",
+    "rtradar.radar": "Radars",
     "rtradar.scene": "Scenes",
+    "rtradar.pipeline": "Runs",
+    "rtradar.clouds": "Point clouds",
+    "rtradar.report": "Pictures and pages",
+    "rtradar.exchange": "For other tools, and back",
+    "rtradar.campaign": "Data sets",
+    "rtradar.classify": "Classifiers",
+    "rtradar.body": "Bodies",
     "rtradar.scatter": "Echo models",
     "rtradar.signal": "Signals",
     "rtradar.process": "Processing",
-    "rtradar.clouds": "Point clouds",
-    "rtradar.classify": "Classifiers",
-    "rtradar.campaign": "Data sets",
-    "rtradar.pipeline": "The whole chain",
-    "rtradar.exchange": "For other tools, and back",
-    "rtradar.report": "Pictures and pages",
+    "rtradar.rcs": "Closed forms",
 }
-"""Packages with a page, in the order of the data flow, and their titles."""
+"""Packages with a page, and their titles: motion, radar, scene, run, results, and the pieces that a run is made of."""
+
+FIRST_PAGE = {
+    "Motion": ("load_motion", "synthetic_motion", "Motion"),
+    "Radar": ("Radar", "Antenna"),
+    "Scene": ("Scene",),
+    "Run": ("run", "compare"),
+    "Results": ("Result", "Comparison"),
+    "Pieces of a run": ("Body", "Ellipsoids", "Echoes", "scattering_length"),
+    "Extensions": ("register_reader", "register_radar", "register_model", "register_detector"),
+    "Errors and warnings": ("InputError", "BackendError", "ExtensionError", "ValidityWarning"),
+}
+"""Sections of the page of ``rtradar``; a name that none of them has comes at the end."""
 
 
 def public(package: str) -> dict[str, object]:
@@ -44,9 +57,18 @@ def page(package: str) -> str:
             "Also here: " + ", ".join(f":py:obj:`rtradar.{name}`" for name in again) + ".",
             "",
         ]
-    for name, thing in public(package).items():
+    things = public(package)
+    sections = FIRST_PAGE if package == "rtradar" else {}
+    place = {name: title for title, names in sections.items() for name in names}
+    order = [name for name in place if name in things]
+    title = ""
+    for name in [*order, *(name for name in things if name not in place)]:
+        thing = things[name]
         if id(thing) in first:
             continue
+        if sections and place.get(name, "Others") != title:
+            title = place.get(name, "Others")
+            lines += [title, "-" * len(title), ""]
         kind = (
             "class"
             if inspect.isclass(thing)

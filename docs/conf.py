@@ -15,6 +15,7 @@ HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
 
 import api_pages  # noqa: E402
+import code_tables  # noqa: E402
 
 import rtradar  # noqa: E402
 
@@ -66,6 +67,7 @@ def displayed_math(page: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Teach Sphinx MathML, and write the pages of the API from what is public."""
+    """Teach Sphinx MathML and tables from the code, and write the API's pages from what is public."""
+    app.add_directive("from-code", code_tables.CodeTable)
     app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))
     app.connect("builder-inited", lambda app: api_pages.write(Path(app.srcdir) / "api"))

@@ -1,0 +1,181 @@
+"""Tables of the pages that follow from the code: a page names one, and Sphinx writes it at each build."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+import re
+import tomllib
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import numpy as np
+from docutils import nodes
+from docutils.parsers.rst import Directive
+from docutils.statemachine import StringList
+
+from rtradar.antenna import Antenna
+from rtradar.campaign.spec import DRAWN
+from rtradar.radar import Radar
+from rtradar.scene import MATERIALS, Furniture, material
+
+SCENES = Path(__file__).parents[1] / "scenes"
+MESHES = Path(__file__).parents[1] / "meshes"
+PAPER = {
+    "max_range_m": ("largest range", "9.6 m", "{:.3f} m"),
+    "range_bin_m": ("range bin", "0.0375 m", "{:.5f} m"),
+    "max_velocity_mps": ("unambiguous velocity", "8.33 m/s", "{:.3f} m/s"),
+    "velocity_bin_mps": ("velocity bin", "0.125 m/s", "{:.4f} m/s"),
+    "max_angle_deg": ("unambiguous angle", "±90°", "±{:.1f}°"),
+    "angle_resolution_deg": (
+        "beam width (-3 dB) of a uniform line, far field",
+        "2.38°",
+        "{:.2f}°",
+    ),
+}
+"""Limits of a radar: their names, what the paper's Table 2 says of its 12 GHz radar, and how they are written here."""
+
+
+def pipe_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
+    """A table in Markdown; rows are of one length."""
+    lines = [list(head), *map(list, rows)]
+    lines.insert(1, ["---"] * len(lines[0]))
+    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
+
+
+def described(text: str) -> Iterable[tuple[list[str], str, str]]:
+    """Names, type and meaning of each entry under Parameters of a numpydoc docstring."""
+    section = re.search(r"^Parameters\n-+\n(.*?)(?=^\w+\n-+\n|\Z)", text, re.M | re.S)
+    entries = re.split(r"^(?=\S)", section[1] if section else "", flags=re.M)
+    for entry in filter(str.strip, entries):
+        first, *rest = entry.strip().splitlines()
+        names, _, kind = first.partition(" : ")
+        yield [name.strip() for name in names.split(",")], kind, " ".join(map(str.strip, rest))
+
+
+def keys(thing: type) -> str:
+    """Keys of the TOML table that makes a dataclass, by its docstring and the defaults of its fields."""
+    defaults = {field.name: field.default for field in dataclasses.fields(thing)}
+    rows = []
+    for names, kind, meaning in described(inspect.getdoc(thing) or ""):
+        values = ["" if defaults[name] in (None, ()) else toml(defaults[name]) for name in names]
+        rows.append(
+            [
+                ", ".join(f"`{name}`" for name in names),
+                kind.removesuffix(", optional").replace("|", r"\|"),
+                meaning,
+                values[0] if len(set(values)) == 1 else ", ".join(values),
+            ]
+        )
+    return pipe_table(["key", "type", "meaning", "default"], rows)
+
+
+def toml(value: object) -> str:
+    """A default as a TOML file has it."""
+    if isinstance(value, str):
+        return f'`"{value}"`'
+    if isinstance(value, tuple):
+        return f"`{list(value)}`"
+    number = float(str(value))
+    power = 3 * int(np.floor(np.log10(number) / 3)) if number > 0 else 0
+    return f"`{number:g}`" if "e" not in f"{number:g}" else f"`{number / 10.0**power:g}e{power}`"
+
+
+def radar_limits() -> str:
+    """What follows from the paper's radars, beside what the paper states."""
+    radars = {name: Radar.preset(name) for name in ("paper-12ghz", "paper-77ghz")}
+    rows = [
+        [name, paper, *(shown.format(getattr(radar, field)) for radar in radars.values())]
+        for field, (name, paper, shown) in PAPER.items()
+    ]
+    return pipe_table(["limit", "paper", *(f"`{name}`" for name in radars)], rows)
+
+
+def materials() -> str:
+    """Constants of all materials; of those that are no power law, the frequencies alone."""
+    rows = []
+    for name, known in MATERIALS.items():
+        for number, band in enumerate(known.bands):
+            low, high = (f"{frequency / 1e9:g}" for frequency in (band.low_hz, band.high_hz))
+            constants = [f"{getattr(band, key):g}" if hasattr(band, key) else "" for key in "abcd"]
+            rows.append(
+                [
+                    "" if number else f"`{name}`",
+                    f"{low} to {high}" if np.isfinite(band.high_hz) else "all",
+                    *constants,
+                ]
+            )
+    return pipe_table(["material", "band [GHz]", "a", "b", "c", "d"], rows)
+
+
+def meshes() -> str:
+    """Sizes of the meshes that come along."""
+    rows = []
+    for path in sorted(MESHES.glob("*.ply")):
+        piece = Furniture(
+            name=path.stem,
+            mesh=path.stem,
+            material=material("metal"),
+            position_m=(0.0, 0.0, 0.0),
+        ).triangles()
+        size = np.ptp(piece.vertices, axis=0)
+        rows.append(
+            [
+                f"`{path.stem}`",
+                " × ".join(f"{length:.2f}" for length in size),
+                str(len(piece.faces)),
+                "closed" if piece.closed else "open sheet",
+            ]
+        )
+    return pipe_table(["mesh", "along x, y, z [m]", "triangles", "kind"], rows)
+
+
+def scenes() -> str:
+    """Scenes that come along."""
+    rows = []
+    for path in sorted(SCENES.glob("*.toml")):
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+        size = table.get("room", {}).get("size_m")
+        place = table.get("radar", {}).get("position_m")
+        rows.append(
+            [
+                f"`{path.stem}`",
+                " × ".join(f"{length:g}" for length in size) if size else "none",
+                re.sub(r"^[\d. by]+m, ", "", table["description"]),
+                f"({', '.join(f'{x:g}' for x in place)})" if place else "where the radar says",
+            ]
+        )
+    return pipe_table(["name", "size [m]", "what is in it", "radar at [m]"], rows)
+
+
+def drawn() -> str:
+    """Ranges of what a data set draws."""
+    rows = [
+        [f"`{name}`", f"{low:g} to {high:g}", f"{least:g} to {most:g}"]
+        for name, ((low, high), least, most) in DRAWN.items()
+    ]
+    return pipe_table(["name under `[drawn]`", "range if left out", "allowed"], rows)
+
+
+TABLES: dict[str, Callable[[], str]] = {
+    "radar-keys": lambda: keys(Radar),
+    "antenna-keys": lambda: keys(Antenna),
+    "radar-limits": radar_limits,
+    "materials": materials,
+    "meshes": meshes,
+    "scenes": scenes,
+    "drawn": drawn,
+}
+
+
+class CodeTable(Directive):
+    """The table of that name."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Write it in Markdown, and let the page's parser read it."""
+        node = nodes.container()
+        lines = TABLES[self.arguments[0]]().splitlines()
+        self.state.nested_parse(StringList(lines, source=__file__), self.content_offset, node)
+        return node.children

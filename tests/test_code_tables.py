@@ -1,0 +1,114 @@
+"""Tables of the pages: those that follow from the code are complete, and those typed by hand have the keys of the code."""
+
+from __future__ import annotations
+
+import dataclasses
+import re
+import runpy
+from pathlib import Path
+
+import pytest
+
+import rtradar as rt
+from rtradar.campaign.spec_file import read_spec
+from rtradar.errors import InputError
+
+pytest.importorskip("docutils", reason="pages are built by what the extra docs brings")
+
+ROOT = Path(__file__).parents[1]
+TABLES = runpy.run_path(str(ROOT / "docs" / "code_tables.py"))["TABLES"]
+SURFACE = 'material = "wood"\nthickness_m = 0.1\n'
+ROOM = f"[room]\nsize_m = [4, 4, 3]\ncorner_m = [0, 0]\n[room.walls]\n{SURFACE}"
+SCENE = {
+    "": "",
+    "[radar]": "[radar]\n",
+    "[person]": "[person]\n",
+    "[room]": "[room]\n",
+    "a side of a room": ROOM,
+    "[[walls]]": "[[walls]]\n",
+    "[[furniture]]": "[[furniture]]\n",
+    "[materials.NAME]": "[materials.mine]\n",
+}
+DATA_SET = {
+    "": "",
+    "[windows]": "[windows]\n",
+    "[each]": "[each]\n",
+    "[drawn]": "[drawn]\n",
+    "[[synthetic]]": "[windows]\nduration_s = 1\n[[synthetic]]\n",
+    "[[recordings]]": "[[recordings]]\n",
+}
+
+
+def page(name: str) -> str:
+    return (ROOT / "docs" / name).read_text(encoding="utf-8")
+
+
+def first_column(table: str) -> list[str]:
+    return [
+        name
+        for line in table.splitlines()[2:]
+        for name in re.findall(r"`([^`]+)`", line.split("|")[1])
+    ]
+
+
+def test_every_table_is_on_a_page_and_no_page_asks_for_another() -> None:
+    used = re.findall(
+        r"\{from-code\} (\S+)", "".join(map(page, ("radar.md", "scenes.md", "data-sets.md")))
+    )
+    assert sorted(used) == sorted(TABLES)
+
+
+def test_tables_from_the_code_are_complete() -> None:
+    keys = [field.name for field in dataclasses.fields(rt.Radar)]
+    assert sorted(first_column(TABLES["radar-keys"]())) == sorted(keys)
+    keys = [field.name for field in dataclasses.fields(rt.Antenna)]
+    assert sorted(first_column(TABLES["antenna-keys"]())) == sorted(keys)
+    assert first_column(TABLES["meshes"]()) == sorted(
+        path.stem for path in (ROOT / "meshes").glob("*.ply")
+    )
+    assert {"concrete", "skin", "perfect-conductor"} <= set(first_column(TABLES["materials"]()))
+    assert "| `paper-12ghz` |" in TABLES["radar-limits"]()
+
+
+def allowed(read, text: str, path: Path) -> set[str]:  # type: ignore[no-untyped-def]
+    """Keys of the last table of a file, as the message about an unknown one lists them."""
+    path.write_text(f"{text}no_such_key = 1\n")
+    with pytest.raises(InputError, match="unknown key 'no_such_key'; allowed: ") as caught:
+        read(path)
+    return set(str(caught.value).rpartition("allowed: ")[2].split(", "))
+
+
+def rows(name: str) -> dict[str, set[str]]:
+    """Keys by table, of the page's table of keys; an empty cell is that of the row before."""
+    found: dict[str, set[str]] = {}
+    table = ""
+    for line in page(name).split("| table | key |")[1].split("\n\n")[0].splitlines()[2:]:
+        cells = line.split(" | ")
+        table = cells[0].strip("| `") or table
+        found.setdefault(table.replace("`", ""), set()).update(re.findall(r"`([^`]+)`", cells[1]))
+    return found
+
+
+@pytest.mark.parametrize("table", [table for table in SCENE if table])
+def test_every_key_of_a_scene_file_is_on_its_page(table: str, tmp_path: Path) -> None:
+    sides = {"walls", "near", "far", "left", "right", "floor", "ceiling"}  # tables of their own
+    keys = allowed(rt.Scene.load, SCENE[table], tmp_path / "scene.toml")
+    assert rows("scenes.md")[table] == keys - (sides if table == "[room]" else set())
+
+
+@pytest.mark.parametrize("table", [table for table in DATA_SET if table not in ("", "[drawn]")])
+def test_every_key_of_a_data_set_is_on_its_page(table: str, tmp_path: Path) -> None:
+    keys = allowed(read_spec, DATA_SET[table], tmp_path / "data.toml")
+    assert rows("data-sets.md")[table] == keys
+
+
+def test_every_key_at_the_top_is_on_its_page(tmp_path: Path) -> None:
+    for name, read in (("scenes.md", rt.Scene.load), ("data-sets.md", read_spec)):
+        keys = allowed(read, "", tmp_path / "top.toml")
+        tables = {re.split(r"[.\]]", table.strip("["))[0] for table in rows(name)}
+        assert rows(name)["top"] <= keys <= rows(name)["top"] | tables, name
+
+
+def test_every_name_that_is_drawn_is_on_its_page(tmp_path: Path) -> None:
+    keys = allowed(read_spec, DATA_SET["[drawn]"], tmp_path / "data.toml")
+    assert set(first_column(TABLES["drawn"]())) == keys
