@@ -178,7 +178,7 @@ def wall_rows(quick: bool) -> Iterator[Row]:
         )
         (own,) = Clutter(radar, rt.Scene(walls=(wall,)), order=1).objects
         frequency = np.linspace(12.05e9, 15.95e9, 9 if quick else 14)
-        ours = own.at_nodes(frequency, radar)[..., 0]
+        ours = own.at_nodes(frequency)[..., 0]
         worst, single = 0.0, 0.0
         for tx, rx in ((0, 0), (0, 1), (1, 0)):
             exact = np.array(

@@ -18,8 +18,8 @@ from rtradar.scatter.clutter.returns import (
     FURNITURE_NODES,
     MOST_NODES,
     RoomEchoes,
-    sweep_nodes,
 )
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_interaction import (
     Series,
@@ -82,7 +82,7 @@ def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     if not behind.any():
         return returns
     nodes = sweep_nodes(radar, FURNITURE_NODES)
-    returns = replace(returns, amplitude=returns.at_nodes(nodes, radar), frequency=nodes)
+    returns = replace(returns, amplitude=returns.at_nodes(nodes), frequency=nodes)
     parts, off = _transmitted(returns.take(behind), radar, scene)
     parts = [returns.take(~behind), *parts]
     whole = replace(

@@ -25,7 +25,8 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.behind_walls import behind_walls
 from rtradar.scatter.clutter.facet_groups import FacetGroups, PathGroups
-from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes, sweep_nodes
+from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid

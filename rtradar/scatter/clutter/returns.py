@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.polynomial.chebyshev import chebvander
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
+from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
 
 Array = NDArray[np.float64]
 Kind = Literal["mirror", "furniture", "reflector", "rough"]
@@ -109,19 +109,18 @@ class RoomEchoes:
         near = (self.length < 2 * radar.max_range_m) & (self.amplitude != 0).any(axis=0)
         return self.take(near.any(axis=(0, 1)))
 
-    def at_nodes(self, frequency: Array, radar: Radar) -> NDArray[np.complex128]:
+    def at_nodes(self, frequency: Array) -> NDArray[np.complex128]:
         """Amplitudes (node, tx, rx, echo) of the polynomial at other frequencies (node,) [Hz]."""
-        return np.asarray(
-            np.tensordot(_weights(self.frequency, frequency, radar), self.amplitude, axes=1)
-        )
+        weights = interpolation_weights(self.frequency, frequency)
+        return np.asarray(np.tensordot(weights, self.amplitude, axes=1))
 
     def with_fewest_nodes(self, radar: Radar, error: float = FREQUENCY_ERROR) -> RoomEchoes:
         """With the fewest frequency nodes that keep the amplitudes within this of the strongest; see ``off_m``."""
         largest = np.abs(self.amplitude).max(initial=0.0)
         for count in _NODES:
             nodes = sweep_nodes(radar, count)
-            fewer = self.at_nodes(nodes, radar)
-            again = np.tensordot(_weights(nodes, self.frequency, radar), fewer, axes=1)
+            fewer = self.at_nodes(nodes)
+            again = np.tensordot(interpolation_weights(nodes, self.frequency), fewer, axes=1)
             off = float(np.abs(again - self.amplitude).max(initial=0.0))
             if off <= error * largest:
                 return replace(self, amplitude=fewer, frequency=nodes, off_m=0.0)
@@ -137,17 +136,3 @@ def best_followed(ways: Iterable[Callable[[], RoomEchoes | None]]) -> RoomEchoes
             return found
         best = found if best is None or found.off_m < best.off_m else best
     return best
-
-
-def sweep_nodes(radar: Radar, count: int) -> Array:
-    """Frequencies (node,) at the zeros of a Chebyshev polynomial over the sweep, ascending [Hz]."""
-    x = -np.cos(np.pi * (np.arange(count) + 0.5) / count)
-    return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * x)
-
-
-def _weights(nodes: Array, places: Array, radar: Radar) -> Array:
-    """Weights (place, node) of values at nodes in the polynomial through them; Chebyshev's keep all digits."""
-    x, y = (2 * (f - radar.centre_frequency_hz) / radar.bandwidth_hz for f in (nodes, places))
-    return np.asarray(
-        np.linalg.solve(chebvander(x, len(nodes) - 1).T, chebvander(y, len(nodes) - 1).T).T
-    )

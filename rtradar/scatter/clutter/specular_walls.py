@@ -26,8 +26,8 @@ from rtradar.scatter.clutter.returns import (
     FREQUENCY_ERROR,
     RoomEchoes,
     best_followed,
-    sweep_nodes,
 )
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.multipath.slab_series import whole_walls
 from rtradar.scatter.multipath.wall_interaction import (
     Series,

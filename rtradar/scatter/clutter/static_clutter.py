@@ -21,8 +21,9 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.diffuse import rough_returns
 from rtradar.scatter.clutter.furniture import furniture_returns
-from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes, sweep_nodes
+from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes
 from rtradar.scatter.clutter.specular_walls import mirror_returns
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
@@ -195,7 +196,7 @@ class Clutter:
             self.radar, max((len(own.frequency) for own in self.objects), default=1)
         )
         shape = (self.radar.n_tx, self.radar.n_rx, 0)
-        amplitudes = [own.at_nodes(frequency, self.radar) for own in self.objects]
+        amplitudes = [own.at_nodes(frequency) for own in self.objects]
         return Echoes(
             length=np.concatenate(
                 [np.empty(shape), *(own.length for own in self.objects)], axis=-1

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from rtradar.radar import Radar
+from rtradar.scatter.common.nodes import interpolation_weights
 
 
 class ArrayNodes(NamedTuple):
@@ -68,8 +69,8 @@ def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
         )
         places.append(np.stack([np.repeat(tx, len(rx), axis=0), np.tile(rx, (len(tx), 1))], axis=1))
         own = np.kron(
-            _lagrange(block.tx_nodes, _evenly(len(block.tx))),
-            _lagrange(block.rx_nodes, _evenly(len(block.rx))),
+            interpolation_weights(block.tx_nodes, _evenly(len(block.tx))),
+            interpolation_weights(block.rx_nodes, _evenly(len(block.rx))),
         )
         count = own.shape[1]
         weights[np.ix_(block.tx, block.rx, np.arange(done, done + count))] = own.reshape(
@@ -87,7 +88,10 @@ def spread_nodes(radar: Radar, few: tuple[int, int], many: tuple[int, int]) -> N
     return np.asarray(
         block_diag(
             *(
-                np.kron(_lagrange(a.tx_nodes, b.tx_nodes), _lagrange(a.rx_nodes, b.rx_nodes))
+                np.kron(
+                    interpolation_weights(a.tx_nodes, b.tx_nodes),
+                    interpolation_weights(a.rx_nodes, b.rx_nodes),
+                )
                 for a, b in blocks
             )
         )
@@ -96,12 +100,3 @@ def spread_nodes(radar: Radar, few: tuple[int, int], many: tuple[int, int]) -> N
 
 def _evenly(count: int) -> NDArray[np.float64]:
     return np.linspace(0, 1, count) if count > 1 else np.array([0.5])
-
-
-def _lagrange(nodes: NDArray[np.float64], places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Lagrange's weights (place, node)."""
-    weights = np.ones((len(places), len(nodes)))
-    for node, at in enumerate(nodes):
-        for other in np.delete(nodes, node):
-            weights[:, node] *= (places - other) / (at - other)
-    return weights

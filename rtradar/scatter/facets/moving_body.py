@@ -8,18 +8,13 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.facets.integral import facet_integral
 from rtradar.scatter.facets.shadows import FacetShadows, Shares
 from rtradar.scatter.facets.surfaces import body_facets, ellipsoid_facets, subdivisions_for
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.facet_visibility import FacetTracer
-
-
-def frequency_nodes(radar: Radar, count: int) -> NDArray[np.float64]:
-    """Frequencies of the sweep (node,) [Hz], Chebyshev's: the polynomial through them serves all of it best."""
-    angles = np.pi * (2 * np.arange(count)[::-1] + 1) / (2 * count)
-    return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * np.cos(angles))
 
 
 class FacetBody:
@@ -59,7 +54,7 @@ class FacetBody:
         self._radar, self._semi_axes, self._spreading = radar, body.semi_axes, spreading
         count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
         self._facets = ellipsoid_facets(body.semi_axes, subdivisions_for(count))
-        self.frequency = frequency_nodes(radar, nodes)
+        self.frequency = sweep_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind
         self._shadows = FacetShadows(

@@ -15,6 +15,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
+from rtradar.scatter.common.nodes import interpolation_weights
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
 from rtradar.scatter.models.analytic import far_field_echo
@@ -29,7 +30,7 @@ from rtradar.scatter.models.auto_errors import (
     forecast,
 )
 from rtradar.scatter.models.auto_plan import choose
-from rtradar.scatter.models.fresnel import sweep_nodes
+from rtradar.scatter.models.fresnel import zone_nodes
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
 from rtradar.scatter.specular_point.solver import mirror
@@ -283,7 +284,7 @@ class Auto:
                 values *= self._specular_points.at(chirps, parts)[0]
         values = values[None]
         if way == FRESNEL and cut[parts].any():
-            frequency = sweep_nodes(self._radar)
+            frequency = zone_nodes(self._radar)
             values = values * self._zones.at(chirps, parts).conj()
         return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
 
@@ -297,7 +298,7 @@ class Auto:
 
     @cached_property
     def _zones(self) -> ZoneShares:
-        return ZoneShares(self._radar, self._body, sweep_nodes(self._radar), self._occluders)
+        return ZoneShares(self._radar, self._body, zone_nodes(self._radar), self._occluders)
 
     @cached_property
     def _physical_optics(self) -> EchoModel:
@@ -324,7 +325,5 @@ def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inex
         return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
     if np.array_equal(echoes.frequency, frequency):
         return echoes.amplitude
-    middle, half = frequency.mean(), np.ptp(frequency) / 2
-    own = np.vander((echoes.frequency - middle) / half, increasing=True)
-    asked = np.vander((frequency - middle) / half, len(echoes.frequency), increasing=True)
-    return np.asarray(np.tensordot(asked @ np.linalg.inv(own), echoes.amplitude, axes=1))
+    weights = interpolation_weights(echoes.frequency, frequency)
+    return np.asarray(np.tensordot(weights, echoes.amplitude, axes=1))

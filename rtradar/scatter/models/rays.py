@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import barycentric_interpolate
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
@@ -162,18 +162,14 @@ class Rays:
             amplitudes.append(
                 sums
                 if len(nodes) == len(frequency)
-                else barycentric_interpolate(nodes, sums, frequency)
+                else np.tensordot(interpolation_weights(nodes, frequency), sums, axes=1)
             )
         return _Shot(np.concatenate(lengths, axis=-1), np.concatenate(amplitudes, axis=-1).conj())
 
     def _nodes(self, several_bounces: bool) -> Array:
         """Frequencies (node,) at the zeros of a Chebyshev polynomial over the sweep [Hz]."""
-        bandwidth = self._radar.bandwidth_hz
-        count = 3 + min(17, math.ceil(_NODES_PER_HZ[several_bounces] * bandwidth))
-        return (
-            self._radar.start_frequency_hz
-            + bandwidth * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count)) / 2
-        )
+        per_hz = _NODES_PER_HZ[several_bounces]
+        return sweep_nodes(self._radar, 3 + min(17, math.ceil(per_hz * self._radar.bandwidth_hz)))
 
 
 class _Shot(NamedTuple):

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
+from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
 from rtradar.scene import Material, Wall, slab
 from rtradar.scene.slab import Polarization, slab_passes
 
@@ -139,18 +140,12 @@ def room_series(
             known[key] = WallSeries((back, on), (one, other)), max(first, second)
         chosen.append(known[key][0])
         nodes = max(nodes, known[key][1])
-    return RoomSeries(tuple(chosen), chebyshev(radar, nodes))
+    return RoomSeries(tuple(chosen), sweep_nodes(radar, nodes))
 
 
 def whole_walls(walls: Sequence[Wall]) -> tuple[WallSeries, ...]:
     """Every coefficient as one term without a delay of its own."""
     return tuple(WallSeries(((WHOLE[0],), (WHOLE[1],)), (True, True)) for _ in walls)
-
-
-def chebyshev(radar: Radar, count: int) -> Array:
-    """Chebyshev nodes in the sweep, ascending (node,) [Hz]."""
-    place = -np.cos((np.arange(count) + 0.5) * math.pi / count)
-    return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * place)
 
 
 def _fewest(
@@ -159,7 +154,7 @@ def _fewest(
     """Terms, how many nodes they need, and whether they hold with ``most_nodes``."""
     if wall.material.conducts:
         return (WHOLE[passes],), 1, True
-    dense = chebyshev(radar, _DENSE_NODES)
+    dense = sweep_nodes(radar, _DENSE_NODES)
     index_squared = _index_squared(wall.material, radar)
     # Of both polarisations the stronger one, at each angle.
     whole = _products(wall, (WHOLE[passes],), dense, power)
@@ -174,9 +169,11 @@ def _fewest(
         exact = _products(wall, terms, dense, power)
 
         def off(count: int, terms: tuple[Term, ...] = terms, exact: Field = exact) -> float:
-            nodes = chebyshev(radar, count)
+            nodes = sweep_nodes(radar, count)
             known = np.einsum(
-                "fn,tnpc->tfpc", _through(nodes, dense), _products(wall, terms, nodes, power)
+                "fn,tnpc->tfpc",
+                interpolation_weights(nodes, dense),
+                _products(wall, terms, nodes, power),
             )
             return float((np.abs(known - exact).sum(axis=0).max(axis=(0, 1)) / scale).max())
 
@@ -222,13 +219,3 @@ def _index_squared(material: Material, radar: Radar) -> float:
     ends = radar.start_frequency_hz + np.array([0.0, radar.bandwidth_hz])
     phase = ends * np.sqrt(material.eta(ends)).real
     return max(float((phase[1] - phase[0]) / (ends[1] - ends[0])), 1.0) ** 2
-
-
-def _through(nodes: Array, dense: Array) -> Array:
-    """Values (dense, node) of the Lagrange polynomials of the nodes."""
-    others = ~np.eye(len(nodes), dtype=bool)
-    columns = [
-        np.prod((dense[:, None] - nodes[own]) / (nodes[i] - nodes[own]), axis=1)
-        for i, own in enumerate(others)
-    ]
-    return np.stack(columns, axis=1)

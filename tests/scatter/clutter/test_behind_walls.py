@@ -11,8 +11,8 @@ from rtradar.scatter.clutter.returns import (
     FREQUENCY_ERROR,
     FURNITURE_NODES,
     RoomEchoes,
-    sweep_nodes,
 )
+from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scene import Scene, Wall, material
 
 RADAR = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, position_m=(0.0, 0.0, 1.0))
@@ -52,7 +52,7 @@ def test_what_has_no_wall_before_it_keeps_its_frequency_response(
     found = behind_walls(returns, RADAR, pane(name, thickness_m))
     own = np.isclose(found.points[0, 0, :, 0, 1], -1.0)
     assert own.sum() == 1
-    kept = found.take(own).at_nodes(nodes, RADAR)
+    kept = found.take(own).at_nodes(nodes)
     np.testing.assert_allclose(
         kept, returns.amplitude[..., :1], atol=FREQUENCY_ERROR * np.abs(response).max()
     )

@@ -32,9 +32,9 @@ def field(
 ) -> np.ndarray:
     """Conjugate of the scattering length relative to the path of that length, times R1 R2: (frequency, tx, rx)."""
     k = 2 * np.pi * frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
-    return (echoes.at_nodes(frequency, radar) * np.exp(1j * k * (echoes.length - to))).sum(
-        axis=-1
-    ) * (to / 2) ** 2
+    return (echoes.at_nodes(frequency) * np.exp(1j * k * (echoes.length - to))).sum(axis=-1) * (
+        to / 2
+    ) ** 2
 
 
 def block(

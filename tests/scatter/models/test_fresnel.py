@@ -19,7 +19,7 @@ from rtradar.scatter.fresnel_zones import keyframes as fresnel_anchors
 from rtradar.scatter.fresnel_zones.grid import RIM, zone_rays
 from rtradar.scatter.fresnel_zones.visible_fraction import zone_shares
 from rtradar.scatter.models import fresnel
-from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering, sweep_nodes
+from rtradar.scatter.models.fresnel import Fresnel, fresnel_scattering, zone_nodes
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.specular_point.solver import mirror
 from rtradar.trace.backends.backend import Backend
@@ -294,7 +294,7 @@ def test_extremes_stay_numbers(axes: tuple[float, float, float], frequency: floa
 
 
 def test_a_wide_sweep_takes_three_nodes_and_a_narrow_one_its_middle() -> None:
-    wide, narrow = (sweep_nodes(Radar.preset(name)) for name in ("paper-12ghz", "paper-77ghz"))
+    wide, narrow = (zone_nodes(Radar.preset(name)) for name in ("paper-12ghz", "paper-77ghz"))
     np.testing.assert_allclose(
         wide, [14e9 - np.sqrt(3) * 1e9, 14e9, 14e9 + np.sqrt(3) * 1e9], rtol=1e-12
     )
