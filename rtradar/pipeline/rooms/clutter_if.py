@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
+from rtradar.kernels.blends import smoothstep
 from rtradar.kernels.jit import compiled
-from rtradar.scatter.clutter.body_shadow import ClutterShadow, Hidden, smooth
+from rtradar.scatter.clutter.body_shadow import ClutterShadow, Hidden
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.signal import synthesize
 
@@ -134,7 +135,7 @@ class RoomIf:
         anchors = chirps // step
         for anchor in np.unique(anchors).tolist():
             inside = np.flatnonzero(anchors == anchor)
-            share = smooth(chirps[inside] - anchor * step, step)
+            share = smoothstep((chirps[inside] - anchor * step) / step)
             before = self._hidden(anchor)
             after = self._hidden(anchor + 1) if (share > 0).any() else before
             kept, changed = (

@@ -11,8 +11,7 @@ smaller share of its two legs.
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from functools import lru_cache
+from functools import lru_cache, partial
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -20,8 +19,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.poses import anchor_step, chirp_poses
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -77,13 +78,13 @@ class ClutterShadow:
         self._ways = self._points - self._middle
         self._squares = np.maximum((self._ways**2).sum(axis=1), 1e-30)
         self._legs = _Legs.of(clutter, self.starts)
-        self._kept: OrderedDict[int, Hidden] = OrderedDict()
+        self._kept: FirstCome[int, Hidden] = FirstCome(0, _KEPT_ANCHORS)
 
     def hidden(self, anchor: int) -> Hidden:
         """What the body hides at an anchor, the pose of chirp ``anchor * step``."""
-        if anchor in self._kept:
-            self._kept.move_to_end(anchor)
-            return self._kept[anchor]
+        return self._kept.get(anchor, partial(self._trace, anchor))
+
+    def _trace(self, anchor: int) -> Hidden:
         at = chirp_poses(self._radar, self._body, np.array([anchor * self.step]))
         centres = at.centres[0]
         self._tracer.pose(centres, at.frames[0])
@@ -100,16 +101,13 @@ class ClutterShadow:
             met[: nodes * len(near)].reshape(nodes, -1),
             met[nodes * len(near) :].reshape(-1, SHADOW_RAYS),
         )
-        self._kept[anchor] = self._together(near, of_nodes, zone, of_zones.mean(axis=1))
-        if len(self._kept) > _KEPT_ANCHORS:
-            self._kept.popitem(last=False)
-        return self._kept[anchor]
+        return self._together(near, of_nodes, zone, of_zones.mean(axis=1))
 
     def weights(self, chirps: NDArray[np.int64]) -> Array:
         """What is left of each echo at these chirps, numbered from the start of the capture: (chirp, rx, echo) of all objects."""
         chirps = np.asarray(chirps, dtype=np.int64)
         anchors, tx = chirps // self.step, self._radar.tx_of_chirp(chirps)
-        share = smooth(chirps - anchors * self.step, self.step)
+        share = smoothstep((chirps - anchors * self.step) / self.step)
         out = np.ones((len(chirps), self._radar.n_rx, int(self.starts[-1])))
         for index, (anchor, line, after) in enumerate(
             zip(anchors.tolist(), tx.tolist(), share.tolist(), strict=True)
@@ -240,12 +238,6 @@ def _disc(count: int) -> Array:
     return np.sqrt((index + 0.5) / count)[:, None] * np.stack(
         [np.cos(angle), np.sin(angle)], axis=-1
     )
-
-
-def smooth(chirps: NDArray[np.int64], step: int) -> Array:
-    """How far (chirp,) a fade from one anchor to the next has come, so many chirps after the first: 0 to 1, level at both."""
-    share = np.asarray(chirps) / step
-    return np.asarray(share**2 * (3 - 2 * share))
 
 
 def _nodes(radar: Radar) -> tuple[Array, Array, Array]:

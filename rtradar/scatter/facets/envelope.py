@@ -257,16 +257,3 @@ def stretch(known, place):
     while not known[right]:
         right += 1
     return left, right
-
-
-@inlined()
-def hermite(place, left, right):
-    """Weights of the values at two places and of the slopes there in the cubic between them."""
-    step = right - left
-    t = (place - left) / step
-    return (
-        (1 + 2 * t) * (1 - t) ** 2,
-        t * t * (3 - 2 * t),
-        step * t * (1 - t) ** 2,
-        step * t * t * (t - 1),
-    )

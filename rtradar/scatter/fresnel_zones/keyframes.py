@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import array_nodes
@@ -238,10 +239,7 @@ def _blend(nodes, slopes, fine, where, spread, inside, out):
                     continue
                 width = 1 if fine[part] else last
                 first = min(int(where[i]), last - 1) if fine[part] else 0
-                x = (where[i] - first) / width
-                y = 1 - x
-                h0, h1 = y * y * (1 + 2 * x), x * x * (3 - 2 * x)
-                g0, g1 = x * y * y * width, -x * x * y * width
+                h0, h1, g0, g1 = hermite_weights((where[i] - first) / width, width)
                 for pair in range(pairs):
                     value[pair] = (
                         h0 * nodes[first, f, pair, part]

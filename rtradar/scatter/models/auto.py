@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights
@@ -208,7 +209,7 @@ class Auto:
         parts = np.arange(len(self._body.part_names))
         interval = chirps // self._step
         share = (chirps - interval * self._step) / self._step
-        share = (share**2 * (3 - 2 * share))[:, None]
+        share = smoothstep(share)[:, None]
         weights = np.zeros((len(WAYS), len(chirps), len(parts)))
         cut = np.zeros(len(parts), dtype=bool)
         for end, weight in ((interval, 1 - share), (interval + 1, share)):

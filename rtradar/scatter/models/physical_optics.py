@@ -12,6 +12,7 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import ArrayNodes, array_nodes, spread_nodes
@@ -21,7 +22,6 @@ from rtradar.scatter.facets.envelope import (
     TOGETHER,
     Envelope,
     Sample,
-    hermite,
     stretch,
     whole_echo,
 )
@@ -45,8 +45,8 @@ def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):
         for part in range(parts):
             left, right = stretch(known[:, part], place)
             ends[0, part], ends[1, part] = left, right
-            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite(
-                place, left, right
+            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite_weights(
+                (place - left) / (right - left), right - left
             )
         own = weights[tx[chirp]]
         value = np.empty(parts, dtype=np.complex128)

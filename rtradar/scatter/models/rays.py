@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections import OrderedDict
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,9 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.kernels.blends import hermite_weights
 from rtradar.radar import Radar
+from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
@@ -86,7 +88,7 @@ class Rays:
         self.variant: str | None = backend.kind
         self._surfaces = BodySurfaces(use(backend), body.semi_axes)
         self._posed: tuple[int, PosedGrid] | None = None
-        self._shots: OrderedDict[tuple[int, int], _Shot] = OrderedDict()
+        self._shots: FirstCome[tuple[int, int], _Shot] = FirstCome(0, _KEPT_SHOTS)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps: of each part one for each number of bounces, by the part of the last bounce."""
@@ -115,13 +117,7 @@ class Rays:
     def _shot(self, chirp: int, tx: int) -> _Shot:
         """What one Tx sends and every Rx hears in the pose of that chirp."""
         key = (chirp, tx)
-        if key in self._shots:
-            self._shots.move_to_end(key)
-        else:
-            self._shots[key] = self._shoot(chirp, tx)
-            if len(self._shots) > _KEPT_SHOTS:
-                self._shots.popitem(last=False)
-        return self._shots[key]
+        return self._shots.get(key, partial(self._shoot, chirp, tx))
 
     def _shoot(self, chirp: int, tx: int) -> _Shot:
         radar, axes = self._radar, self._body.semi_axes
@@ -181,13 +177,8 @@ class _Shot(NamedTuple):
 
 def _cubic(share: float) -> tuple[float, float, float, float]:
     """Weights of the anchors -1, 0, 1, 2 at ``share`` of the way from 0 to 1: Catmull and Rom's cubic, smooth at anchors."""
-    s, t = share, 1 - share
-    return (
-        -s * t * t / 2,
-        t * (1 + t * (4 - 3 * t)) / 2,
-        s * (1 + s * (4 - 3 * s)) / 2,
-        -t * s * s / 2,
-    )
+    h0, h1, g0, g1 = hermite_weights(share, 1)
+    return -g0 / 2, h0 - g1 / 2, h1 + g0 / 2, g1 / 2
 
 
 def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import prange
 
+from rtradar.kernels.blends import smoothstep
 from rtradar.kernels.jit import compiled
 
 
@@ -33,7 +34,7 @@ def weigh(
     ends = rx_weight.shape[2]
     for chirp in prange(chirps):
         which, own, part = interval[chirp], line[chirp], share[chirp]
-        smooth = part * part * (3 - 2 * part)
+        smooth = smoothstep(part)
         left = np.zeros((ends, echoes), dtype=np.float32)
         real, imaginary = np.zeros((2, nodes, ends, echoes), dtype=np.float32)
         fade = np.empty(echoes, dtype=np.float32)

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
+from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.body_shadow import ClutterShadow, smooth
+from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 
@@ -133,7 +134,7 @@ def test_weights_fade_smoothly_from_anchor_to_anchor(clutter: Clutter) -> None:
     chirps = np.arange(0, 3 * step, n_tx)  # one Tx
     weights = shadow.weights(chirps)
     before, after = (1 - _dense(shadow, anchor, clutter)[0] for anchor in (0, 1))
-    share = smooth(np.array([step // 2 // n_tx * n_tx]), step)
+    share = smoothstep(np.array([step // 2 // n_tx * n_tx]) / step)
     np.testing.assert_allclose(weights[0], before)
     np.testing.assert_allclose(
         weights[step // 2 // n_tx], before + share * (after - before), atol=1e-12

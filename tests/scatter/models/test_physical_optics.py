@@ -15,8 +15,9 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.blends import hermite_weights
 from rtradar.scatter.common.array_interpolation import array_nodes, spread_nodes
-from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, hermite, stretch
+from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, stretch
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
@@ -240,7 +241,7 @@ def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex1
         for part in range(2):
             left, right = stretch(known[:, part], place)
             values = ratio[left], ratio[right], slope[left], slope[right]
-            weights = hermite(place, left, right)
+            weights = hermite_weights((place - left) / (right - left), right - left)
             out[row, part] = sum(
                 weight * value[0, 0, part] for weight, value in zip(weights, values, strict=True)
             )
