@@ -15,7 +15,7 @@ from rtradar.cli import ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
-SOON_S = 10.0  # two seconds on a quiet machine, which validation/interruptions.py holds it to; tests share theirs
+SOON_S = 10.0  # two seconds on a quiet machine, which validation/robustness/interruptions.py holds it to; tests share theirs
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Extremes: the cases of ``validation/extremes.py``, each of which gives the right finite answer, a refusal or a warning."""
+"""Extremes: the cases of ``validation/robustness/extremes.py``, each of which gives the right finite answer, a refusal or a warning."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-FOLDER = Path(__file__).resolve().parents[1] / "validation"
+FOLDER = Path(__file__).resolve().parents[1] / "validation" / "robustness"
 
 
 def load(name: str) -> ModuleType:

@@ -18,7 +18,7 @@ from rtradar.validate import validation_folder
 @pytest.fixture(scope="module")
 def paper() -> ModuleType:
     spec = importlib.util.spec_from_file_location(
-        "paper_numpy", validation_folder() / "paper_numpy.py"
+        "paper_numpy", validation_folder() / "other_methods" / "paper_numpy.py"
     )
     assert spec is not None
     assert spec.loader is not None

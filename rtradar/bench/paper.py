@@ -55,7 +55,7 @@ def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | Non
     RunError
         Where the script fails.
     """
-    script = validation_folder() / "paper_numpy.py"
+    script = validation_folder() / "other_methods" / "paper_numpy.py"
     if not script.is_file():
         return None
     with temporary_folder() as folder:

@@ -151,7 +151,7 @@ class Motion:
         """Pose at any time, bones exactly rigid.
 
         Rotations go through a C2 cubic spline of the sign-continuous quaternion components, normalised; the root goes
-        through PCHIP. ``validation/interpolation.py`` measures the choice. With every second frame left out, cubic,
+        through PCHIP. ``validation/measurements/interpolation.py`` measures the choice. With every second frame left out, cubic,
         makima and ``RotationSpline`` meet the left-out frames of 120 Hz recordings alike (kicks: 0.41 mm rms, PCHIP 0.46,
         slerp 0.64), where noise decides; at 30 Hz the cubic is the nearest (2.7 mm, makima 3.1, PCHIP 3.7,
         slerp 5.5). On smooth motion it leaves false Doppler lines of a swinging limb at -71 dB of a 77 GHz echo, where

@@ -21,7 +21,7 @@ MAX_BINS_IN_CHIRP = 0.1
 """A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
 
 MANY_ECHOES, MANY_VARYING_ECHOES = 300, 84
-"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/if_sum.py` times both ways): of
+"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/other_methods/if_sum.py` times both ways): of
 amplitudes that are one number, and of those that are given at several frequencies."""
 
 _CHIRPS_A_THREAD = 16

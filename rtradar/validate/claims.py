@@ -45,14 +45,14 @@ def validation_folder() -> Path:
 def claims(folder: Path) -> list[Claim]:
     """All scripts of a folder that measure a claim, by name."""
     found = []
-    for script in sorted(folder.glob("*.py")):
+    for script in sorted(folder.rglob("*.py"), key=lambda path: path.stem):
         tree = ast.parse(script.read_text(encoding="utf-8"), str(script))
         measures = any(
             isinstance(node, ast.FunctionDef) and node.name == "measure" for node in tree.body
         )
         asks = any(
             isinstance(node, ast.ImportFrom)
-            and node.module == "rows"
+            and node.module == "rtradar.validate.rows"
             and any(alias.name == "main" for alias in node.names)
             for node in tree.body
         )

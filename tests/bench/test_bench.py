@@ -193,7 +193,9 @@ def test_without_the_validation_scripts_the_table_says_so(
 def test_the_baseline_is_timed_in_a_process_of_its_own(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    (tmp_path / "paper_numpy.py").write_text(
+    folder = tmp_path / "other_methods"
+    folder.mkdir()
+    (folder / "paper_numpy.py").write_text(
         "import json, sys\n"
         "assert sys.argv[1:5] == ['--radar', 'paper-77ghz', '--repeats', '2'] and '--cycles' in sys.argv\n"
         "frames = [{'echoes and IF': 1.0, 'cfar': 0.5}, {'echoes and IF': 3.0, 'cfar': 0.5}]\n"
@@ -205,7 +207,7 @@ def test_the_baseline_is_timed_in_a_process_of_its_own(
     assert found == Baseline(
         {"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133
     )
-    (tmp_path / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
+    (folder / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
     with pytest.raises(RunError, match=r"paper_numpy.py: ArithmeticError: the abacus is broken"):
         paper.measure_baseline("paper-77ghz", 2, quick=True)
 

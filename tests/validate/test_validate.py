@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 from pathlib import Path
 
 import pytest
@@ -12,11 +11,9 @@ from rtradar import validate
 from rtradar.cli import main
 from rtradar.errors import InputError
 
-ROWS = validate.validation_folder() / "rows.py"
-
 GOOD = """
 import sys
-from rows import Row, judged, main, reported
+from rtradar.validate.rows import Row, judged, main, reported
 def measure(quick):
     share = 0.5 if quick else 0.25
     round_ = judged("a ball", "round", "m", share, 1.0, key="sphere", says="balls are round", cases=3)
@@ -26,7 +23,7 @@ if __name__ == "__main__":
 """
 BAD = """
 import sys
-from rows import judged, main
+from rtradar.validate.rows import judged, main
 def measure(quick):
     print("what goes to stdout does not matter")
     return [judged("a floor", "flat", "dB", -70.0, -80.0), judged("a wall", "straight", "dB", float("nan"), 1.0)]
@@ -34,21 +31,20 @@ if __name__ == "__main__":
     sys.exit(main("Floors.", measure))
 """
 BROKEN = """
-from rows import main
+from rtradar.validate.rows import main
 def measure(quick): ...
 if __name__ == "__main__":
     raise RuntimeError("the judge is ill")
 """
-HELPER = "def measure(quick): ...\n"  # no main from rows: not a claim
+HELPER = "def measure(quick): ...\n"  # takes no `main` of rtradar.validate.rows: not a claim
 
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder of scripts in place of the real one."""
     place = tmp_path / "validation"
-    place.mkdir()
-    shutil.copy(ROWS, place)
-    (place / "balls.py").write_text(GOOD)
+    (place / "toys").mkdir(parents=True)
+    (place / "toys" / "balls.py").write_text(GOOD)
     (place / "helper.py").write_text(HELPER)
     monkeypatch.setattr(validate, "validation_folder", lambda: place)
     return place
@@ -251,4 +247,10 @@ def test_the_claims_of_this_checkout_have_their_scripts() -> None:
     found = validate.claims(validate.validation_folder())
     keys = {key for claim in found for key in claim.keys}
     assert set(validate.KEYS) <= keys
-    assert "rows" not in {claim.name for claim in found}
+    assert {claim.script.parent.name for claim in found} == {
+        "closed_forms",
+        "other_methods",
+        "measurements",
+        "robustness",
+        "cost",
+    }

@@ -8,7 +8,7 @@ are named here are asked for.
 A joint's centre is the middle of its markers - pairs before and behind, or on both sides of it - or, where one marker alone
 marks it, that marker; from there an offset in the axes of its segment leads inward. Offsets belong to a person whose knee and
 ankle markers are `SHANK_M` apart, and grow with that distance. They are medians over the first half of the CMU take 135_02,
-which exists as AMC too; ``validation/c3d_take.py`` judges by its second half. Markers on waist and wrist bars stand centimetres
+which exists as AMC too; ``validation/measurements/c3d_take.py`` judges by its second half. Markers on waist and wrist bars stand centimetres
 off the bone, and a solver's shoulder lies lower than the marker on it: without the offsets hips are 18 cm off.
 
 References

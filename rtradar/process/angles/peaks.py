@@ -15,7 +15,7 @@ MOST_PEAKS = 3
 
 BELOW_HIGHEST_DB = 6.0
 """Peaks further below the highest are left out. Off the boresight, elements read different range bins: in a cell beside a
-strong, fast echo its side lobes in range and angle meet. ``validation/spatial_cloud.py`` counts the points that
+strong, fast echo its side lobes in range and angle meet. ``validation/closed_forms/spatial_cloud.py`` counts the points that
 are of no body part: 4 % of those of a walk at 6 dB, 9 % at 10 dB."""
 
 ABOVE_MEDIAN_DB = 11.0

@@ -9,7 +9,7 @@ law of shape L. With the training cells independent of the cell under test and o
   Rohling's product of (N - i) / (N - i + alpha), i = 0 .. k-1 (H. Rohling, IEEE Trans. AES 19(4), 1983, eq. 22).
 
 In windowed maps neighbouring cells are correlated: the training cells count for fewer, and the rate comes out higher than
-asked; validation/cfar.py measures by how much.
+asked; validation/closed_forms/cfar.py measures by how much.
 """
 
 from __future__ import annotations

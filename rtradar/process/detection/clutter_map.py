@@ -17,7 +17,7 @@ k c_k = L (p_1 c_(k-1) + ... + p_k c_0), p_m = sum r_j^m, without cancellation.
 Windows that share chirps with the one under test (three of the paper's radars) wait outside the map until they no longer do:
 else an echo would hide behind itself. Windows in the map that share chirps with each other count for fewer than they are, 40
 of the paper's for 21, which C holds. Taken for independent they would let the rate asked at 1e-3 rise to 2.2 times with one
-look and 1.4 times with 96 while the map is young, to 1.25 and 1.1 times later (validation/clutter.py).
+look and 1.4 times with 96 while the map is young, to 1.25 and 1.1 times later (validation/closed_forms/clutter.py).
 """
 
 from __future__ import annotations

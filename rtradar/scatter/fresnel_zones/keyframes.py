@@ -1,7 +1,7 @@
 """Shares of the return left to the parts of a moving body, antenna by antenna: at anchors, and smoothly between them.
 
 Over the array V is a polynomial through at most six nodes along a line of Tx and three along a line of Rx: half a metre
-of array sees an edge half a metre before a part move by several Fresnel zones (``validation/fresnel.py``: 1.0 % rms at
+of array sees an edge half a metre before a part move by several Fresnel zones (``validation/other_methods/fresnel.py``: 1.0 % rms at
 12 GHz; two along the line of Rx give 1.9 %, four along that of Tx 7 %). In time it is a cubic through anchors 10 ms
 apart, and 1.25 ms (12 GHz) or 0.5 ms (77 GHz) apart for each part and interval in which it bends; slopes are those of
 the parabola through neighbours, so that what comes out has no corners, whatever the spacing on either side. Rays are

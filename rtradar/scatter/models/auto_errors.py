@@ -6,9 +6,9 @@ is taken to be G V; then
 
     analytic         |A exp(jk dL) - G V|     dL between both paths
     specular         |G (v - V)|              v whether the specular point itself is in view
-    fresnel          3 % of G where an edge cuts the zones (``validation/fresnel.py``)
+    fresnel          3 % of G where an edge cuts the zones (``validation/other_methods/fresnel.py``)
     all of optics    G V / (2 k rho)          the next term of its expansion, rho the mean radius of curvature
-    physical-optics  1.5 % of G V: about what its interpolation leaves (``validation/ladder.py``)
+    physical-optics  1.5 % of G V: about what its interpolation leaves (``validation/other_methods/ladder.py``)
 
 and that of `reference` is 0, for it is what errors are held against. All of it through the patterns of the radar's antennas.
 """

@@ -21,7 +21,7 @@ _SYSTEMATIC, _INTERFERING = 0.5, 0.6
 """Of a tolerance on power: what the sum of all powers may be off by, and the field, whose parts interfere.
 
 A frame holds some ten independent looks at how echoes interfere, and a field that is off by a share e leaves its power
-off by up to 1.3 e in the worst frame of a hundred (``validation/auto.py``). What curvature adds turns faster and averages out.
+off by up to 1.3 e in the worst frame of a hundred (``validation/cost/auto.py``). What curvature adds turns faster and averages out.
 """
 
 

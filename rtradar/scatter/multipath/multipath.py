@@ -33,7 +33,7 @@ from rtradar.scatter.specular_point.visibility import MirrorVisibility
 from rtradar.scene import Scene
 
 ANCHORS_S = 20e-3
-"""Between instants at which what is left of echoes over walls is found: ghosts are within -21 dB (`validation/multipath.py`)."""
+"""Between instants at which what is left of echoes over walls is found: ghosts are within -21 dB (`validation/other_methods/multipath.py`)."""
 
 FIELD_ERROR = 0.02
 """Of the field of an echo through or over a wall, at most, over the sweep; beyond it a limit tells."""

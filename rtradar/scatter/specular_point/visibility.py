@@ -2,7 +2,7 @@
 
 A part that goes behind another fades as the edge crosses the Fresnel zone round its specular point, which takes longer
 than 10 ms for a limb at 1 m/s. A jump would smear a line over all velocities that physical optics does not have:
-``validation/occlusion.py`` measures -35 dB beside the Doppler line for a ramp of 1.25 ms, -59 dB for this one and
+``validation/other_methods/occlusion.py`` measures -35 dB beside the Doppler line for a ramp of 1.25 ms, -59 dB for this one and
 -60 dB for physical optics (12 GHz, 1.5 m/s). The instant is known to 5 ms; at 4 m/s the true fade is the faster one.
 """
 

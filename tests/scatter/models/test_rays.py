@@ -182,7 +182,7 @@ def test_a_corner_reflector_sends_back_from_off_its_axis_too() -> None:
 def test_two_spheres_send_each_other_what_one_of_them_alone_does_not() -> None:
     pair = sphere(0.1, (0, -0.15, 0), (0, 0.15, 0))
     one, two = (backscatter(pair, [4.0, 0.1, 0.05], 24e9, bounces=n) for n in (1, 2))
-    # Stationary phase over both spheres gives 0.0676 m (validation/rays.py works it out); 1 dB for edges of shadow.
+    # Stationary phase over both spheres gives 0.0676 m (validation/closed_forms/rays.py works it out); 1 dB for edges of shadow.
     assert 20 * np.log10(abs(two - one) / 0.0676) == pytest.approx(0, abs=1.0)
 
 

@@ -1,0 +1,177 @@
+"""The model `auto` against its tolerance, frame by frame of four whole activities, and its cost against the fixed models.
+
+Frames of 100 ms follow each other over 3 s of each activity. Of each, the received spectrum H(f, t) is held against that of
+`reference` at the four corner channels of the y-line, at the first, middle and last frequency of the sweep, in 4 TDM cycles
+spread evenly over the frame: the power of the frame in decibels, and rms |H - Href| over rms |Href| of the whole activity.
+The cost of a way is reported as the time of echoes and IF samples of every third frame over that of `analytic` in the same run.
+
+Judged is the time that a user waits for the range-Doppler-time cloud when asking for 0.5 dB, over that by the cheapest fixed
+level that keeps 0.5 dB on all activities: the whole chain from motion to that cloud, after warm-up, without angles, pictures and
+files. Both run in turn, `REPEATS` times each after one run of each that is not counted, and their medians are added up over
+the activities.
+
+    python validation/cost/auto.py [--quick] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+from trade import seconds
+
+import rtradar as rt
+from rtradar.bench.times import to_cloud_s
+from rtradar.body import Body
+from rtradar.motion import place
+from rtradar.scatter import build_model
+from rtradar.validate.rows import Row, judged, main, reported
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "other_methods"))
+
+from ladder import FRAMES, spectrum
+
+DURATION_S = 3.0
+REPEATS = 5
+MOST = {"analytic": 1.15, "specular": 1.15, "fresnel": 1.0}
+"""Times that of a fixed level: where a cheap one is enough, finding that out may cost 15 %."""
+LOOSE = {"tolerance_db": 0.5}
+CYCLES = 4
+FIXED = ("analytic", "specular", "fresnel")  # cheapest first
+TOLERANCES: dict[str, tuple[dict[str, float], ...]] = {
+    "paper-12ghz": (
+        {"tolerance_db": 0.5},
+        {"tolerance_db": 0.1},
+        {"tolerance_complex": 0.2},
+        {"tolerance_complex": 0.05},
+    ),
+    "paper-77ghz": ({"tolerance_db": 0.5},),  # its facets take minutes
+}
+
+
+def measure(quick: bool) -> list[Row]:
+    rows = []
+    for name in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
+        radar = rt.Radar.preset(name)
+        meets: dict[str, list[bool]] = {}
+        cost: dict[str, list[float]] = {}
+        for activity in ("kick",) if quick else FRAMES:
+            duration_s = 1.0 if quick else DURATION_S
+            body = Body.from_motion(
+                place(rt.synthetic_motion(activity, seed=0, duration_s=duration_s))
+            )
+            n_frames = round(duration_s / radar.frame_duration_s)
+            spread = (np.arange(CYCLES) + 0.5) / CYCLES * radar.cycles_per_frame
+            cycles = (
+                np.arange(n_frames)[:, None] * (duration_s / n_frames / radar.cycle_duration_s)
+                + spread
+            )
+            chirps = (
+                cycles.astype(np.int64)[..., None] * radar.n_tx + np.array([0, radar.tx_y - 1])
+            ).ravel()
+            truth = spectrum(build_model("reference", radar, body), radar, chirps)
+
+            rungs: list[tuple[str, str, dict[str, Any]]] = [(fixed, fixed, {}) for fixed in FIXED]
+            tolerances = TOLERANCES[name][::2] if quick else TOLERANCES[name]
+            rungs += [
+                (f"auto {key} {value:g}", "auto", {key: value})
+                for dials in tolerances
+                for key, value in dials.items()
+            ]
+            for label, fidelity, dials in rungs:
+                found = spectrum(build_model(fidelity, radar, body, **dials), radar, chirps)
+                powers = [
+                    (np.abs(field) ** 2).reshape(3, n_frames, -1).mean(axis=(0, 2))
+                    for field in (found, truth)
+                ]
+                worst = float(np.abs(10 * np.log10(powers[0] / powers[1])).max())
+                wrong = float(
+                    np.sqrt((np.abs(found - truth) ** 2).mean() / (np.abs(truth) ** 2).mean())
+                )
+                claim = f"{name}, {activity}, {label}"
+                of_power, of_field = (
+                    (claim, "frame power, worst of all frames", "dB", worst),
+                    (claim, "complex error, rms", "", wrong),
+                )
+                says = "four activities by `auto` against `reference`, 3 s"
+                for figure, dial, judges in (
+                    (of_power, "tolerance_db", f"{says}: power of the worst frame"),
+                    (of_field, "tolerance_complex", f"{says}: complex error"),
+                ):
+                    rows.append(
+                        judged(*figure, dials[dial], says=judges)
+                        if dial in dials
+                        else reported(*figure)
+                    )
+                meets.setdefault(label, []).append(worst <= LOOSE["tolerance_db"])
+                if not quick and (fidelity in FIXED or dials == LOOSE):
+                    cost.setdefault(label, []).append(_cost(fidelity, dials, radar, body, n_frames))
+                    rows.append(
+                        reported(
+                            claim,
+                            "cost over analytic",
+                            "",
+                            cost[label][-1] / cost["analytic"][-1],
+                            key="auto",
+                        )
+                    )
+        if quick:
+            continue  # one activity does not tell which fixed model meets the tolerance on all
+        cheapest = next(fixed for fixed in FIXED if all(meets[fixed]))
+        says = (
+            f"{name}, time to the cloud by `auto` at 0.5 dB over that by `{cheapest}`, the cheapest fixed level that keeps it, "
+            f"medians of {REPEATS} runs in turn"
+        )
+        figure = (
+            f"{name}, auto 0.5 dB over {cheapest}",
+            "cost",
+            "",
+            to_cloud("auto", cheapest, radar),
+        )
+        rows.append(judged(*figure, MOST[cheapest], key="auto", says=says, cases=len(FRAMES)))
+    return rows
+
+
+def _cost(
+    fidelity: str, dials: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int
+) -> float:
+    """Seconds of every third frame [s], by a new model, for models keep what they traced."""
+    seconds(build_model(fidelity, radar, body, **dials), radar, 0)
+    rung = build_model(fidelity, radar, body, **dials)
+    return sum(
+        seconds(rung, radar, frame * radar.chirps_per_frame) for frame in range(0, n_frames, 3)
+    )
+
+
+def to_cloud(
+    fidelity: str,
+    other: str,
+    radar: rt.Radar,
+    repeats: int = REPEATS,
+    duration_s: float = DURATION_S,
+) -> float:
+    """Time of all activities to the cloud by one level, with its own options, over that by another."""
+    whole = {fidelity: 0.0, other: 0.0}
+    for activity in FRAMES:
+        motion = rt.synthetic_motion(activity, seed=0, duration_s=duration_s)
+        seconds_of: dict[str, list[float]] = {each: [] for each in whole}
+        for _ in range(1 + repeats):
+            for each in whole:
+                with TemporaryDirectory() as folder, warnings.catch_warnings():
+                    warnings.simplefilter("ignore", rt.ValidityWarning)
+                    summary = rt.run(
+                        motion, radar, out=Path(folder) / "run", fidelity=each, variant="cpu"
+                    ).summary
+                seconds_of[each].append(to_cloud_s(summary["stages"], summary["wall_s"]))
+        for each in whole:
+            whole[each] += median(seconds_of[each][1:])
+    return whole[fidelity] / whole[other]
+
+
+if __name__ == "__main__":
+    sys.exit(main(__doc__.splitlines()[0], measure))

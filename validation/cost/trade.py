@@ -1,0 +1,468 @@
+"""The trade of speed for accuracy: what every model and every setting of its options costs, and how far it is from `reference`.
+
+Error is that of ``ladder.py``: the received spectrum H(f, t) of the corner channels over one frame of 100 ms, rms over rms, and
+the power of that frame. Cost is the time of echoes and IF samples of that frame, all channels, over that of `analytic` in the
+same run; each is first run a little, so that nothing is compiled, and is the best of some. `rays` and `reference`, which take
+minutes a frame, are timed on a part of it: `rays` on one Tx over the time between two anchors, `reference` on two TDM cycles.
+
+What is measured goes to ``--json FILE`` at once, and what is there is not measured again: to go on after a stop, or to add a
+line to `MODELS` or `DIALS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
+
+    python validation/cost/trade.py --json FILE [--figure validation/cost/trade.png] [--costs] [--quick]
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import math
+import sys
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.scatter import EchoModel, build_model
+from rtradar.scatter.models.rays import ANCHOR_S
+
+sys.path.append(str(Path(__file__).resolve().parents[1] / "other_methods"))
+
+from ladder import FRAMES, PRESETS, Scene
+
+CHEAPEST = "analytic"  # all costs are over its
+# In the order of the table; `reference` has a cost and no error.
+MODELS = (
+    "analytic-paper",
+    "analytic",
+    "specular",
+    "fresnel",
+    "physical-optics",
+    "auto",
+    "rays",
+    "reference",
+)
+SLOW = ("rays", "reference")  # minutes a frame: after all others
+
+
+@dataclass(frozen=True)
+class Dial:
+    """Settings of one option, from cheap to dear, for each radar; that which the model takes by itself is among them."""
+
+    fidelity: str
+    name: str
+    values: dict[str, tuple[float, ...]]
+    default: dict[str, float]
+    style: str  # of its line in the figure
+
+
+def for_both(values: Any) -> dict[str, Any]:
+    return dict.fromkeys(PRESETS, values)
+
+
+DIALS = (
+    Dial("fresnel", "shadow_rays", for_both((16, 64, 256)), for_both(64), "-"),
+    Dial(
+        "physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"
+    ),
+    Dial(
+        "physical-optics",
+        "facets",
+        {"paper-12ghz": (320, 1280, 5120, 20480), "paper-77ghz": (1280, 5120, 20480)},
+        {"paper-12ghz": 5120, "paper-77ghz": 20480},
+        "-",
+    ),
+    Dial("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
+    Dial("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
+    Dial(
+        "rays",
+        "rays_per_wavelength",
+        {"paper-12ghz": (1.0, 2.0, 3.0), "paper-77ghz": (3.0,)},
+        for_both(3.0),
+        "-",
+    ),
+)
+COLOURS = {
+    "analytic-paper": "tab:gray",
+    "analytic": "tab:orange",
+    "specular": "tab:green",
+    "fresnel": "tab:blue",
+    "physical-optics": "tab:red",
+    "rays": "tab:purple",
+    "auto": "black",
+    "reference": "0.5",
+}
+MARKERS = {"walk": "o", "kick": "^", "punch": "s", "jumping_jack": "D"}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A model with its own options, or one of them turned."""
+
+    fidelity: str
+    dial: str = ""
+    value: float = 0.0
+
+    @property
+    def dials(self) -> dict[str, float]:
+        return {self.dial: self.value} if self.dial else {}
+
+    @property
+    def label(self) -> str:
+        return f"{self.fidelity} {self.dial}={self.value:g}" if self.dial else self.fidelity
+
+
+@dataclass
+class Point:
+    """What one setting gave on one activity."""
+
+    preset: str
+    activity: str
+    setting: str
+    error: float  # rms over rms; 0 of the reference
+    power_db: float
+    seconds: float = 0.0  # of one frame
+    cost: float = 0.0  # over that of `analytic`
+
+
+def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
+    """Along an option, each with its value; where it stands by itself is the model as it is."""
+
+    def at(value: float) -> Setting:
+        return (
+            Setting(dial.fidelity)
+            if value == dial.default[preset]
+            else Setting(dial.fidelity, dial.name, value)
+        )
+
+    return [(value, at(value)) for value in dial.values[preset]]
+
+
+def settings(preset: str, quick: bool) -> list[Setting]:
+    """Each once, `analytic` first."""
+    found = [Setting(CHEAPEST), *(Setting(fidelity) for fidelity in MODELS)]
+    found += (
+        [] if quick else [setting for dial in DIALS for _, setting in settings_of(dial, preset)]
+    )
+    return list(dict.fromkeys(found))
+
+
+# -- cost -----------------------------------------------------------------------------------------------------------
+
+
+def seconds(rung: EchoModel, radar: rt.Radar, first: int) -> float:
+    """Of echoes and IF samples of the frame that begins at this chirp."""
+    step, end = 33 * radar.n_tx, first + radar.chirps_per_frame
+    return sum(
+        timed(rung, radar, np.arange(begin, min(begin + step, end)))
+        for begin in range(first, end, step)
+    )
+
+
+def timed(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
+    began = time.perf_counter()
+    at = (chirps + 0.5) * radar.chirp_duration_s
+    rt.signal.synthesize(rung.echoes(chirps), radar, at, dtype=np.complex64)
+    return time.perf_counter() - began
+
+
+def seconds_of(scene: Scene, setting: Setting) -> float:
+    """The same for a setting, by a model that has traced nothing of it yet; of those that take minutes, from a part of it."""
+    radar, first = scene.radar, scene.first_chirp
+    rung = build_model(setting.fidelity, radar, scene.body, **setting.dials)
+    if setting.fidelity == "reference":
+        chirps = np.arange(first, first + 2 * radar.n_tx)
+        timed(rung, radar, chirps)
+        return timed(rung, radar, chirps + len(chirps)) * radar.cycles_per_frame / 2
+    if setting.fidelity == "rays":
+        # From one anchor to the next, one of all Tx.
+        step = round(ANCHOR_S / radar.chirp_duration_s)
+        begin = -(-first // step) * step
+        before, chirps = (np.arange(at, at + step) for at in (begin, begin + step))
+        timed(rung, radar, before[before % radar.n_tx == 0])
+        return (
+            timed(rung, radar, chirps[chirps % radar.n_tx == 0])
+            * radar.n_tx
+            * radar.chirps_per_frame
+            / step
+        )
+    return seconds(rung, radar, first)
+
+
+def best_seconds(scene: Scene, setting: Setting) -> float:
+    """The best of some: of many where it takes a moment, of one where it takes long."""
+    found = [seconds_of(scene, setting)]
+    began = time.perf_counter()
+    while len(found) < 5 and time.perf_counter() - began < 4:
+        found.append(seconds_of(scene, setting))
+    return min(found)
+
+
+def warm_up(scene: Scene, fidelity: str) -> None:
+    """Compile what the model compiles."""
+    if fidelity in SLOW:
+        return  # begun anyway
+    chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
+    rung = build_model(fidelity, scene.radar, scene.body)
+    rt.signal.synthesize(
+        rung.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64
+    )
+
+
+# -- all of it ------------------------------------------------------------------------------------------------------
+
+
+def read(path: Path | None) -> dict[tuple[str, str, str], Point]:
+    if path is None or not path.exists():
+        return {}
+    points = [Point(**fields) for fields in json.loads(path.read_text())["points"]]
+    return {(point.preset, point.activity, point.setting): point for point in points}
+
+
+def write(path: Path | None, points: dict[tuple[str, str, str], Point]) -> None:
+    if path is not None:
+        path.write_text(
+            json.dumps({"points": [asdict(point) for point in points.values()]}, indent=1) + "\n"
+        )
+
+
+def measure_points(
+    scene: Scene, wanted: Sequence[Setting], points: dict[tuple[str, str, str], Point]
+) -> Iterator[Point]:
+    """What is not there yet, one after the other."""
+    base = None
+    for setting in wanted:
+        key = scene.preset, scene.activity, setting.label
+        point = points.get(key)
+        if point is not None and point.cost > 0:
+            continue
+        if point is None:
+            exact = setting.fidelity == "reference"
+            error, power_db = (
+                (0.0, 0.0)
+                if exact
+                else scene.compared(scene.spectrum(setting.fidelity, **setting.dials))
+            )
+            point = points[key] = Point(*key, error, power_db)
+        if base is None:
+            # In this run, however little of it is left to do.
+            warm_up(scene, CHEAPEST)
+            base = best_seconds(scene, Setting(CHEAPEST))
+        warm_up(scene, setting.fidelity)
+        point.seconds = best_seconds(scene, setting)
+        point.cost = 1.0 if setting == Setting(CHEAPEST) else point.seconds / base
+        yield point
+
+
+# -- table and figure -----------------------------------------------------------------------------------------------
+
+
+def span(values: Sequence[float], form: str) -> str:
+    """Least to most, once where they read alike."""
+    least, most = format(min(values), form), format(max(values), form)
+    return least if least == most else f"{least} to {most}"
+
+
+def figures(points: list[Point]) -> str:
+    if not points:
+        return " | | "
+    most = max(abs(point.power_db) for point in points)
+    costs = [float(f"{point.cost:.2g}") for point in points]
+    cost = span(costs, ".0f" if max(costs) >= 10 else ".2g")
+    if all(point.error == 0 for point in points):
+        return f"- | - | {cost}"
+    errors = [100 * point.error for point in points]
+    return f"{span(errors, '.0f' if max(errors) >= 10 else '.1f')} % | {most:.2f} dB | {cost}"
+
+
+def table(points: dict[tuple[str, str, str], Point]) -> str:
+    """For docs/choosing-a-level.md: a line a model, then a line a setting of an option; from and to over the activities."""
+    lines = [
+        "| rung | "
+        + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS)
+        + " |"
+    ]
+    lines.append("|---" * (1 + 3 * len(PRESETS)) + "|")
+
+    def line(name: str, labels: dict[str, str]) -> None:
+        own = [
+            [
+                point
+                for (of, _, label), point in points.items()
+                if (of, label) == (each, labels.get(each))
+            ]
+            for each in PRESETS
+        ]
+        if any(own):
+            lines.append(f"| {name} | " + " | ".join(figures(each) for each in own) + " |")
+
+    for fidelity in MODELS:
+        line(f"`{fidelity}`", dict.fromkeys(PRESETS, fidelity))
+    for dial in DIALS:
+        at = {
+            (value, each): setting for each in PRESETS for value, setting in settings_of(dial, each)
+        }
+        for value in sorted({value for value, _ in at}):
+            labels = {each: at[value, each].label for each in PRESETS if (value, each) in at}
+            line(f"`{dial.fidelity}`, {dial.name} {value:g}", labels)
+    return "\n".join(lines)
+
+
+def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
+    """Complex error over cost: a colour a model, a marker an activity, a line an option."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+    from matplotlib.lines import Line2D
+
+    figure, panels = plt.subplots(
+        1, len(PRESETS), figsize=(11, 5), sharex=True, sharey=True, layout="constrained"
+    )
+    for axes, preset in zip(panels, PRESETS, strict=True):
+        for (of, activity, _), point in points.items():
+            fidelity, _, dial = point.setting.partition(" ")
+            if of == preset and point.error > 0:
+                style: dict[str, Any] = (
+                    {"s": 14, "alpha": 0.6}
+                    if dial
+                    else {"s": 42, "edgecolors": "black", "linewidths": 0.6}
+                )
+                axes.scatter(
+                    point.cost,
+                    100 * point.error,
+                    color=COLOURS[fidelity],
+                    marker=MARKERS[activity],
+                    zorder=3,
+                    **style,
+                )
+        for dial in DIALS:
+            for activity in FRAMES:
+                along = [
+                    (value, points.get((preset, activity, each.label)))
+                    for value, each in settings_of(dial, preset)
+                ]
+                found = [(value, point) for value, point in along if point is not None]
+                x, y = [point.cost for _, point in found], [100 * point.error for _, point in found]
+                axes.plot(
+                    x,
+                    y,
+                    dial.style,
+                    color=COLOURS[dial.fidelity],
+                    linewidth=0.8,
+                    alpha=0.6,
+                    zorder=2,
+                )
+                # The ends of the option, once.
+                if activity == "walk" and len(found) > 1:
+                    for value, point in (found[0], found[-1]):
+                        text = f"{1e3 * value:g} ms" if dial.name == "anchor_s" else f"{value:g}"
+                        place = (point.cost, 100 * point.error)
+                        axes.annotate(
+                            text,
+                            place,
+                            (4, 4),
+                            textcoords="offset points",
+                            fontsize=6.5,
+                            color=COLOURS[dial.fidelity],
+                        )
+        dearest = [
+            point.cost
+            for (of, _, name), point in points.items()
+            if (of, name) == (preset, "reference")
+        ]
+        if dearest:
+            axes.axvline(
+                float(np.median(dearest)), color=COLOURS["reference"], linestyle=":", linewidth=1.5
+            )
+        axes.set(xscale="log", yscale="log", xlabel="cost of a 100 ms frame [times analytic]")
+        axes.set_title(f"{preset[6:8]} GHz", fontsize=10)
+        axes.grid(which="both", alpha=0.2)
+    panels[0].set_ylabel("error of H(f, t) against reference, rms [%]")
+    seen = {point.setting.partition(" ")[0] for point in points.values() if point.error > 0}
+    keys = [
+        Line2D([], [], color=colour, marker="o", linestyle="", label=name)
+        for name, colour in COLOURS.items()
+        if name in seen
+    ]
+    keys.append(
+        Line2D(
+            [],
+            [],
+            color=COLOURS["reference"],
+            linestyle=":",
+            label="reference: no error, this cost",
+        )
+    )
+    keys += [
+        Line2D([], [], color="black", marker=mark, linestyle="", label=name)
+        for name, mark in MARKERS.items()
+    ]
+    keys += [
+        Line2D(
+            [],
+            [],
+            color=COLOURS[dial.fidelity],
+            linestyle=dial.style,
+            label=f"{dial.fidelity}: {dial.name}",
+        )
+        for dial in DIALS
+    ]
+    figure.legend(handles=keys, loc="outside right upper", fontsize=7)
+    figure.savefig(path, dpi=110)
+    plt.close(figure)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="points are kept there; those that it holds are not measured again",
+    )
+    parser.add_argument(
+        "--figure", type=Path, metavar="FILE", help="draw error over cost there, as PNG"
+    )
+    parser.add_argument("--costs", action="store_true", help="measure the cost of all points anew")
+    parser.add_argument(
+        "--quick", action="store_true", help="one activity at 12 GHz, without dials"
+    )
+    options = parser.parse_args()
+    began = time.perf_counter()
+    points = read(options.json)
+    if options.costs:
+        for point in points.values():
+            point.seconds = point.cost = 0.0
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rt.ValidityWarning)
+        scenes = [Scene(*each) for each in itertools.product(PRESETS, FRAMES)][
+            : 1 if options.quick else None
+        ]
+        for slow, scene in itertools.product((False, True), scenes):
+            wanted = [
+                each
+                for each in settings(scene.preset, options.quick)
+                if (each.fidelity in SLOW) == slow
+            ]
+            for point in measure_points(scene, wanted, points):
+                write(options.json, points)
+                print(
+                    f"{time.perf_counter() - began:6.0f} s  {scene.preset}  {scene.activity:<13} {point.setting:<36} "
+                    f"{100 * point.error:7.2f} %  {point.power_db:+6.2f} dB  {point.seconds:9.3g} s  {point.cost:7.3g}",
+                    flush=True,
+                )
+    print(table(points))
+    print(f"\n{time.perf_counter() - began:.0f} s in all")
+    if options.figure:
+        draw(points, options.figure)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

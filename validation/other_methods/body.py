@@ -1,0 +1,252 @@
+"""`analytic` against `specular` on whole bodies: where no part is hidden they differ by near-field spreading alone.
+
+The far-field formula takes wavefronts as plane. What their curvature takes away is found here from stationary phase: the path
+Tx..surface..Rx as a function of two parameters of the surface, its minimum by Newton's method and its Hessian, both from
+differences of the path, give |F| = 2 sqrt(pi) cos(i) |dp/ds x dp/dt| / sqrt(det L'') for each Tx, Rx and part, and its
+spreading 1 / (R1 R2). No curvature and no wavefront matrix is written down, so nothing is shared with `specular`. The
+near-field factor is the ratio of that to the same for plane waves, spread over the way to the point that these meet.
+
+A standing person goes through `rtradar.compare`, and those parts are judged that it says are fully seen; four activities are
+looked at instant by instant. What is left between the two models is hidden by other parts, and reported.
+
+    python validation/other_methods/body.py [--quick] [--json FILE]
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import sys
+import tempfile
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import rtradar as rt
+from rtradar.motion import place
+from rtradar.pipeline.survey import survey
+from rtradar.scatter import build_model
+from rtradar.scatter.common.poses import anchor_step
+from rtradar.validate.rows import Row, judged, main, reported
+
+Array = NDArray[np.float64]
+ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
+TOLERANCE_DB = 0.1
+STEP = 1e-4
+FAR = 1e6  # how many times as far away a plane wave comes from
+
+
+def path(points: Array, antennas: tuple[Array, Array]) -> Array:
+    """Tx..point..Rx less that over the origin, without cancellation (...,) [m]; antennas (..., 3)."""
+    total = np.zeros(points.shape[:-1])
+    for antenna in antennas:
+        lengths = np.linalg.norm(points - antenna, axis=-1) + np.linalg.norm(antenna, axis=-1)
+        total = total + np.sum(points * (points - 2 * antenna), axis=-1) / lengths
+    return total
+
+
+def tangents(unit: Array) -> tuple[Array, Array]:
+    helper = np.eye(3)[np.argmin(np.abs(unit), axis=-1)]
+    east = np.cross(unit, helper)
+    east /= np.linalg.norm(east, axis=-1, keepdims=True)
+    return east, np.cross(unit, east)
+
+
+def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
+    """|F|^2 (n,) and specular point (n, 3) of ellipsoids about the origin for antennas (n, 3), axes (n, 3)."""
+
+    def on_surface(unit: Array, s: float, t: float) -> Array:
+        east, north = tangents(unit)
+        moved = unit + s * east + t * north
+        return np.asarray(moved / np.linalg.norm(moved, axis=-1, keepdims=True) * axes)
+
+    unit = axes * (
+        tx / np.linalg.norm(tx, axis=1, keepdims=True)
+        + rx / np.linalg.norm(rx, axis=1, keepdims=True)
+    )
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    for _ in range(40):
+        f = {
+            (i, j): path(on_surface(unit, i * STEP, j * STEP), (tx, rx))
+            for i in (-1, 0, 1)
+            for j in (-1, 0, 1)
+        }
+        slope_s, slope_t = (f[1, 0] - f[-1, 0]) / (2 * STEP), (f[0, 1] - f[0, -1]) / (2 * STEP)
+        ss = (f[1, 0] - 2 * f[0, 0] + f[-1, 0]) / STEP**2
+        tt = (f[0, 1] - 2 * f[0, 0] + f[0, -1]) / STEP**2
+        st = (f[1, 1] - f[1, -1] - f[-1, 1] + f[-1, -1]) / (4 * STEP**2)
+        determinant = ss * tt - st * st
+        step = (
+            np.stack([st * slope_t - tt * slope_s, st * slope_s - ss * slope_t], axis=-1)
+            / determinant[:, None]
+        )
+        size = np.linalg.norm(step, axis=1, keepdims=True)
+        step *= 0.3 / np.maximum(size, 0.3)
+        east, north = tangents(unit)
+        unit = unit + step[:, :1] * east + step[:, 1:] * north
+        unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    # Differences of the path are good to 1e-9 of it: Newton's last steps dither by that.
+    assert size.max() < 1e-5, size.max()
+    east, north = tangents(unit)
+    across = np.cross(axes * east, axes * north)
+    area = np.linalg.norm(across, axis=1)
+    normal = across / area[:, None]
+    normal *= np.sign(np.sum(normal * unit * axes, axis=1, keepdims=True))
+    point = unit * axes
+    cosine = np.zeros(len(point))
+    for antenna in (tx, rx):
+        way = antenna - point
+        cosine += np.sum(normal * way, axis=1) / np.linalg.norm(way, axis=1) / 2
+    return 4 * np.pi * (cosine * area) ** 2 / determinant, point
+
+
+def near_and_far(radar: rt.Radar, body: rt.Body, n_chirps: int) -> tuple[Array, Array]:
+    """Power of each part at each instant of the survey by stationary phase, and by that of plane waves (time, part) [m^2]."""
+    chirps = np.arange(0, n_chirps, anchor_step(radar))
+    poses = body.at(np.minimum((chirps + 0.5) * radar.chirp_duration_s, body.duration_s))
+    index = radar.tx_of_chirp(chirps)
+    tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
+    times, parts, receivers = len(chirps), len(body.part_names), radar.n_rx
+    shape = (times, receivers, parts, 3)
+    local = [
+        np.einsum(
+            "tpji,trpj->trpi",
+            poses.frames,
+            np.broadcast_to(antenna, shape) - poses.centres[:, None],
+        ).reshape(-1, 3)
+        for antenna in (tx[:, None, None], rx[:, :, None])
+    ]
+    axes = np.broadcast_to(poses.semi_axes, shape).reshape(-1, 3)
+    powers = []
+    for farther in (1.0, FAR):
+        size, point = stationary(local[0] * farther, local[1] * farther, axes)
+        ranges = [np.linalg.norm(antenna - point, axis=1) for antenna in local]
+        powers.append((size / (ranges[0] * ranges[1]) ** 2).reshape(shape[:3]).mean(axis=1))
+    return powers[0], powers[1]
+
+
+def still(motion: rt.Motion, frame: int) -> rt.Motion:
+    """A person who stands as in one frame, for a second."""
+    return dataclasses.replace(
+        motion,
+        name=f"{motion.name}, standing",
+        root_positions=np.repeat(motion.root_positions[frame : frame + 1], 101, axis=0),
+        rotations=np.repeat(motion.rotations[frame : frame + 1], 101, axis=0),
+        rate_hz=100.0,
+        first_frame_s=0.0,
+        length_s=None,
+    )
+
+
+def decibels(ratio: Array) -> Array:
+    return np.asarray(10 * np.log10(ratio))
+
+
+def compared_rows(preset: str) -> Iterator[Row]:
+    """Through `compare`: each part of a standing person that no channel misses."""
+    radar = rt.Radar.preset(preset)
+    motion, duration = still(rt.synthetic_motion("jumping_jack", seed=0), 0), 0.15
+    with tempfile.TemporaryDirectory() as folder:
+        found = rt.compare(
+            motion,
+            radar,
+            out=Path(folder, "out"),
+            fidelities=("analytic", "specular"),
+            duration_s=duration,
+        )
+    rungs = found.summary["fidelities"]
+    body = rt.Body.from_motion(place(motion, duration_s=duration))
+    n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
+    near, far = near_and_far(radar, body, n_chirps)
+    factor = dict(zip(body.part_names, near.mean(axis=0) / far.mean(axis=0), strict=True))
+    claim = f"compare, standing, {preset}"
+    hidden = rungs["specular"]["part_hidden_share"]
+    seen = [part for part, share in hidden.items() if share == 0]
+    for part in seen:
+        ratio = rungs["specular"]["part_power_m2"][part] / rungs["analytic"]["part_power_m2"][part]
+        expected = float(decibels(factor[part]))
+        quantity = f"{part}: specular over analytic, ref. near field"
+        says = "`compare` of `analytic` with `specular`, standing: parts fully seen, echo power once near field is counted"
+        yield judged(
+            claim,
+            quantity,
+            "dB",
+            float(decibels(ratio)),
+            TOLERANCE_DB,
+            reference=expected,
+            says=says,
+        )
+    says = "`compare` of `analytic` with `specular`, standing: parts that are hidden, of 21"
+    yield judged(
+        claim,
+        "parts that are hidden, of 21",
+        "",
+        len(hidden) - len(seen),
+        len(hidden) - 1,
+        says=says,
+    )
+
+
+def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row]:
+    """Instant by instant: parts that no channel misses, and what the others make of the frame's power."""
+    radar = rt.Radar.preset(preset)
+    body = rt.Body.from_motion(
+        place(rt.synthetic_motion(activity, seed=0), start_s=0.5, duration_s=duration_s)
+    )
+    n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rt.ValidityWarning)
+        found = {
+            rung: survey(build_model(rung, radar, body), radar, body, n_chirps)
+            for rung in ("analytic", "specular")
+        }
+    near, far = near_and_far(radar, body, n_chirps)
+    analytic, specular = (found[rung].power_at for rung in ("analytic", "specular"))
+    hidden = found["specular"].hidden_at
+    seen = hidden == 0
+    claim = f"{activity}, {preset}, {duration_s:g} s"
+    error = decibels(specular[seen] / analytic[seen]) - decibels(near[seen] / far[seen])
+    count = f"{seen.sum()} of {seen.size} parts and instants"
+    quantity = f"fully seen, {count}: worst |dB| once near field is counted"
+    says = "`analytic` against `specular`, four activities: the same of parts fully seen, at each instant"
+    worst = float(abs(error).max())
+    yield judged(claim, quantity, "dB", worst, TOLERANCE_DB, says=says, cases=int(seen.sum()))
+    yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
+    yield reported(
+        claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean())
+    )
+    yield reported(
+        claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min())
+    )
+    # What the models' frame powers differ by: near field of all parts, then occlusion of some.
+    whole = decibels(specular.sum(axis=1) / analytic.sum(axis=1))
+    bent = decibels((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
+    yield reported(claim, "frame power, specular over analytic, mean", "dB", float(whole.mean()))
+    yield reported(claim, "of that near field", "dB", float(bent.mean()))
+    yield reported(claim, "of that occlusion", "dB", float((whole - bent).mean()))
+    left = decibels(specular.sum(axis=1) / (analytic * near / far * (1 - hidden)).sum(axis=1))
+    yield reported(
+        claim, "left where hidden shares are taken off, rms", "dB", float(np.sqrt(np.mean(left**2)))
+    )
+
+
+def measure(quick: bool) -> list[Row]:
+    presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
+    rows: list[Row] = []
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", rt.ValidityWarning)
+        for preset in presets:
+            rows += compared_rows(preset)
+            for activity in ACTIVITIES[:2] if quick else ACTIVITIES:
+                rows += activity_rows(activity, preset, 0.3 if quick else 1.0)
+    return rows
+
+
+if __name__ == "__main__":
+    sys.exit(
+        main(
+            "`analytic` against `specular` on whole bodies, near-field spreading counted.", measure
+        )
+    )
