@@ -20,6 +20,7 @@ from rtradar.process.sliding_range_time import SlidingRangeTime
 from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
+from rtradar.process.window_functions import WindowFunctions
 
 __all__ = [
     "CLUTTER_REMOVALS",
@@ -34,6 +35,7 @@ __all__ = [
     "SlidingSpectrogram",
     "SlidingWindows",
     "Spectrogram",
+    "WindowFunctions",
     "angle",
     "angle_grid",
     "angle_spectra",

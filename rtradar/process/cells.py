@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.process.angles.steering import range_walk
-from rtradar.process.window_functions import hann
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.threads import in_threads
 
@@ -26,6 +26,8 @@ def cell_spectra(
     radar: Radar,
     range_bins: ArrayLike,
     velocity_bins: ArrayLike,
+    *,
+    window_functions: WindowFunctions = HANN,
 ) -> NDArray[np.complexfloating]:
     """Values of chosen cells in every channel, with those of the range bins beside them.
 
@@ -41,12 +43,15 @@ def cell_spectra(
     range_bins, velocity_bins : (cell,) int
         Indices of the cells in the map of `power_map`: velocity ascending, zero at ``n_cycles // 2``.
 
+    window_functions : WindowFunctions
+        The window function in slow time is taken from it.
+
     Returns
     -------
     (cell, offset, channel) complex
         What `range_doppler` gives at range bins ``-walk`` to ``+walk`` about each cell, walk = `range_walk` of the radar (offset
         ``walk`` is the cell itself; past the end of the range axis it goes on at the other), in the precision of ``spectra``.
-        Periodic Hann window in slow time with coherent gain 1; channel = tx * n_rx + rx. The phase that a moving echo gains
+        Coherent gain 1; channel = tx * n_rx + rx. The phase that a moving echo gains
         between the Tx of one cycle is left in.
 
     Raises
@@ -78,8 +83,7 @@ def cell_spectra(
     # Index 0 of the map is the DFT bin of the most negative velocity.
     turns = np.broadcast_to(((columns - n_cycles // 2) % n_cycles)[:, None], steps.shape)
     values = np.empty((*steps.shape, radar.n_channels), dtype=cube.dtype)
-    window = hann(n_cycles) / hann(n_cycles).sum()
-    weights = window.astype(cube.real.dtype)[:, None, None]
+    scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)[:, None, None]
     used, place = np.unique(steps, return_inverse=True)
     place = place.reshape(steps.shape)
 
@@ -91,7 +95,7 @@ def cell_spectra(
         # Channels of one Tx lie side by side in what is filled.
         tx, rx = item // batches, item % batches * at_once
         weighted = np.take(cube[:, tx, rx : rx + at_once], used, axis=2)
-        weighted *= weights
+        weighted *= scale
         doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
         first = tx * radar.n_rx + rx
         values[:, :, first : first + weighted.shape[1]] = doppler[turns, :, place]

@@ -7,7 +7,7 @@ begin, the one with most power in it is taken, and the copies lose what that ech
 its place.
 
 Parts of a body interfere, so a Tx may see next to nothing of an echo in one cell; where the block begins is therefore asked of
-the cells about it together, as far as an echo's own skirts reach under Hann windows. Of two echoes so near each other in range
+the cells about it together, as far as the main lobes of the window functions spread an echo. Of two echoes so near each other in range
 and, but for a whole number of bands, in speed, the weaker is taken for a copy: whoever moves in more than one band's width of
 speeds at one range needs fewer bands or shorter chirps.
 """
@@ -20,18 +20,18 @@ from scipy.ndimage import maximum_filter
 from scipy.special import gammainccinv, gammaincinv
 
 from rtradar.errors import InputError
+from rtradar.process.window_functions import HANN, WindowFunctions
 from rtradar.radar import Radar
 
 _CHANCE = 1e-3
 """That noise alone passes for an echo, whose copies are taken out, somewhere on the Doppler axis. What is detected is rarer."""
 
 
-_SKIRT = 2
-"""Cells on either side of an echo in which Hann windows leave something of it."""
-
-
 def without_copies(
-    band_power: NDArray[np.floating], radar: Radar, receivers: int
+    band_power: NDArray[np.floating],
+    radar: Radar,
+    receivers: int,
+    window_functions: WindowFunctions = HANN,
 ) -> NDArray[np.floating]:
     """Power of all Tx together, each echo at its own Doppler only.
 
@@ -43,6 +43,8 @@ def without_copies(
         Under DDM.
     receivers : int
         Rx whose power is summed.
+    window_functions : WindowFunctions
+        Window functions of the power. Their main lobes tell how far an echo spreads over cells.
 
     Returns
     -------
@@ -62,7 +64,8 @@ def without_copies(
         )
     power = band_power.reshape(bands, -1, band_power.shape[1])
     filled = _block_sums(power, n_tx)
-    begin = _block_sums(_about(band_power).reshape(power.shape), n_tx).argmax(axis=0)
+    spread = window_functions.main_lobe_bins
+    begin = _block_sums(_about(band_power, spread).reshape(power.shape), n_tx).argmax(axis=0)
     strongest = np.take_along_axis(filled, begin[None], axis=0)[0]
     empty = (power.sum(axis=0) - strongest) / (bands - n_tx)
     usual = np.median(filled, axis=(0, 1))
@@ -71,9 +74,8 @@ def without_copies(
     echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))
     # Its skirts have copies, too, weaker than what passes for an echo by itself.
     echoes = ((place == 0) & echo).reshape(band_power.shape)
-    near = maximum_filter(echoes, size=2 * _SKIRT + 1, mode=("wrap", "nearest")).reshape(
-        power.shape
-    )
+    size = [2 * bins + 1 for bins in spread]
+    near = maximum_filter(echoes, size=size, mode=("wrap", "nearest")).reshape(power.shape)
     echo = np.take_along_axis(near, begin[None], axis=0)[0]
     # Band by band: how many filled bands of the copy that begins there the echo explains, and with what power.
     explained = np.where(place < n_tx, power - empty, 0)
@@ -91,11 +93,11 @@ def _block_sums(power: NDArray[np.floating], count: int) -> NDArray[np.floating]
     return total
 
 
-def _about(power: NDArray[np.floating]) -> NDArray[np.floating]:
+def _about(power: NDArray[np.floating], spread: tuple[int, int]) -> NDArray[np.floating]:
     """Sum over the cells about each one (doppler, range)."""
-    for axis in (0, 1):
+    for axis, bins in enumerate(spread):
         power = sum(
-            (np.roll(power, step, axis=axis) for step in range(-_SKIRT, _SKIRT + 1)),
+            (np.roll(power, step, axis=axis) for step in range(-bins, bins + 1)),
             np.zeros_like(power),
         )
     return power

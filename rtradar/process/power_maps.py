@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 import scipy.fft
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
 from rtradar.process.doppler_division import without_copies
 from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
-from rtradar.process.window_functions import weights
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.threads import in_threads
 
@@ -92,7 +92,7 @@ def power_map(
     radar: Radar,
     *,
     channel: int | None = None,
-    doppler_window: ArrayLike | None = None,
+    window_functions: WindowFunctions = HANN,
 ) -> NDArray[np.floating]:
     """Range-Doppler power of one window: the squared magnitudes of all channels summed, or of one channel.
 
@@ -104,8 +104,9 @@ def power_map(
         Gives the shape.
     channel : int, optional
         Only this channel, tx * n_rx + rx; all of them when left out.
-    doppler_window : (cycle,) float, optional
-        Instead of the periodic Hann window.
+    window_functions : WindowFunctions
+        Window functions of the range spectra and in slow time. Only that in slow time is applied here; under DDM both tell
+        how far an echo spreads over cells.
 
     Returns
     -------
@@ -117,7 +118,7 @@ def power_map(
     Raises
     ------
     InputError
-        Where the shape does not fit the radar, there is no such channel, or the window has the wrong length or no weight.
+        Where the shape does not fit the radar, or there is no such channel.
     """
     cube = np.asarray(spectra)
     if cube.ndim != 4 or cube.shape[1:3] != (radar.n_tx, radar.n_rx) or cube.shape[0] < 1:
@@ -130,7 +131,7 @@ def power_map(
             f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
         )
     n_cycles, _, _, n_range = cube.shape
-    scale = weights(doppler_window, n_cycles, "doppler_window")
+    scale = weights(window_functions.doppler, n_cycles)
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
     divided = channel is None and radar.multiplexing == "ddm"
     # Under DDM the rows of all Tx are the same sum; those of the first are not turned.
@@ -141,7 +142,7 @@ def power_map(
     )
     power = _doppler_power(channels, chosen, scale, radar.n_rx)
     if divided:
-        power = without_copies(power, radar, radar.n_rx)
+        power = without_copies(power, radar, radar.n_rx, window_functions)
     return np.ascontiguousarray(np.fft.fftshift(power, axes=0).T)
 
 

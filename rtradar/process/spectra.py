@@ -1,8 +1,8 @@
 """IF samples to range spectra and range-Doppler spectra.
 
 The IF turns with exp(+j 2 pi f tau), so an echo at range R peaks in range bin R / range_bin (paper, eq. 12) and one
-that recedes in a positive Doppler bin (paper, eq. 16). Windows are periodic Hann unless others are given. Spectra are
-divided by the sums of their windows: a tone of amplitude 1 on the middle of a bin reads 1.
+that recedes in a positive Doppler bin (paper, eq. 16). Window functions are periodic Hann windows unless others are named.
+Spectra are divided by the sums of their weights: a tone of amplitude 1 on the middle of a bin reads 1.
 
 Range spectra, which are streamed, keep complex64: their rounding stays some 140 dB below the strongest echo, and a map of 666
 cycles takes 131 MB instead of 262 MB.
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.jit import compiled
-from rtradar.process.window_functions import weights
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
 from rtradar.system.threads import in_threads
@@ -51,8 +51,7 @@ def range_doppler(
     x: ArrayLike,
     radar: Radar,
     *,
-    range_window: ArrayLike | None = None,
-    doppler_window: ArrayLike | None = None,
+    window_functions: WindowFunctions = HANN,
 ) -> RangeDoppler:
     """Windowed range and Doppler spectra of IF samples, every channel apart.
 
@@ -62,10 +61,8 @@ def range_doppler(
         IF samples; chirp 0 comes from Tx 0. Whole TDM cycles are used, the chirps after the last are left out.
     radar : Radar
         Gives the schedule and the axes.
-    range_window : (sample,) float, optional
-        Instead of the periodic Hann window in fast time.
-    doppler_window : (cycle,) float, optional
-        Instead of the periodic Hann window in slow time.
+    window_functions : WindowFunctions
+        Window functions in fast time and in slow time.
 
     Returns
     -------
@@ -75,8 +72,7 @@ def range_doppler(
     Raises
     ------
     InputError
-        Where the shape does not fit the radar, not one whole cycle is there, a sample is not finite, or a window has
-        the wrong length or no weight.
+        Where the shape does not fit the radar, not one whole cycle is there, or a sample is not finite.
 
     Notes
     -----
@@ -90,8 +86,8 @@ def range_doppler(
         )
     if not np.isfinite(samples).all():
         raise InputError("range_doppler: x holds NaN or infinity; every IF sample must be finite")
-    fast = weights(range_window, samples.shape[2], "range_window")
-    slow = weights(doppler_window, n_cycles, "doppler_window")
+    fast = weights(window_functions.range, samples.shape[2])
+    slow = weights(window_functions.doppler, n_cycles)
     kind = complex_kind(samples)
     cube = samples[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_channels, samples.shape[2])
     weighted = cube * fast.astype(kind) * slow.astype(kind)[:, None, None]
@@ -105,7 +101,7 @@ def range_spectrum(
     x: ArrayLike,
     radar: Radar,
     *,
-    window: ArrayLike | None = None,
+    window_functions: WindowFunctions = HANN,
     out: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.complex64]:
     """Range spectrum of each chirp, the part of the work that overlapping windows share.
@@ -116,8 +112,8 @@ def range_spectrum(
         IF samples of any number of chirps.
     radar : Radar
         Gives the shape.
-    window : (sample,) float, optional
-        Instead of the periodic Hann window.
+    window_functions : WindowFunctions
+        The window function in fast time is taken from it.
     out : (chirp, rx, range) complex64, optional
         Array to fill, C-contiguous; otherwise a new one is made.
 
@@ -129,12 +125,12 @@ def range_spectrum(
     Raises
     ------
     InputError
-        Where the shape does not fit the radar or the window has the wrong length or no weight.
+        Where the shape does not fit the radar.
     ValueError
         Where ``out`` is not an array of that shape and type.
     """
     samples = _checked_if(x, radar)
-    scale = weights(window, samples.shape[2], "window").astype(np.float32)
+    scale = weights(window_functions.range, samples.shape[2]).astype(np.float32)
     spectra = array_to_fill("range_spectrum", out, samples.shape, np.complex64)
 
     def transform(first: int) -> None:

@@ -14,6 +14,7 @@ gives the same columns and is what the tests compare with.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.fft
@@ -22,7 +23,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.doppler_division import without_copies
-from rtradar.process.window_functions import hann
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
 WINDOW_CYCLES = 128
@@ -72,6 +73,7 @@ def spectrogram(
     tx: int = 0,
     window: int = WINDOW_CYCLES,
     overlap: float = OVERLAP,
+    window_functions: WindowFunctions = HANN,
 ) -> Spectrogram:
     """Spectrogram of one virtual channel, its power summed over the given range bins.
 
@@ -85,15 +87,18 @@ def spectrogram(
     tx : int
         Transmitter of the channel: its chirp is that far into the cycle, which moves the time axis.
     window : int
-        Cycles in one window, weighted by a periodic Hann window.
+        Number of cycles in one window.
     overlap : float
         Least share of a window that it has in common with the next: 0.95 of 128 cycles is a hop of 6.
+    window_functions : WindowFunctions
+        Window functions of the range spectra and in slow time. Only that in slow time is applied here; under DDM both tell
+        how far an echo spreads over cells.
 
     Returns
     -------
     Spectrogram
-        Only whole windows. An echo of constant amplitude a and velocity reads 1.5 a^2 in its velocity bin where all range
-        bins are given: the three bins of a Hann-windowed range spectrum hold 1/4, 1 and 1/4. float32 where ``signals`` are
+        Only whole windows. Under Hann windows an echo of constant amplitude a and velocity reads 1.5 a^2 in its velocity bin
+        where all range bins are given: the three bins of a Hann-windowed range spectrum hold 1/4, 1 and 1/4. float32 where ``signals`` are
         complex64 or float32, else float64.
 
     Raises
@@ -123,7 +128,7 @@ def spectrogram(
         np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False
     )
     starts = np.arange(0, len(values) - window + 1, hop)
-    power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar))
+    power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar), window_functions)
     return Spectrogram(power, _times(starts, radar, tx, window), radar.velocity_mps(window))
 
 
@@ -138,8 +143,8 @@ class SlidingSpectrogram:
         Gives the schedule and the shape.
     channel : int
         tx * n_rx + rx.
-    window, overlap
-        As of `spectrogram`; `window_cycles` of them if left out.
+    window, overlap, window_functions
+        See `spectrogram`; a window has `window_cycles` cycles if left out.
     removal : ClutterRemoval, optional
         The removal whose `ClutterRemoval.block` the spectra have passed; each window of the spectrogram passes its
         `ClutterRemoval.window`. Who stands still for the length of a window is then removed with the clutter.
@@ -158,6 +163,7 @@ class SlidingSpectrogram:
         window: int | None = None,
         overlap: float = OVERLAP,
         removal: ClutterRemoval | None = None,
+        window_functions: WindowFunctions = HANN,
     ) -> None:
         window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:
@@ -165,6 +171,7 @@ class SlidingSpectrogram:
                 f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
             )
         self._radar, self._window, self._removal = radar, window, removal or ClutterRemoval(radar)
+        self._window_functions = window_functions
         self._tx, self._rx = divmod(channel, radar.n_rx)
         self._hop = _hop(radar, self._tx, window, overlap)
         self._chirps = 0  # pushed so far
@@ -203,7 +210,9 @@ class SlidingSpectrogram:
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
-        power = _columns(cycles, starts, self._window, radar, self._tx, self._removal)
+        power = _columns(
+            cycles, starts, self._window, radar, self._tx, self._removal, self._window_functions
+        )
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop
@@ -241,15 +250,16 @@ def _columns(
     radar: Radar,
     tx: int,
     removal: ClutterRemoval,
+    window_functions: WindowFunctions,
 ) -> NDArray[np.floating]:
     """Power (time, velocity) of the windows that begin at these rows of the signals (cycle, range)."""
     real = np.float32 if signals.dtype == np.complex64 else np.float64
-    weights = (hann(window) / hann(window).sum()).astype(real)[:, None]
+    scale: NDArray[Any] = weights(window_functions.doppler, window).astype(real)[:, None]
     power = np.empty((len(starts), window), dtype=real)
     # One window at a time stays in the cache of a core, and a column cannot depend on its neighbours in the stream.
     for row, start in enumerate(starts):
         spectra = scipy.fft.fft(
-            removal.window(signals[start : start + window]) * weights, axis=0, overwrite_x=True
+            removal.window(signals[start : start + window]) * scale, axis=0, overwrite_x=True
         )
         parts = spectra.view(real)
         squares = np.square(parts, out=parts)
@@ -258,7 +268,7 @@ def _columns(
             received = np.roll(
                 squares[:, ::2] + squares[:, 1::2], tx * window // radar.n_doppler_bands, axis=0
             )
-            own = without_copies(received, radar, 1) / radar.n_tx
+            own = without_copies(received, radar, 1, window_functions) / radar.n_tx
             power[row] = own.sum(axis=1)
         else:
             power[row] = squares.sum(axis=1)

@@ -1,39 +1,120 @@
-"""Windows that samples are weighted by before a Fourier transform."""
+"""Window functions, by which samples are weighted before a Fourier transform over fast or slow time."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 
+WindowName = str | tuple[str, float]
+"""Name of a window function, or its name and its parameter."""
+
+NAMES = (
+    "barthann",
+    "bartlett",
+    "blackman",
+    "blackmanharris",
+    "bohman",
+    "boxcar",
+    "cosine",
+    "flattop",
+    "hamming",
+    "hann",
+    "nuttall",
+    "parzen",
+    "taylor",
+    "triang",
+    "tukey",
+)
+"""Window functions that take no parameter, as `scipy.signal.get_window` names them."""
+
+PARAMETERS = {"chebwin": (45.0, 300.0), "kaiser": (0.0, 50.0)}
+"""Window functions with a parameter and its limits: side-lobe attenuation [dB] of ``chebwin``, beta of ``kaiser``."""
+
+_LOBE_SAMPLES = 64
+_LOBE_STEPS = 16
+
+
+@dataclass(frozen=True)
+class WindowFunctions:
+    """The window functions of the transforms over fast time (range) and over slow time (Doppler).
+
+    All of them are periodic (DFT-even). A spectrum is divided by the sum of its weights, so a tone of amplitude 1 in the
+    middle of a bin reads 1 under any of them.
+
+    Parameters
+    ----------
+    range, doppler : str or (str, float)
+        Name of a window function as `scipy.signal.get_window` knows it, such as ``hann`` or ``blackman``, or a name and
+        a parameter: ``("chebwin", 80)`` for side lobes at -80 dB, ``("kaiser", 8.6)`` for beta.
+
+    Raises
+    ------
+    InputError
+        Where there is no such window function, or its parameter is missing or outside of its limits.
+    """
+
+    range: WindowName = "hann"
+    doppler: WindowName = "hann"
+
+    def __post_init__(self) -> None:
+        for field in ("range", "doppler"):
+            object.__setattr__(self, field, _checked(getattr(self, field), f"{field} window"))
+
+    @property
+    def main_lobe_bins(self) -> tuple[int, int]:
+        """Half widths of the main lobe in Doppler and in range [bins]; 2 of ``hann``."""
+        return _main_lobe_bins(self.doppler), _main_lobe_bins(self.range)
+
+
+@lru_cache(maxsize=64)
+def weights(window: WindowName, n: int) -> NDArray[np.float64]:
+    """Weights (sample,) of a periodic window function, divided by their sum; read-only."""
+    if window == "hann":
+        values = hann(n)
+    else:
+        from scipy.signal import get_window  # here, for scipy.signal is slow to import
+
+        values = np.asarray(get_window(window, n, fftbins=True), dtype=np.float64)
+    values = values / values.sum()
+    values.flags.writeable = False
+    return values
+
 
 def hann(n: int) -> NDArray[np.float64]:
-    """Periodic (DFT-even) Hann window (sample,); one sample alone is 1."""
+    """Periodic Hann window (sample,), which is the default and needs no SciPy; one sample alone is 1."""
     if n == 1:
         return np.ones(1)
     return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
 
 
-def weights(window: ArrayLike | None, n: int, name: str) -> NDArray[np.float64]:
-    """The window, Hann if none is given, divided by its sum."""
-    if window is None:
-        return _hann_weights(n)
-    given = np.asarray(window)
-    if given.shape != (n,) or given.dtype.kind not in "fiu" or not np.isfinite(given).all():
-        raise InputError(
-            f"{name} has shape {given.shape}, type {given.dtype}; it must be {n} finite real numbers"
-        )
-    total = float(given.sum())
-    if total == 0:
-        raise InputError(f"{name} sums to 0; a window needs weight")
-    return given.astype(np.float64) / total
+@lru_cache(maxsize=64)
+def _main_lobe_bins(window: WindowName) -> int:
+    spectrum = np.abs(np.fft.rfft(weights(window, _LOBE_SAMPLES), _LOBE_STEPS * _LOBE_SAMPLES))
+    # Below half of its top, where a flat top has no ripple any more.
+    first_null = int(np.argmax((np.diff(spectrum) > 0) & (spectrum[:-1] < 0.5 * spectrum.max())))
+    return -(-first_null // _LOBE_STEPS)
 
 
-@lru_cache(maxsize=16)
-def _hann_weights(n: int) -> NDArray[np.float64]:
-    weights = hann(n) / hann(n).sum()
-    weights.flags.writeable = False
-    return weights
+def _checked(window: Any, name: str) -> WindowName:
+    """The window as a name or a tuple; TOML and JSON give lists."""
+    if isinstance(window, str) and window in NAMES:
+        return window
+    if isinstance(window, list | tuple) and len(window) == 2 and window[0] in PARAMETERS:
+        least, most = PARAMETERS[window[0]]
+        value = window[1]
+        if isinstance(value, int | float) and least <= value <= most:
+            return (str(window[0]), float(value))
+    with_parameter = ", ".join(
+        f"({kind}, {least:g} to {most:g})" for kind, (least, most) in PARAMETERS.items()
+    )
+    raise InputError(f"{name} {window!r} is unknown; allowed: {', '.join(NAMES)}, {with_parameter}")
+
+
+HANN = WindowFunctions()
+"""The default of everything that transforms."""

@@ -25,7 +25,6 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.signal.windows import chebwin
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
@@ -162,16 +161,13 @@ def floor_of(
     radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, int], tuple[float, float]]
 ) -> Floor:
     n = radar.cycles_per_frame
-    fast, slow = (
-        chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False),
-        chebwin(n, ATTENUATION_DB, sym=False),
-    )
+    chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
     echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
     x = rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps)))
-    spectrum = rt.process.range_doppler(x, radar, range_window=fast, doppler_window=slow)
+    spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
     found = []
     for (tx, rx), (least, most) in bands.items():
         power = np.abs(spectrum.values[:, :, tx * radar.n_rx + rx]) ** 2

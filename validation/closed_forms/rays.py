@@ -31,7 +31,6 @@ import trimesh
 from doppler_floor import ATTENUATION_DB, MOTIONS, Moving, beyond, main_lobe_bins, true_velocities
 from numpy.typing import NDArray
 from scipy.optimize import minimize
-from scipy.signal.windows import chebwin
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
@@ -422,10 +421,7 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
         bandwidth_hz=1e9,
     )
     n = radar.cycles_per_frame
-    fast, slow = (
-        chebwin(radar.samples_per_chirp, ATTENUATION_DB, sym=False),
-        chebwin(n, ATTENUATION_DB, sym=False),
-    )
+    chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     bodies: dict[str, Moving] = {name: MOTIONS[name] for name in list(MOTIONS)[: 1 if quick else 3]}
     for name, body in bodies.items():
@@ -433,7 +429,7 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
         for dial, anchors in ((3.0, 10e-3),) if quick else ((1.0, 0.0), (3.0, 0.0), (3.0, 10e-3)):
             rung = Rays(radar, body, rays_per_wavelength=dial, bounces=1, anchor_s=anchors)  # type: ignore[arg-type]
             x = rt.signal.synthesize(rung.echoes(np.arange(n)), radar, radar.chirp_times(n))
-            spectrum = rt.process.range_doppler(x, radar, range_window=fast, doppler_window=slow)
+            spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
             power = np.abs(spectrum.values[:, :, 0]) ** 2
             outside = beyond(
                 spectrum.velocity, least - 2 * lobe, most + 2 * lobe, 2 * radar.max_velocity_mps

@@ -19,7 +19,6 @@ from dataclasses import replace
 import numpy as np
 from doppler_floor import ATTENUATION_DB, main_lobe_bins
 from numpy.typing import NDArray
-from scipy.signal.windows import chebwin
 
 import rtradar as rt
 from rtradar.pipeline.rooms.clutter_if import RoomIf
@@ -261,13 +260,8 @@ def still_rows(quick: bool) -> Iterator[Row]:
         n = min(radar.cycles_per_frame, 400)
         clutter = Clutter(radar, scene)
         samples = RoomIf(clutter).clutter_if(np.arange(n * radar.n_tx))
-        # Periodic, as windows of spectra are: one point longer and cut.
-        windows = [
-            chebwin(length + 1, ATTENUATION_DB)[:-1] for length in (radar.samples_per_chirp, n)
-        ]
-        spectra = rt.process.range_doppler(
-            samples, radar, range_window=windows[0], doppler_window=windows[1]
-        )
+        chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
+        spectra = rt.process.range_doppler(samples, radar, window_functions=chebyshev)
         power = (np.abs(spectra.values) ** 2).max(axis=(0, 2))
         beside = np.abs(np.arange(n) - n // 2) > np.ceil(main_lobe_bins(n + 1))
         floor = 10 * np.log10(max(power[beside].max(), 1e-300) / power.max())

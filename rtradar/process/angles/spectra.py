@@ -36,6 +36,7 @@ from rtradar.process.angles.steering import (
 )
 from rtradar.process.cells import cell_spectra
 from rtradar.process.spectra import range_spectrum
+from rtradar.process.window_functions import HANN, WindowFunctions
 from rtradar.radar import Radar
 from rtradar.system.threads import in_threads
 
@@ -165,7 +166,13 @@ def angle_spectra(
 
 
 def angle(
-    x: ArrayLike, radar: Radar, range_m: float, velocity: float, focus: bool = True
+    x: ArrayLike,
+    radar: Radar,
+    range_m: float,
+    velocity: float,
+    focus: bool = True,
+    *,
+    window_functions: WindowFunctions = HANN,
 ) -> tuple[float, float]:
     """Direction of the strongest echo in one range-Doppler cell.
 
@@ -177,7 +184,9 @@ def angle(
     range_m, velocity : float
         Range [m] and range rate [m/s] in the middle of the window; the nearest cell of the map is taken.
     focus : bool
-        As in `angle_spectra`.
+        See `angle_spectra`.
+    window_functions : WindowFunctions
+        Window functions in fast time and in slow time.
 
     Returns
     -------
@@ -197,7 +206,7 @@ def angle(
     """
     virtual_lines(radar)
     samples = np.asarray(x)
-    spectra = range_spectrum(samples, radar)
+    spectra = range_spectrum(samples, radar, window_functions=window_functions)
     if not np.isfinite(spectra).all():
         raise InputError("angle: x holds NaN or infinity; every IF sample must be finite")
     n_cycles = len(spectra) // radar.n_tx
@@ -217,7 +226,13 @@ def angle(
             f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s, the unambiguous one"
         )
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
-    values = cell_spectra(cube, radar, [row], [(column + n_cycles // 2) % n_cycles])
+    values = cell_spectra(
+        cube,
+        radar,
+        [row],
+        [(column + n_cycles // 2) % n_cycles],
+        window_functions=window_functions,
+    )
     found = angle_spectra(
         values, radar, [row * radar.range_bin_m], [column * step], focus=focus, taper="uniform"
     )

@@ -33,7 +33,7 @@ from scipy.linalg import eig_banded
 from rtradar.errors import InputError
 from rtradar.process.clutter import check_time_constant
 from rtradar.process.detection.cfar_thresholds import check_looks, check_pfa, multiplier
-from rtradar.process.window_functions import hann
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
 _FORGOTTEN = 1e-4
@@ -49,7 +49,7 @@ class ClutterMap:
     Parameters
     ----------
     radar : Radar
-        Gives the windows and what they share; they are taken to be Hann windows in slow time.
+        Gives the windows and what they share.
     time_constant_s : float
         Of forgetting [s].
     pfa : float
@@ -59,6 +59,8 @@ class ClutterMap:
         Channels summed in each cell.
     scale : float, optional
         The multiplier itself, instead of those solved for ``pfa``.
+    window_functions : WindowFunctions
+        Window functions of the maps; that in slow time tells how windows that share chirps are correlated.
 
     Raises
     ------
@@ -74,6 +76,7 @@ class ClutterMap:
         pfa: float = 1e-6,
         looks: int = 1,
         scale: float | None = None,
+        window_functions: WindowFunctions = HANN,
     ) -> None:
         check_pfa(pfa)
         check_looks(looks)
@@ -82,6 +85,7 @@ class ClutterMap:
                 f"clutter map: scale = {scale!r}; a multiplier must be positive and finite"
             )
         self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
+        self._window_functions = window_functions
         hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
         self._share = -math.expm1(-1 / hops)
         self._memory = math.ceil(
@@ -158,7 +162,9 @@ class ClutterMap:
         # The more windows, the less one more matters: solved anew for each of the first 100, then in growing steps. What is
         # kept meanwhile is the multiplier of fewer windows, and the rate at most 5 % too low at 1e-6, less above.
         if count >= self._solved_for + max(1.0, self._solved_for**2 / 5000):
-            self._scale = _scale_after(count, self._share, self._radar, self._pfa, self._looks)
+            self._scale = _scale_after(
+                count, self._share, self._radar, self._pfa, self._looks, self._window_functions
+            )
             self._solved_for = count
         return self._scale
 
@@ -232,7 +238,14 @@ def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:
 
 
 @lru_cache(maxsize=1024)
-def _scale_after(count: int, share: float, radar: Radar, pfa: float, looks: int) -> float:
+def _scale_after(
+    count: int,
+    share: float,
+    radar: Radar,
+    pfa: float,
+    looks: int,
+    window_functions: WindowFunctions,
+) -> float:
     """Multiplier of a map that holds this many windows; the captures of one radar share these."""
     steps = np.maximum(share, 1 / np.arange(1.0, count + 1))
     later = np.append(
@@ -244,9 +257,9 @@ def _scale_after(count: int, share: float, radar: Radar, pfa: float, looks: int)
     if len(band) > 1:
         n = radar.cycles_per_frame
         starts = radar.window_starts((math.ceil(count * radar.hop_cycles) + n) * radar.n_tx)[:count]
-        shared = (
-            np.append(np.correlate(hann(n), hann(n), "full")[n - 1 :], 0.0) / (hann(n) ** 2).sum()
-        )
+        slow = weights(window_functions.doppler, n)
+        shared = np.append(np.correlate(slow, slow, "full")[n - 1 :], 0.0)
+        shared /= shared[0]
         for lag in range(1, len(band)):
             apart = np.minimum(starts[lag:] - starts[:-lag], n)
             band[lag, :-lag] = shared[apart] * root[lag:] * root[:-lag]

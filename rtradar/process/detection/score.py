@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.window_functions import hann
+from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
 
@@ -105,8 +105,10 @@ def target_cells(power: ArrayLike, noise_power: float, margin_db: float) -> NDAr
     return np.asarray(np.asarray(power) > noise_power * 10 ** (margin_db / 10))
 
 
-def cell_noise_power(noise_power: float, radar: Radar, looks: int = 1) -> float:
-    """Mean noise power of a cell of `power_map` with its Hann windows.
+def cell_noise_power(
+    noise_power: float, radar: Radar, looks: int = 1, window_functions: WindowFunctions = HANN
+) -> float:
+    """Mean noise power of a cell of `power_map`.
 
     White noise of power P a sample leaves P sum(w^2) / sum(w)^2 in a spectrum divided by the sum of its window; so once for
     fast time and once for slow time, and added up over channels.
@@ -119,14 +121,17 @@ def cell_noise_power(noise_power: float, radar: Radar, looks: int = 1) -> float:
         Gives the lengths of the windows.
     looks : int
         Channels summed in the map.
+    window_functions : WindowFunctions
+        Window functions of the map.
 
     Returns
     -------
     float
         In the unit of ``noise_power``.
     """
-    fast, slow = (hann(n) for n in (radar.samples_per_chirp, radar.cycles_per_frame))
-    return float(looks * noise_power * np.prod([(w**2).sum() / w.sum() ** 2 for w in (fast, slow)]))
+    fast = weights(window_functions.range, radar.samples_per_chirp)
+    slow = weights(window_functions.doppler, radar.cycles_per_frame)
+    return float(looks * noise_power * np.sum(fast**2) * np.sum(slow**2))
 
 
 def _share(part: int, whole: int) -> float:
