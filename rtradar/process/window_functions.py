@@ -1,4 +1,4 @@
-"""Window functions, by which samples are weighted before a Fourier transform over fast or slow time."""
+"""Window functions, which weight samples before a Fourier transform over fast or slow time."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ NAMES = (
 """Window functions that take no parameter, as `scipy.signal.get_window` names them."""
 
 PARAMETERS = {"chebwin": (45.0, 300.0), "kaiser": (0.0, 50.0)}
-"""Window functions with a parameter and its limits: side-lobe attenuation [dB] of ``chebwin``, beta of ``kaiser``."""
+"""Limits of the parameter: side-lobe attenuation [dB] of ``chebwin``, beta of ``kaiser``."""
 
 _LOBE_SAMPLES = 64
 _LOBE_STEPS = 16
@@ -44,19 +44,20 @@ _LOBE_STEPS = 16
 class WindowFunctions:
     """The window functions of the transforms over fast time (range) and over slow time (Doppler).
 
-    All of them are periodic (DFT-even). A spectrum is divided by the sum of its weights, so a tone of amplitude 1 in the
-    middle of a bin reads 1 under any of them.
+    All of them are periodic (DFT-even). A spectrum is divided by the sum of its weights, so a tone
+    of amplitude 1 in the middle of a bin reads 1 under any of them.
 
     Parameters
     ----------
     range, doppler : str or (str, float)
-        Name of a window function as `scipy.signal.get_window` knows it, such as ``hann`` or ``blackman``, or a name and
-        a parameter: ``("chebwin", 80)`` for side lobes at -80 dB, ``("kaiser", 8.6)`` for beta.
+        Name of a window function as `scipy.signal.get_window` knows it, such as ``hann`` or
+        ``blackman``, or a name and a parameter: ``("chebwin", 80)`` for side lobes at -80 dB,
+        ``("kaiser", 8.6)`` for beta.
 
     Raises
     ------
     InputError
-        Where there is no such window function, or its parameter is missing or outside of its limits.
+        Where there is no such window function, or its parameter is missing or beyond its limits.
     """
 
     range: WindowName = "hann"
@@ -87,7 +88,7 @@ def weights(window: WindowName, n: int) -> NDArray[np.float64]:
 
 
 def hann(n: int) -> NDArray[np.float64]:
-    """Periodic Hann window (sample,), which is the default and needs no SciPy; one sample alone is 1."""
+    """Periodic Hann window (sample,), the default, which needs no SciPy; one sample alone is 1."""
     if n == 1:
         return np.ones(1)
     return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,7 +127,7 @@ MAPS: dict[str, tuple[Callable[[], np.ndarray], np.ndarray]] = {
 def test_side_lobes_of_a_tone_are_those_of_the_window_in_every_map(name: str) -> None:
     found, expected = MAPS[name][0](), MAPS[name][1]
     assert found.shape == expected.shape
-    # Range spectra are complex64: amplitudes are rounded to 1e-7 of the tone, side lobes lie above 1e-5 of it.
+    # Range spectra are complex64: their amplitudes are rounded to 1e-7 of the tone.
     np.testing.assert_allclose(
         np.sqrt(found), np.sqrt(expected), rtol=1e-4, atol=1e-6 * np.sqrt(expected.max())
     )
@@ -151,6 +152,28 @@ def test_angles_take_the_windows() -> None:
     assert abs(found - angle(x, RADAR, RADAR.range_m[10], velocity)[0]) > 1e-3
 
 
+@pytest.mark.parametrize("windows", [WindowFunctions(), OTHER, WindowFunctions("hann", "flattop")])
+def test_doppler_division_removes_the_copies_as_wide_as_the_window_makes_them(
+    windows: WindowFunctions,
+) -> None:
+    radar = replace(RADAR, multiplexing="ddm", doppler_bands=4, frame_duration_s=16e-3)
+    n = radar.cycles_per_frame
+    cycle, sample = np.arange(n)[:, None, None], np.broadcast_to(np.arange(64), (radar.n_rx, 64))
+    echo = np.exp(2j * np.pi * (RANGE_BIN * sample / 64 + DOPPLER_BIN * cycle / n))
+    # Each Tx moves the echo by a band, which separating turns back: rows of a Tx hold both.
+    both = echo * (1 + np.exp(2j * np.pi * cycle / radar.n_doppler_bands))
+    random = np.random.default_rng(0)
+    noise = random.standard_normal((*both.shape, 2)) @ [1e-4, 1e-4j]
+    spectra = range_spectrum(both + noise, radar, window_functions=windows)
+    cube = np.repeat(spectra[:, None], radar.n_tx, axis=1)
+    power = power_map(cube, radar, window_functions=windows)
+    lobe = np.arange(-windows.main_lobe_bins[0], windows.main_lobe_bins[0] + 1)
+    column = int(power.max(axis=0).argmax())
+    bands = n // radar.n_doppler_bands * np.arange(1, radar.n_doppler_bands)[:, None]
+    copies = power[:, (column + bands + lobe) % n]
+    assert copies.max() < 1e-6 * power.max()
+
+
 def test_noise_of_a_cell_and_the_clutter_map_take_the_windows() -> None:
     expected = 2.0 * np.sum(weights("blackman", 64) ** 2) * np.sum(weights("nuttall", CYCLES) ** 2)
     windows = WindowFunctions("blackman", "nuttall")
@@ -165,8 +188,8 @@ def test_noise_of_a_cell_and_the_clutter_map_take_the_windows() -> None:
         frame_duration_s=16e-3,
         frame_hop_s=4e-3,
     )
-    # Windows that share chirps are the more alike the flatter their window function is; the more alike, the higher
-    # the multiplier of a young map.
+    # Frames that share chirps are the more alike the flatter their window function is; the more
+    # alike, the higher the multiplier of a young map.
     scales = []
     for name in ("boxcar", "hann", "blackmanharris"):
         clutter = ClutterMap(overlapping, pfa=1e-3, window_functions=WindowFunctions(doppler=name))
@@ -229,4 +252,5 @@ def test_what_is_no_window_is_refused_in_one_line(field: str, given: object) -> 
 
 def test_a_list_from_a_file_is_a_window() -> None:
     given: object = ["kaiser", 8]
-    assert WindowFunctions(range=given) == WindowFunctions(range=("kaiser", 8.0))  # type: ignore[arg-type]
+    found = WindowFunctions(range=given)  # type: ignore[arg-type]
+    assert found == WindowFunctions(range=("kaiser", 8.0))
