@@ -174,7 +174,8 @@ class CodeTable(Directive):
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Write it in Markdown, and let the page's parser read it."""
+        """Write it in Markdown, and let the page's parser read it; the page is read anew at the next build."""
+        self.state.document.settings.env.note_reread()
         node = nodes.container()
         lines = TABLES[self.arguments[0]]().splitlines()
         self.state.nested_parse(StringList(lines, source=__file__), self.content_offset, node)
