@@ -1,6 +1,6 @@
-"""The scene: what stands around the person, of which materials, and how Mitsuba is told of the body.
+"""The scene: walls and furniture around the person, and their materials.
 
-Meshes are read by trimesh, which loads when the first one is.
+Meshes are read by trimesh, which is imported when the first mesh is read.
 """
 
 from rtradar.scene.furniture import Furniture

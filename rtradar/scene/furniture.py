@@ -1,4 +1,4 @@
-"""Furniture: a mesh, its material, and where it stands."""
+"""Furniture: a mesh with a material and a position."""
 
 from __future__ import annotations
 
@@ -13,36 +13,38 @@ from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes
 from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
 
 SMALLEST_M, LARGEST_M = 1e-3, 100.0
-"""What furniture may measure in its longest direction."""
+"""Limits of the size of furniture along its longest axis [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Furniture:
-    """A mesh that stands in a scene.
+    """A mesh in a scene.
 
     Parameters
     ----------
     name : str
-        Shown in reports.
+        Name that reports show.
     mesh : str or Path
-        A name of `mesh_names`, or a file of ``.ply .obj .stl .glb``.
+        Name of a mesh that comes with rtradar, or a file of ``.ply .obj .stl .glb``.
     material : Material
-        Of its surface.
+        Material of the surface.
     position_m : tuple of float
-        Where the mesh's own origin goes, world [m].
+        Position of the mesh's own origin, world [m].
     yaw_deg : float
-        Turn about the vertical through its origin, anticlockwise seen from above [deg].
+        Rotation about the vertical through that origin, anticlockwise seen from above [deg].
     scale : float
-        Larger or smaller than it was made.
+        Factor by which the mesh is enlarged.
     metres_per_unit : float, optional
-        Of a file: 1 for metres, 0.001 for millimetres. Meshes by name are in metres, and take none.
+        Unit of a file [m]: 1 for metres, 0.001 for millimetres. Meshes by name are in metres, and
+        take none.
     sheet : bool
-        A file whose mesh is not closed must be meant so: it is then a thin sheet, and must be of metal.
+        Whether the mesh of a file is a thin sheet. A mesh that is not closed must be one, and must
+        be of metal.
 
     Raises
     ------
     InputError
-        Where a value has no meaning. The mesh itself is read, and judged, by `triangles`.
+        Where a value has no meaning. The mesh itself is read and checked by `triangles`.
     """
 
     name: str
@@ -59,30 +61,31 @@ class Furniture:
         where = f"furniture '{self.name}'"
         if not isinstance(self.material, Material):
             raise InputError(
-                f"{where}: material = {shown(self.material)}; it must be a Material, as material('wood') gives"
+                f"{where}: material = {shown(self.material)}; it must be a Material, as "
+                "material('wood') gives"
             )
-        object.__setattr__(
-            self, "position_m", check_vector(where, "position_m", self.position_m, 3)
-        )
-        object.__setattr__(
-            self, "yaw_deg", check_number(where, "yaw_deg", self.yaw_deg, -360.0, 360.0)
-        )
+        position = check_vector(where, "position_m", self.position_m, 3)
+        object.__setattr__(self, "position_m", position)
+        yaw = check_number(where, "yaw_deg", self.yaw_deg, -360.0, 360.0)
+        object.__setattr__(self, "yaw_deg", yaw)
         object.__setattr__(self, "scale", check_number(where, "scale", self.scale, 1e-3, 1e3))
         if not isinstance(self.sheet, bool):
             raise InputError(f"{where}: sheet = {shown(self.sheet)}; it must be true or false")
         if self._comes_along:
             if self.mesh not in mesh_names():
                 raise InputError(
-                    f"{where}: mesh = {shown(self.mesh)} is unknown; allowed: {', '.join(mesh_names())}, "
-                    f"or a file of {' '.join(MESH_ENDINGS)}"
+                    f"{where}: mesh = {shown(self.mesh)} is unknown; allowed: "
+                    f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
                 )
             if self.metres_per_unit is not None or self.sheet:
                 raise InputError(
-                    f"{where}: metres_per_unit and sheet belong to a file of one's own; '{self.mesh}' has both settled"
+                    f"{where}: metres_per_unit and sheet belong to a file of one's own; "
+                    f"'{self.mesh}' has both settled"
                 )
         elif self.metres_per_unit is None:
             raise InputError(
-                f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: 1 for m, 0.001 for mm"
+                f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
+                "1 for m, 0.001 for mm"
             )
         else:
             unit = check_number(where, "metres_per_unit", self.metres_per_unit, 1e-6, 1e3)
@@ -98,23 +101,25 @@ class Furniture:
         return meshes_folder() / f"{self.mesh}.ply" if self._comes_along else Path(self.mesh)
 
     def triangles(self) -> Triangles:
-        """Its mesh as it stands in the scene, world [m].
+        """Read the mesh, and move it to its position in the scene.
 
         Returns
         -------
         Triangles
-            Where it stands, world [m].
+            Mesh in world coordinates [m].
 
         Raises
         ------
         InputError
-            Where the file cannot be read or used, the mesh is open without being a sheet, or has an impossible size.
+            Where the file cannot be read or used, the mesh is open without being a sheet, or has an
+            impossible size.
         """
         where = f"furniture '{self.name}'"
         read = read_mesh(self.path)
         if not (read.closed or self.sheet or self._comes_along):
             raise InputError(
-                f"{where}: mesh '{self.mesh}' is not closed; close its holes, or say sheet = true if it is a thin sheet"
+                f"{where}: mesh '{self.mesh}' is not closed; close its holes, or say sheet = true "
+                "if it is a thin sheet"
             )
         if read.closed and self.sheet:
             raise InputError(
@@ -122,19 +127,19 @@ class Furniture:
             )
         if not read.closed and not self.material.conducts:
             raise InputError(
-                f"{where}: material '{self.material.name}' of a thin sheet; allowed: metal, perfect-conductor"
+                f"{where}: material '{self.material.name}' of a thin sheet; allowed: metal, "
+                "perfect-conductor"
             )
         vertices = read.vertices * (self.scale * (self.metres_per_unit or 1.0))
         size = float(np.ptp(vertices, axis=0).max())
         if not SMALLEST_M <= size <= LARGEST_M:
             raise InputError(
-                f"{where}: its mesh measures {size:.3g} m; allowed are {SMALLEST_M:g} to {LARGEST_M:g} m: "
-                "see to metres_per_unit and scale"
+                f"{where}: its mesh measures {size:.3g} m; allowed are {SMALLEST_M:g} to "
+                f"{LARGEST_M:g} m: see to metres_per_unit and scale"
             )
         angle = np.radians(self.yaw_deg)
-        turn = np.array(
-            [[np.cos(angle), -np.sin(angle), 0], [np.sin(angle), np.cos(angle), 0], [0, 0, 1]]
-        )
-        vertices = vertices @ turn.T + np.array(self.position_m)
+        cosine, sine = np.cos(angle), np.sin(angle)
+        rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+        vertices = vertices @ rotation.T + np.array(self.position_m)
         vertices.setflags(write=False)
         return Triangles(vertices, read.faces, read.closed)

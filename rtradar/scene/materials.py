@@ -1,41 +1,120 @@
-"""Materials of rooms and of people: complex relative permittivity over frequency, each with its source and its limits.
+"""Materials of rooms and people: complex relative permittivity over frequency.
+
+Each material names the source of its figures and the frequencies for which they are given.
 
 References
 ----------
-ITU-R P.2040-3 (08/2023), "Effects of building materials and structures on radiowave propagation above about 100 MHz",
-table 3: eps_r = a f^b and sigma = c f^d [S/m] with f in GHz.
+ITU-R P.2040-3 (08/2023), "Effects of building materials and structures on radiowave propagation
+above about 100 MHz", table 3: eps_r = a f^b and sigma = c f^d [S/m] with f in GHz.
 
-S. Gabriel, R. W. Lau and C. Gabriel, "The dielectric properties of biological tissues: III. Parametric models for the
-dielectric spectrum of tissues", Phys. Med. Biol. 41 (1996) 2271-2293: four Cole-Cole terms.
+S. Gabriel, R. W. Lau and C. Gabriel, "The dielectric properties of biological tissues: III.
+Parametric models for the dielectric spectrum of tissues", Phys. Med. Biol. 41 (1996) 2271-2293:
+four Cole-Cole terms.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from math import isfinite
+from math import inf, isfinite, pi
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.scene.permittivity import ColeCole, Conductor, PowerLaw
 from rtradar.system.checks import check_number, check_text, shown
+
+VACUUM_PERMITTIVITY_FPM = 8.8541878188e-12
+"""Permittivity of vacuum [F/m], CODATA 2022.
+
+P.2040-3 rounds 1e-9 / (2 pi eps_0) = 17.975 to 17.98."""
+
+
+@dataclass(frozen=True)
+class PowerLaw:
+    """Permittivity a f^b and conductivity c f^d [S/m], f in GHz: a row of ITU-R P.2040-3, table 3.
+
+    Parameters
+    ----------
+    low_hz, high_hz : float
+        Limits of the measured band, which belong to it [Hz].
+    a, b, c, d : float
+        Constants of the Recommendation.
+    """
+
+    low_hz: float
+    high_hz: float
+    a: float
+    b: float
+    c: float
+    d: float
+
+    def eta(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
+        ghz = frequency_hz / 1e9
+        conductivity = self.c * ghz**self.d
+        return np.asarray(
+            self.a * ghz**self.b
+            - 1j * conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
+        )
+
+
+@dataclass(frozen=True)
+class ColeCole:
+    """Sum of Cole-Cole relaxations and an ionic conductivity.
+
+    Parameters
+    ----------
+    low_hz, high_hz : float
+        Limits of the band, which belong to it [Hz].
+    infinite : float
+        Relative permittivity far above all relaxations.
+    terms : tuple of (float, float, float)
+        Step of permittivity, relaxation time [s] and broadening alpha of each relaxation.
+    conductivity : float
+        Ionic conductivity [S/m].
+    """
+
+    low_hz: float
+    high_hz: float
+    infinite: float
+    terms: tuple[tuple[float, float, float], ...]
+    conductivity: float
+
+    def eta(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
+        omega = 2 * pi * frequency_hz
+        eta = self.infinite + self.conductivity / (1j * omega * VACUUM_PERMITTIVITY_FPM)
+        for step, time, alpha in self.terms:
+            eta = eta + step / (1 + (1j * omega * time) ** (1 - alpha))
+        return np.asarray(eta)
+
+
+@dataclass(frozen=True)
+class Conductor:
+    """Perfect conductor: the permittivity is -j infinity, which `reflection` and `slab` know."""
+
+    low_hz: float = 0.0
+    high_hz: float = inf
+
+    def eta(self, frequency_hz: NDArray[np.float64]) -> NDArray[np.complex128]:
+        """Complex relative permittivity, minus j infinity."""
+        return np.full(frequency_hz.shape, complex(0.0, -inf))
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """What a wall, a piece of furniture or a person is made of.
+    """Material of a wall, a piece of furniture or a person.
 
     Parameters
     ----------
     name : str
-        As scene files call it.
+        Name of the material in scene files.
     source : str
-        Where the figures come from.
+        Publication that gives the figures.
     bands : tuple of PowerLaw, ColeCole or Conductor
-        One or more; the first that holds a frequency is taken.
+        Laws over frequency, one or more; the first whose band holds a frequency is used.
     """
 
     name: str
@@ -44,19 +123,19 @@ class Material:
 
     @property
     def conducts(self) -> bool:
-        """Whether it reflects so well that a sheet of it needs no thickness: sigma of 1e6 S/m or more."""
+        """Whether a sheet of it needs no thickness: its conductivity is 1e6 S/m or more."""
         return all(
             isinstance(band, Conductor) or (isinstance(band, PowerLaw) and band.c >= 1e6)
             for band in self.bands
         )
 
     def holds(self, frequency_hz: ArrayLike) -> NDArray[np.bool_]:
-        """Whether its figures are given at these frequencies [Hz], of any shape.
+        """Tell whether the figures are given at some frequencies.
 
         Parameters
         ----------
         frequency_hz : (...) array_like
-            [Hz].
+            Frequencies [Hz].
 
         Returns
         -------
@@ -67,12 +146,14 @@ class Material:
         return np.asarray(np.any(inside, axis=0) & np.isfinite(frequency) & (frequency > 0))
 
     def eta(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
-        """Complex relative permittivity eps_r - j sigma / (omega eps_0), exp(+j omega t).
+        """Compute the complex relative permittivity eps_r - j sigma / (omega eps_0).
+
+        The time factor is exp(+j omega t).
 
         Parameters
         ----------
         frequency_hz : (...) float
-            [Hz]
+            Frequencies [Hz].
 
         Returns
         -------
@@ -102,8 +183,8 @@ class Material:
             sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz))
         )
         raise InputError(
-            f"material '{self.name}' at {frequency_hz / 1e9:g} GHz: {self.source} gives it for {limits}; known there: "
-            f"{others or 'none'}; or give one of your own, with its source"
+            f"material '{self.name}' at {frequency_hz / 1e9:g} GHz: {self.source} gives it for "
+            f"{limits}; known there: {others or 'none'}; or give one of your own, with its source"
         )
 
 
@@ -156,15 +237,17 @@ def _known() -> dict[str, Material]:
 
 
 MATERIALS: Mapping[str, Material] = MappingProxyType(_known())
-"""Those known by name. ``metal`` is that of the Recommendation, 1e7 S/m; the body of the paper is ``perfect-conductor``."""
+"""Materials by their names. ``metal`` is that of the Recommendation, with 1e7 S/m; the body of the
+paper is a ``perfect-conductor``."""
 
 
 def material(name: str) -> Material:
-    """The material of that name among `MATERIALS`.
+    """Find the material of a name among `MATERIALS`.
 
     Parameters
     ----------
     name : str
+        One of `MATERIALS`.
 
     Returns
     -------
@@ -173,7 +256,7 @@ def material(name: str) -> Material:
     Raises
     ------
     InputError
-        Where there is none.
+        Where there is no such material.
     """
     if not isinstance(name, str) or name not in MATERIALS:
         raise InputError(
@@ -193,18 +276,18 @@ def own_material(
     c: object = 0.0,
     d: object = 0.0,
 ) -> Material:
-    """A material by constants of one's own: permittivity a f^b and conductivity c f^d [S/m], f in GHz.
+    """Make a material from constants: permittivity a f^b, conductivity c f^d [S/m], f in GHz.
 
     Parameters
     ----------
     name : str
-        Must not be one of `MATERIALS`.
+        Name of the material, none of `MATERIALS`.
     source : str
-        Where the constants come from: never empty.
+        Publication or measurement that gives the constants; it must not be empty.
     low_hz, high_hz : float
-        Between which frequencies they hold [Hz].
+        Limits of the frequencies for which the constants hold [Hz].
     a, b, c, d : float
-        As in ITU-R P.2040-3.
+        Constants of the power laws, defined as in ITU-R P.2040-3.
 
     Returns
     -------
@@ -219,7 +302,8 @@ def own_material(
     check_text(where, "its name", name)
     if name in MATERIALS:
         raise InputError(
-            f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your own figures"
+            f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your own "
+            "figures"
         )
     check_text(where, "source", source)
     low = check_number(where, "low_hz", low_hz, 1e6, 1e12)
@@ -234,11 +318,11 @@ def own_material(
         )
     ]
     law = PowerLaw(low, high, *constants)
-    # A power law is monotonic, so its ends tell.
+    # A power law is monotonic, so its ends suffice.
     ends = law.eta(np.array([low, high]))
     if not all(value.real >= 1.0 and isfinite(abs(value)) for value in ends):
         raise InputError(
-            f"{where}: a = {shown(a)}, b = {shown(b)} give a permittivity of {ends[0].real:.3g} to {ends[1].real:.3g}; "
-            "it must be 1 or more"
+            f"{where}: a = {shown(a)}, b = {shown(b)} give a permittivity of {ends[0].real:.3g} to "
+            f"{ends[1].real:.3g}; it must be 1 or more"
         )
     return Material(name=name, source=str(source), bands=(law,))

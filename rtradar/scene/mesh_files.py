@@ -1,9 +1,13 @@
-"""Triangle meshes, which may be anybody's, from files or not: checked in one place, closed or known to be open."""
+"""Triangle meshes, from files or arrays, checked in one place.
+
+Files may come from strangers: their sizes and headers are checked before a reader reserves memory.
+"""
 
 from __future__ import annotations
 
 import codecs
 import io
+import json
 import os
 import re
 import struct
@@ -17,7 +21,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.scene.mesh_headers import refuse_hostile_header
 from rtradar.system.checks import shown
 from rtradar.system.files import open_regular, read_bytes
 
@@ -26,24 +29,28 @@ MOST_FACES = 2_000_000
 MOST_BYTES = 200_000_000
 _STL_HEADER_BYTES, _STL_FACE_BYTES = 84, 50
 _TO_ASCII = bytes(range(128)).ljust(256, b"?")
+_MOST_PLY_HEADER = 65_536
+_MOST_GLB_HEADER = 16_000_000
+_NUMBERS_A_FACE = 12
+"""Three corners with position, normal, texture and index each: a glb without shared vertices."""
 _FARTHEST = 1e9
-"""In units of the file: a kilometre in micrometres."""
+"""Largest coordinate in units of the file: a kilometre in micrometres."""
 _MOST_INWARD = 100
-"""Pieces of a mesh that are wound the other way round than the whole, each of which is a cavity or is turned."""
+"""Largest number of parts of a mesh that are wound the other way round than the whole."""
 
 
 @dataclass(frozen=True, eq=False)
 class Triangles:
-    """A mesh, read-only.
+    """A triangle mesh, read-only.
 
     Parameters
     ----------
     vertices : (vertex, 3) float64
-        [m]; each place once.
+        Positions [m], each once.
     faces : (face, 3) int64
-        Anticlockwise seen from outside where the mesh is closed.
+        Indices of vertices, anticlockwise seen from outside where the mesh is closed.
     closed : bool
-        Whether it encloses a body; if not, it is a thin sheet.
+        Whether the mesh encloses a volume; if not, it is a thin sheet.
     """
 
     vertices: NDArray[np.float64]
@@ -56,12 +63,12 @@ class Triangles:
         return self.vertices[self.faces]
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether points (..., 3) lie inside a closed mesh; shape (...).
+        """Tell whether points lie inside a closed mesh.
 
         Parameters
         ----------
         points : (..., 3) float64
-            World [m].
+            Points, world [m].
 
         Returns
         -------
@@ -75,17 +82,17 @@ class Triangles:
         return inside
 
     def distance_m(self, point: NDArray[np.float64]) -> float:
-        """From a point (3,) to the nearest point of the surface [m]; 0 inside a closed mesh.
+        """Compute the distance from a point to the surface.
 
         Parameters
         ----------
         point : (3,) float64
-            World [m].
+            Point, world [m].
 
         Returns
         -------
         float
-            [m].
+            Distance [m]; 0 inside a closed mesh.
         """
         from trimesh import triangles  # slow to import
 
@@ -98,24 +105,21 @@ class Triangles:
 
 
 def meshes_folder() -> Path:
-    """Folder of the meshes that come with rtradar: inside the installed package, or at the top of a checkout."""
+    """Find the meshes of rtradar: inside the installed package, or at the top of a checkout."""
     installed = Path(str(resources.files("rtradar"))) / "meshes"
     return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "meshes"
 
 
 def mesh_names() -> tuple[str, ...]:
-    """Meshes that come with rtradar."""
+    """List the meshes that come with rtradar."""
     return tuple(sorted(file.stem for file in meshes_folder().glob("*.ply")))
 
 
 def read_mesh(path: Path) -> Triangles:
-    """A mesh in the units of its file; kept, and read again only where the file changes.
+    """Read a mesh in the units of its file; it is kept, and read again only where the file changes.
 
-    Raises
-    ------
-    InputError
-        Where the file cannot be read, is too large, has no triangles, a vertex that is not finite, or faces that do not
-        agree which side is outside.
+    An `InputError` is raised where the file cannot be read, is too large, has no triangles, a
+    vertex that is not finite, or faces that do not agree which side is outside.
     """
     where = f"mesh '{path}'"
     if path.suffix.lower() not in MESH_ENDINGS:
@@ -140,14 +144,55 @@ def _read(path: Path, changed_ns: int, size: int) -> Triangles:
     except (OSError, ValueError) as error:
         raise InputError(f"{where}: {getattr(error, 'strerror', None) or error}") from None
     content = _in_ascii(content, ending)
-    refuse_hostile_header(where, ending, content, MOST_FACES)
+    # Of the kinds of files only these two carry counts that a reader believes.
+    if ending == ".ply":
+        _check_ply_header(where, content)
+    elif ending == ".glb":
+        _check_glb_header(where, content)
     return checked_triangles(where, *_load(where, ending, content))
 
 
-def _in_ascii(content: bytes, ending: str) -> bytes:
-    """The same mesh with ``?`` for every byte of its text that is not ASCII, and without a byte order mark.
+def _check_ply_header(where: str, content: bytes) -> None:
+    """Refuse a PLY file that promises more elements than `MOST_FACES` faces could need."""
+    head, end, _ = content[:_MOST_PLY_HEADER].partition(b"end_header")
+    if not end:
+        raise InputError(f"{where} is broken or is no ply file: its header has no end")
+    for kind, count in re.findall(rb"element\s+(\S+)\s+(\d+)", head):
+        most = MOST_FACES if kind == b"face" else 3 * MOST_FACES
+        if len(count) > 12 or int(count) > most:
+            raise InputError(
+                f"{where} promises more elements {shown(kind.decode('ascii', 'replace'))} than the "
+                f"{most} allowed"
+            )
 
-    Only names and comments hold such bytes. Nothing here asks for them, but trimesh would have to know their encoding.
+
+def _check_glb_header(where: str, content: bytes) -> None:
+    """Refuse a glb file that promises more numbers than `MOST_FACES` faces could need."""
+    broken = f"{where} is broken or is no glb file"
+    length = struct.unpack("<I", content[12:16])[0] if len(content) >= 20 else 0
+    if not 0 < length <= _MOST_GLB_HEADER:
+        raise InputError(
+            f"{broken}: its header has {length} bytes; 1 to {_MOST_GLB_HEADER} are allowed"
+        )
+    try:
+        accessors = json.loads(content[20 : 20 + length]).get("accessors", [])
+        count = sum(abs(int(accessor["count"])) for accessor in accessors)
+    except (ValueError, TypeError, KeyError, AttributeError, OverflowError, RecursionError):
+        raise InputError(f"{broken}: its header cannot be read") from None
+    # An accessor without data is filled with as many zeros as it names, and one whose rows overlap
+    # grows.
+    if count > _NUMBERS_A_FACE * MOST_FACES:
+        raise InputError(
+            f"{where} promises more data than the {MOST_FACES} triangles that are allowed could "
+            "have"
+        )
+
+
+def _in_ascii(content: bytes, ending: str) -> bytes:
+    """Replace every byte of the text that is not ASCII by ``?``, and remove a byte order mark.
+
+    Only names and comments hold such bytes. They are not used, but trimesh would have to know their
+    encoding.
     """
     content = content.removeprefix(codecs.BOM_UTF8)
     if ending == ".obj":
@@ -158,7 +203,7 @@ def _in_ascii(content: bytes, ending: str) -> bytes:
             if len(content) >= _STL_HEADER_BYTES
             else (0,)
         )
-        # What tells a binary file from one of text, which may both begin with "solid".
+        # The size tells a binary file from one of text; both may begin with "solid".
         text = 0 if len(content) == _STL_HEADER_BYTES + _STL_FACE_BYTES * count else len(content)
     elif ending == ".ply":
         text = (
@@ -175,7 +220,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
     import trimesh  # slow to import
 
     try:
-        # No resolver: a file may name others (materials, buffers, pictures), and none of them is opened.
+        # Without a resolver no other file that this one names (materials, buffers) is opened.
         with np.errstate(all="ignore"):
             loaded = trimesh.load_scene(
                 io.BytesIO(content),
@@ -189,7 +234,8 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
         raise
     except ImportError as error:  # trimesh looks for some packages only where a file needs them
         raise InputError(
-            f"{where}: to read it takes the Python package '{error.name}'; install that, or save the mesh as binary PLY"
+            f"{where}: to read it takes the Python package '{error.name}'; install that, or save "
+            "the mesh as binary PLY"
         ) from None
     except Exception as error:  # what trimesh raises at broken files is of any type
         reason = shown(str(error))[1:-1] or type(error).__name__
@@ -206,7 +252,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
 
 
 def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
-    """Vertices and faces of every mesh of a scene, as often as it stands in it."""
+    """Give the vertices and faces of every instance of every mesh in a scene of trimesh."""
     placed = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
     meshes = [(loaded.geometry[geometry], matrix) for _, matrix, geometry in placed]
     solid = [(mesh, matrix) for mesh, matrix in meshes if hasattr(mesh, "faces")]
@@ -217,7 +263,7 @@ def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[
     for mesh, matrix in solid:
         vertices = np.asarray(mesh.vertices, dtype=np.float64)
         faces = np.asarray(mesh.faces, dtype=np.int64)
-        # A mirror turns the faces round with the body.
+        # A reflection reverses the winding of the faces.
         faces = faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces
         pieces.append((vertices @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3], faces))
     return pieces
@@ -226,27 +272,11 @@ def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[
 def checked_triangles(
     where: str, vertices: NDArray[np.float64], faces: NDArray[np.int64]
 ) -> Triangles:
-    """A mesh, checked: each place once, no triangle without area, and, where it is closed, normals outward.
+    """Check a mesh, merge equal vertices, remove empty triangles and wind closed parts outward.
 
-    Parameters
-    ----------
-    where : str
-        What messages begin with.
-    vertices : (vertex, 3) float64
-        In any unit.
-    faces : (face, 3) int64
-        Numbers of vertices.
-
-    Returns
-    -------
-    Triangles
-        In the same unit.
-
-    Raises
-    ------
-    InputError
-        Where there are no triangles or too many, none has an area, a vertex is not finite or is not there, or faces do not
-        agree which side is outside.
+    Vertices may be in any unit; ``where`` begins the messages. An `InputError` is raised where
+    there are no triangles or too many, none has an area, a vertex is not finite or does not exist,
+    or faces do not agree which side is outside.
     """
     import trimesh  # slow to import
 
@@ -257,7 +287,8 @@ def checked_triangles(
         or (len(faces) and faces.shape[1] != 3)
     ):
         raise InputError(
-            f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) and (face, 3)"
+            f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) "
+            "and (face, 3)"
         )
     if not np.all(np.abs(vertices) <= _FARTHEST):
         raise InputError(f"{where}: a vertex is not finite, or more than {_FARTHEST:g} units away")
@@ -265,7 +296,8 @@ def checked_triangles(
         raise InputError(f"{where} has no triangles; give a surface")
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise InputError(
-            f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, counted from 0"
+            f"{where}: a triangle names a vertex that is not there; there are {len(vertices)}, "
+            "counted from 0"
         )
     places, which = np.unique(vertices + 0.0, axis=0, return_inverse=True)
     faces = which.reshape(-1)[faces]
@@ -279,7 +311,8 @@ def checked_triangles(
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
         raise InputError(
-            f"{where}: its triangles do not agree which side is outside; make their normals consistent"
+            f"{where}: its triangles do not agree which side is outside; make their normals "
+            "consistent"
         )
     if closed:
         faces = _outward(where, mesh)
@@ -294,7 +327,7 @@ def checked_triangles(
 
 
 def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
-    """Faces of a closed mesh, each of its pieces wound outward; but a piece inside another may be a cavity, and stays."""
+    """Wind each part of a closed mesh outward, but for parts inside others, possible cavities."""
     from trimesh import graph
 
     faces, corners = np.array(mesh.faces), np.asarray(mesh.triangles - mesh.vertices.mean(axis=0))
@@ -318,7 +351,10 @@ def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
 
 
 def _winding(corners: NDArray[np.float64]) -> float:
-    """How often triangles (face, 3, 3) wind round the origin (van Oosterom and Strackee 1983)."""
+    """Compute the winding number of triangles (face, 3, 3) about the origin.
+
+    Sum of their solid angles over 4 pi (van Oosterom and Strackee 1983).
+    """
     a, b, c = (corners[:, k] for k in range(3))
     la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
     over = np.einsum("ij,ij->i", a, np.cross(b, c))

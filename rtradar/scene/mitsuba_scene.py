@@ -1,9 +1,9 @@
 """The posed body as a Mitsuba scene.
 
-Every part is an instance of one unit sphere of triangles, moved, turned and stretched by its ``to_world``: a new pose
-costs 21 matrices and the small upper tree of the ray tracer, where new vertices cost a full rebuild. Mitsuba's own
-``sphere`` is not used, for it is silently wrong under a stretch that is not uniform, nor its ``ellipsoids``, which cull
-back faces.
+Every part is an instance of one unit sphere of triangles, which its ``to_world`` moves, rotates and
+stretches: a new pose costs 21 matrices and the small upper tree of the ray tracer, where new
+vertices cost a full rebuild. Mitsuba's own ``sphere`` is not used, because it is silently wrong
+under a stretch that is not uniform, nor its ``ellipsoids``, which cull back faces.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ def _part_key(part: int) -> str:
 
 
 def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> Any:
-    """Tell Mitsuba of a mesh, for hits alone.
+    """Make a Mitsuba mesh, of which only the hits of rays are used.
 
     Parameters
     ----------
     mi : module
         Mitsuba with its variant set.
     vertices, faces : (vertex, 3) float64, (face, 3) int
-        Vertices near the origin, for they are rounded to float32.
+        Vertices near the origin, because they are rounded to float32, and faces.
 
     Returns
     -------
@@ -52,9 +52,9 @@ def build_body_scene(
     mi : module
         Mitsuba with its variant set.
     vertices, faces : (vertex, 3) float64, (face, 3) int
-        The unit sphere of triangles.
+        Unit sphere of triangles.
     n_parts : int
-        How many instances.
+        Number of instances.
 
     Returns
     -------
@@ -81,9 +81,9 @@ def pose_body_scene(mi: Any, parameters: Any, matrices: NDArray[np.float64]) -> 
     mi : module
         Mitsuba with its variant set.
     parameters : mitsuba.SceneParameters
-        Of a scene from `build_body_scene`.
+        Parameters of a scene that `build_body_scene` made.
     matrices : (part, 4, 4) float64
-        From the unit sphere to the scene.
+        Transformations from the unit sphere to the scene.
     """
     for part, matrix in enumerate(matrices):
         parameters[f"{_part_key(part)}.to_world"] = mi.Transform4f(matrix)

@@ -1,9 +1,8 @@
-"""What stands around the person: a scene, named or read from a TOML file."""
+"""The surroundings of the person: a scene, made by name or read from a TOML file."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,10 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import Material
+from rtradar.scene.scene_file import scene_fields, scene_path
 from rtradar.scene.walls import Wall
 from rtradar.system.checks import Vector, check_number, check_vector, shown
+from rtradar.system.toml_tables import read_toml
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,19 +25,20 @@ class Scene:
     Parameters
     ----------
     name : str
-        Shown in reports.
+        Name that reports show.
     description : str
-        One line for people.
+        Description in one line, for people.
     walls : tuple of Wall
-        Floor and ceiling among them.
+        Walls of the scene; the floor and the ceiling are among them.
     furniture : tuple of Furniture
-        What stands in the room.
+        Meshes in the room.
     radar_position_m : tuple of float, optional
-        Where the radar is in this scene, world [m]; its axes stay parallel to the world's. None: where the radar says.
+        Position of the radar in this scene, world [m]; its axes stay parallel to the world's. With
+        None the radar keeps its own position.
     person_position_m : tuple of float
-        Where the mean place of the person is, x and y [m].
+        Mean position of the person, x and y [m].
     heading_deg : float
-        Turns the person about the vertical there, anticlockwise seen from above [deg].
+        Rotation of the person about the vertical there, anticlockwise seen from above [deg].
 
     Raises
     ------
@@ -78,7 +80,7 @@ class Scene:
 
     @classmethod
     def load(cls, source: str | Path) -> Scene:
-        """A scene by its name under ``scenes/``, or a TOML file.
+        """Load a scene by its name under ``scenes/``, or from a TOML file.
 
         Parameters
         ----------
@@ -92,45 +94,35 @@ class Scene:
         Raises
         ------
         InputError
-            Where there is no such scene, the file is not TOML, or anything in it has no meaning; the message names the
-            file, the table and key, the value, and what is allowed.
+            Where there is no such scene, the file is not TOML, or anything in it has no meaning;
+            the message names the file, the table and key, the value, and what is allowed.
         """
-        from rtradar.scene.scene_file import read_scene
-
-        folder = scenes_folder()
-        path = Path(source)
-        if path.suffix != ".toml":
-            path = folder / f"{source}.toml"
-            try:
-                found = path.is_file()
-            except ValueError:  # a null character
-                found = False
-            if not found:
-                known = ", ".join(sorted(file.stem for file in folder.glob("*.toml")))
-                raise InputError(
-                    f"scene {shown(str(source))} is unknown; allowed: {known}, or the path of a TOML file"
-                )
-        return read_scene(path)
+        path = scene_path(source)
+        table = read_toml(path, "scene", "give a TOML file or the name of a scene")
+        try:
+            scene = cls(**scene_fields(table, path))
+            for piece in scene.furniture:
+                piece.triangles()  # refuses a mesh that cannot be used
+        except InputError as error:
+            raise InputError(f"scene file '{path}': {error}") from None
+        return scene
 
     @property
     def materials(self) -> tuple[Material, ...]:
-        """All that walls and furniture are made of, each once."""
-        return tuple(
-            dict.fromkeys(
-                [
-                    *(wall.material for wall in self.walls),
-                    *(piece.material for piece in self.furniture),
-                ]
-            )
-        )
+        """Materials of the walls and the furniture, each once."""
+        return tuple(dict.fromkeys(part.material for part in self._parts))
+
+    @property
+    def _parts(self) -> tuple[Wall | Furniture, ...]:
+        return *self.walls, *self.furniture
 
     def place(self, radar: Radar) -> Radar:
-        """The radar where it stands in this scene.
+        """Move a radar to its position in this scene.
 
         Parameters
         ----------
         radar : Radar
-            Its own position holds where the scene has none.
+            Radar that keeps its own position where the scene has none.
 
         Returns
         -------
@@ -139,51 +131,37 @@ class Scene:
         Raises
         ------
         InputError
-            Where a material is not known over the sweep of the radar, or the radar is inside a wall or nearer than 0.3 m to
-            furniture.
+            Where a material is not known over the sweep of the radar, or the radar is inside a wall
+            or nearer than 0.3 m to furniture.
         """
-        placed = (
-            radar
-            if self.radar_position_m is None
-            else replace(radar, position_m=self.radar_position_m)
-        )
+        placed = radar
+        if self.radar_position_m is not None:
+            placed = replace(radar, position_m=self.radar_position_m)
         start = placed.start_frequency_hz
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
-        made_of = [
-            *((wall.name, wall.material) for wall in self.walls),
-            *((piece.name, piece.material) for piece in self.furniture),
-        ]
-        for name, material in made_of:
+        for part in self._parts:
             try:
-                material.eta(sweep)
+                part.material.eta(sweep)
             except InputError as error:
-                raise InputError(f"scene '{self.name}', {name}: {error}") from None
+                raise InputError(f"scene '{self.name}', {part.name}: {error}") from None
         for wall in self.walls:
             if wall.holds(antennas).any():
                 raise InputError(
-                    f"scene '{self.name}': the radar at {placed.position_m} m has antennas inside wall '{wall.name}'; move it"
+                    f"scene '{self.name}': the radar at {placed.position_m} m has antennas inside "
+                    f"wall '{wall.name}'; move it"
                 )
         for piece in self.furniture:
             triangles = piece.triangles()
             low, high = triangles.vertices.min(axis=0), triangles.vertices.max(axis=0)
-            # Only antennas near its box are worth a look at every triangle.
-            beside = (
-                np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1)
-                < MINIMUM_ANTENNA_DISTANCE_M
-            )
-            nearest = min(
-                (triangles.distance_m(antenna) for antenna in antennas[beside]), default=np.inf
-            )
-            if nearest < MINIMUM_ANTENNA_DISTANCE_M:
+            # Only antennas near the box of the mesh are compared with every triangle.
+            to_box_m = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1)
+            near = antennas[to_box_m < MINIMUM_ANTENNA_DISTANCE_M]
+            nearest_m = min((triangles.distance_m(antenna) for antenna in near), default=np.inf)
+            if nearest_m < MINIMUM_ANTENNA_DISTANCE_M:
                 raise InputError(
-                    f"scene '{self.name}': '{piece.name}' is {nearest:.2f} m from an antenna of the radar at "
-                    f"{placed.position_m} m; {MINIMUM_ANTENNA_DISTANCE_M} m or more are needed"
+                    f"scene '{self.name}': '{piece.name}' is {nearest_m:.2f} m from an antenna of "
+                    f"the radar at {placed.position_m} m; {MINIMUM_ANTENNA_DISTANCE_M} m or more "
+                    "are needed"
                 )
         return placed
-
-
-def scenes_folder() -> Path:
-    """Folder of the scenes that come with rtradar: inside the installed package, or at the top of a checkout."""
-    installed = Path(str(resources.files("rtradar"))) / "scenes"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "scenes"

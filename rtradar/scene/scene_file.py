@@ -1,21 +1,20 @@
-"""From a TOML file to a scene: which tables and keys it may have, and one line of complaint about anything else."""
+"""Scene files: where they are, and which tables and keys they may have."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import resources
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
-from rtradar.scene.scene import Scene
 from rtradar.scene.walls import ROOM_SIDES, Surface, Wall, room_walls
 from rtradar.system.checks import check_text, inside, printable, shown
-from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
-
-Made = TypeVar("Made")
+from rtradar.system.toml_tables import Table, check_keys, table_at, tables_at
 
 _TEXTS = ("name", "description")
 _TABLES = ("radar", "person", "materials", "room", "walls", "furniture")
@@ -28,33 +27,47 @@ _FURNITURE = (
 _MATERIAL = ("source", "low_hz", "high_hz", "a"), ("b", "c", "d")
 
 
-def read_scene(path: Path) -> Scene:
-    """The scene that a TOML file describes; its meshes are read, and judged, at once.
+def scenes_folder() -> Path:
+    """Find the scenes of rtradar: inside the installed package, or at the top of a checkout."""
+    installed = Path(str(resources.files("rtradar"))) / "scenes"
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "scenes"
 
-    Raises
-    ------
-    InputError
-        Where the file cannot be read, is not TOML, or anything in it has no meaning.
-    """
-    table = read_toml(path, "scene", "give a TOML file or the name of a scene")
+
+def scene_path(source: str | Path) -> Path:
+    """Find the file of a scene that is given by its name, or as a ``.toml`` file."""
+    if Path(source).suffix == ".toml":
+        return Path(source)
+    folder = scenes_folder()
+    path = folder / f"{source}.toml"
     try:
-        return _scene(table, path)
-    except InputError as error:
-        raise InputError(f"scene file '{path}': {error}") from None
+        found = path.is_file()
+    except ValueError:  # a null character
+        found = False
+    if not found:
+        known = ", ".join(sorted(file.stem for file in folder.glob("*.toml")))
+        raise InputError(
+            f"scene {shown(str(source))} is unknown; allowed: {known}, or the path of a TOML file"
+        )
+    return path
 
 
-def _scene(table: Table, path: Path) -> Scene:
+def scene_fields(table: Table, path: Path) -> dict[str, Any]:
+    """Turn the table of the file at ``path`` into the fields of a `Scene`.
+
+    An `InputError` names the table and key that has no meaning.
+    """
     check_keys("", table, (), (*_TEXTS, *_TABLES))
     for key in _TEXTS:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
             raise InputError(f"{key} = {shown(table[key])}; it must be a string of one line")
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
-    walls = [
-        *(_room(table["room"], materials) if "room" in table else ()),
-        *_walls(table, materials),
-    ]
-    furniture = _furniture(table, materials, path.parent)
-    fields: dict[str, Any] = {}
+    room = _room(table["room"], materials) if "room" in table else ()
+    fields: dict[str, Any] = {
+        "name": printable(path.stem),
+        **{key: table[key] for key in _TEXTS if key in table},
+        "walls": (*room, *_walls(table, materials)),
+        "furniture": tuple(_furniture(table, materials, path.parent)),
+    }
     if "radar" in table:
         radar = table_at("radar", table)
         check_keys("[radar] ", radar, ("position_m",), ())
@@ -62,19 +75,9 @@ def _scene(table: Table, path: Path) -> Scene:
     if "person" in table:
         person = table_at("person", table)
         check_keys("[person] ", person, (), ("position_m", "heading_deg"))
-        fields |= {
-            "person_" + key if key == "position_m" else key: value for key, value in person.items()
-        }
-    texts = {key: table[key] for key in _TEXTS if key in table}
-    scene = Scene(
-        **{"name": printable(path.stem), **texts},
-        walls=tuple(walls),
-        furniture=tuple(furniture),
-        **fields,
-    )
-    for piece in scene.furniture:
-        piece.triangles()
-    return scene
+        for key, value in person.items():
+            fields["person_position_m" if key == "position_m" else key] = value
+    return fields
 
 
 def _own_materials(table: Table) -> dict[str, Material]:
@@ -107,28 +110,31 @@ def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
 
 
 def _walls(table: Table, materials: Mapping[str, Material]) -> list[Wall]:
-    def wall(where: str, piece: Table) -> Wall:
-        check_keys(where, piece, *_WALL)
-        return _within(
-            where,
-            lambda: Wall(**{**piece, "material": _material("", piece["material"], materials)}),
-        )
-
-    return [wall(where, piece) for where, piece in tables_at("walls", table)]
+    found = []
+    for where, entry in tables_at("walls", table):
+        check_keys(where, entry, *_WALL)
+        with _prefixed(where):
+            chosen = _material("", entry["material"], materials)
+            found.append(Wall(**{**entry, "material": chosen}))
+    return found
 
 
 def _furniture(table: Table, materials: Mapping[str, Material], folder: Path) -> list[Furniture]:
-    def furniture(where: str, piece: Table) -> Furniture:
-        check_keys(where, piece, *_FURNITURE)
-        mesh = _mesh(where, piece["mesh"], folder)
-        chosen = _material(where, piece["material"], materials)
-        return _within(where, lambda: Furniture(**{**piece, "mesh": mesh, "material": chosen}))
-
-    return [furniture(where, piece) for where, piece in tables_at("furniture", table)]
+    found = []
+    for where, entry in tables_at("furniture", table):
+        check_keys(where, entry, *_FURNITURE)
+        mesh = _mesh(where, entry["mesh"], folder)
+        chosen = _material(where, entry["material"], materials)
+        with _prefixed(where):
+            found.append(Furniture(**{**entry, "mesh": mesh, "material": chosen}))
+    return found
 
 
 def _mesh(where: str, value: object, folder: Path) -> str | Path:
-    """A name as it is; a file only from the folder of the scene file or below: a scene may come from a stranger."""
+    """Check a mesh; a file must lie in the folder of the scene file or below.
+
+    A scene may come from a stranger, and must not open files anywhere else.
+    """
     text = check_text(where.strip(), "mesh", value)
     if not Path(text).suffix:
         return text
@@ -136,7 +142,8 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
         raise InputError(f"{where}mesh = {shown(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
     if inside(folder, text) is None:
         raise InputError(
-            f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside it or below"
+            f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside "
+            "it or below"
         )
     return folder / text
 
@@ -145,13 +152,15 @@ def _material(where: str, value: object, materials: Mapping[str, Material]) -> M
     if not isinstance(value, str) or value not in materials:
         allowed = ", ".join(sorted(materials))
         raise InputError(
-            f"{where}material = {shown(value)} is unknown; allowed: {allowed}, or a table [materials.NAME] of your own"
+            f"{where}material = {shown(value)} is unknown; allowed: {allowed}, or a table "
+            "[materials.NAME] of your own"
         )
     return materials[value]
 
 
-def _within(where: str, make: Callable[[], Made]) -> Made:
+@contextmanager
+def _prefixed(where: str) -> Iterator[None]:
     try:
-        return make()
+        yield
     except InputError as error:
         raise InputError(f"{where}{error}") from None

@@ -1,9 +1,9 @@
 """Reflection by a half-space, and reflection and transmission by a slab of one material.
 
-ITU-R P.2040-3: the half-space of its eqs. (31a, b), and its slab of a single layer. Time goes with
-exp(+j omega t). TE is the field across the plane of incidence; TM lies in it. The unit vectors of TM are e_TE x k, each
-wave with its own direction k, so that a perfect conductor has -1 for TE and +1 for TM, and at normal incidence both turn
-the field round.
+Source: ITU-R P.2040-3, the half-space of its eqs. (31a, b) and its slab of a single layer. The time
+factor is exp(+j omega t). The TE field is perpendicular to the plane of incidence, the TM field is
+in it. The unit vectors of TM are e_TE x k, each wave with its own direction k, so that a perfect
+conductor has -1 for TE and +1 for TM, and at normal incidence both reverse the field.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ Polarization = Literal["te", "tm"]
 def reflection(
     eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
 ) -> NDArray[np.complex128]:
-    """Fresnel reflection of a plane wave in air by a half-space.
+    """Compute the Fresnel reflection of a plane wave in air by a half-space.
 
     Parameters
     ----------
@@ -61,16 +61,18 @@ def slab(
     cos_incidence: ArrayLike,
     polarization: Polarization,
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """Reflection and transmission of a plane wave by a slab with air on both sides, all bounces inside it summed.
+    """Compute the reflection and transmission of a plane wave by a slab in air.
+
+    All reflections inside the slab are summed.
 
     Parameters
     ----------
     eta : (...) complex
         Relative permittivity, its imaginary part not positive; infinite for a perfect conductor.
     thickness_m : (...) float
-        [m], positive.
+        Thickness [m], positive.
     frequency_hz : (...) float
-        [Hz]
+        Frequency [Hz].
     cos_incidence : (...) float
         Cosine between the wave and the normal, 0 to 1. All of these broadcast.
     polarization : {"te", "tm"}
@@ -81,9 +83,9 @@ def slab(
     reflection : (...) complex128
         Reflected over incident field, at the face that the wave meets.
     transmission : (...) complex128
-        Field behind the slab over the incident one, between points opposite each other on its faces. In place of the same
-        thickness of air, as a straight path from one antenna to the other has it, it is
-        ``transmission * exp(+1j * k * thickness_m * cos_incidence)``.
+        Field behind the slab over the incident one, between points opposite each other on its
+        faces. In place of the same thickness of air, as on a straight path from one antenna to the
+        other, it is ``transmission * exp(+1j * k * thickness_m * cos_incidence)``.
 
     Raises
     ------
@@ -106,7 +108,8 @@ def slab(
     face = _interface(eta, cosine, inner, polarization)
     through = np.exp(-2j * pi * frequency / SPEED_OF_LIGHT_MPS * thickness * inner)
     loop = 1 - (face * through) ** 2
-    # At exactly grazing incidence a lossless slab of whole half waves has 0 / 0: it is a window, as at other angles.
+    # At exactly grazing incidence a lossless slab of whole half waves has 0 / 0: it is transparent,
+    # as at other angles.
     window = loop == 0
     loop = np.where(window, 1.0, loop)
     reflected = np.where(window, 0.0, face * (1 - through**2) / loop)
@@ -126,14 +129,15 @@ def slab_passes(
     *,
     rest: bool = False,
 ) -> NDArray[np.complex128]:
-    """What leaves a slab after so many passes through it, of a plane wave that meets it: a term of the series of `slab`.
+    """Compute the field that leaves a slab after some passes, a term of the series of `slab`.
 
     Parameters
     ----------
     eta, thickness_m, frequency_hz, cos_incidence, polarization
-        As of `slab`.
+        Slab and wave, as `slab` takes them.
     passes : int
-        0 or more: even ones leave by the face that the wave meets, odd ones by the other.
+        Number of passes, 0 or more: even numbers leave by the face that the wave meets, odd ones by
+        the other.
     rest : bool
         Whether the terms of two passes more, four more, and so on, are added.
 
@@ -194,7 +198,7 @@ def _checked(
 
 
 def _inner(eta: NDArray[np.complex128], cosine: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Normal component of the wave number inside, over that of air: sqrt(eta - sin^2), decaying."""
+    """Normal wave number inside relative to that in air, sqrt(eta - sin^2), the decaying root."""
     root = np.sqrt((eta - 1) + cosine**2)
     return np.where(root.imag > 0, -root, root)
 

@@ -1,4 +1,4 @@
-"""Walls: rectangles of one material and thickness; six of them make a room."""
+"""Walls: rectangular slabs of one material; six of them make a room."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from rtradar.scene.materials import Material
 from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
-"""Least x, largest x, least y, largest y, z = 0 and the top."""
+"""Sides at the least x, largest x, least y, largest y, z = 0 and the top."""
 
 _SHORTEST_M = 0.01
 _SQUARE = 1e-6
@@ -23,30 +23,31 @@ _SQUARE = 1e-6
 
 @dataclass(frozen=True, kw_only=True)
 class Wall:
-    """A rectangular slab: its front face, and what is behind it.
+    """A rectangular slab, given by its front face and its thickness.
 
-    The front is the side that ``edge_u_m x edge_v_m`` points to: in a room the inside. The slab lies behind the front face,
-    ``thickness_m`` deep, so that the rectangle is what one measures in the room.
+    The front is the side to which ``edge_u_m x edge_v_m`` points: in a room the inside. The slab
+    lies behind the front face, so that the rectangle is what one measures in the room.
 
     Parameters
     ----------
     name : str
-        Shown in reports.
+        Name that reports show.
     corner_m : tuple of float
         One corner of the front face, world [m].
     edge_u_m, edge_v_m : tuple of float
-        From that corner to its two neighbours [m]; at right angles.
+        Vectors from that corner to its two neighbours [m], at right angles.
     material : Material
-        Of the whole slab.
+        Material of the whole slab.
     thickness_m : float
-        Between its two faces [m].
+        Distance between the two faces [m].
     roughness_m : float
-        Root mean square of the height of its faces about their planes [m].
+        Root mean square of the height of the faces about their planes [m].
 
     Raises
     ------
     InputError
-        Where a value has no physical meaning; the message names the wall, the field and what is allowed.
+        Where a value has no physical meaning; the message names the wall, the field and what is
+        allowed.
     """
 
     name: str
@@ -65,24 +66,23 @@ class Wall:
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
                 raise InputError(
-                    f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} m long or more"
+                    f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} "
+                    "m long or more"
                 )
         u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
         if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
             raise InputError(
-                f"{where}: edge_u_m = {shown(self.edge_u_m)} and edge_v_m = {shown(self.edge_v_m)} are not at right angles; "
-                "a wall is a rectangle"
+                f"{where}: edge_u_m = {shown(self.edge_u_m)} and edge_v_m = {shown(self.edge_v_m)} "
+                "are not at right angles; a wall is a rectangle"
             )
         if not isinstance(self.material, Material):
             raise InputError(
-                f"{where}: material = {shown(self.material)}; it must be a Material, as material('concrete') gives"
+                f"{where}: material = {shown(self.material)}; it must be a Material, as "
+                "material('concrete') gives"
             )
-        object.__setattr__(
-            self, "thickness_m", check_number(where, "thickness_m", self.thickness_m, 1e-4, 10.0)
-        )
-        object.__setattr__(
-            self, "roughness_m", check_number(where, "roughness_m", self.roughness_m, 0.0, 0.1)
-        )
+        for key, least, most in (("thickness_m", 1e-4, 10.0), ("roughness_m", 0.0, 0.1)):
+            value = check_number(where, key, getattr(self, key), least, most)
+            object.__setattr__(self, key, value)
 
     @cached_property
     def normal(self) -> NDArray[np.float64]:
@@ -93,43 +93,41 @@ class Wall:
     @cached_property
     def corners(self) -> NDArray[np.float64]:
         """Corners of the front face, anticlockwise seen from the front, (4, 3) [m]."""
-        corner, u, v = (
-            np.array(vector) for vector in (self.corner_m, self.edge_u_m, self.edge_v_m)
-        )
+        corner, u, v = map(np.array, (self.corner_m, self.edge_u_m, self.edge_v_m))
         return np.stack([corner, corner + u, corner + u + v, corner + v])
 
     @property
     def area_m2(self) -> float:
-        """Of one face [m^2]."""
+        """Area of one face [m^2]."""
         return float(np.linalg.norm(self.edge_u_m) * np.linalg.norm(self.edge_v_m))
 
     def depth_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        """How far points (..., 3) [m] lie behind the front face, NaN beside the rectangle; shape (...).
+        """Compute the depth of points behind the front face.
 
         Parameters
         ----------
         points : (..., 3) float64
-            World [m].
+            Points, world [m].
 
         Returns
         -------
         (...) float64
-            [m]; from 0 to `thickness_m` inside the slab.
+            Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle.
         """
         away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
-        before = np.ones(away.shape[:-1], dtype=bool)
+        inside = np.ones(away.shape[:-1], dtype=bool)
         for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
-            share = away @ edge / (edge @ edge)
-            before &= (share >= 0) & (share <= 1)
-        return np.where(before, -(away @ self.normal), np.nan)
+            fraction = away @ edge / (edge @ edge)
+            inside &= (fraction >= 0) & (fraction <= 1)
+        return np.where(inside, -(away @ self.normal), np.nan)
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether points (..., 3) [m] lie inside the slab; shape (...).
+        """Tell whether points lie inside the slab.
 
         Parameters
         ----------
         points : (..., 3) float64
-            World [m].
+            Points, world [m].
 
         Returns
         -------
@@ -141,16 +139,16 @@ class Wall:
 
 @dataclass(frozen=True, kw_only=True)
 class Surface:
-    """What one side of a room is made of.
+    """Material and thickness of one side of a room.
 
     Parameters
     ----------
     material : Material
-        Of the whole slab.
+        Material of the whole slab.
     thickness_m : float
-        [m]
+        Thickness [m].
     roughness_m : float
-        Root mean square of the height of its faces [m].
+        Root mean square of the height of the faces [m].
     """
 
     material: Material
@@ -161,21 +159,21 @@ class Surface:
 def room_walls(
     size_m: Vector, corner_m: tuple[float, float], surfaces: Mapping[str, Surface]
 ) -> tuple[Wall, ...]:
-    """The six walls of a box, fronts inward; its floor is z = 0.
+    """Make the six walls of a box, their fronts inward; its floor is z = 0.
 
     Parameters
     ----------
     size_m : tuple of float
-        Inside, along x, y and z [m].
+        Inner size along x, y and z [m].
     corner_m : tuple of float
-        Its least x and least y, inside [m].
+        Least x and least y inside [m].
     surfaces : mapping of str to Surface
-        One for each of `ROOM_SIDES`.
+        Surface of each of `ROOM_SIDES`.
 
     Returns
     -------
     tuple of Wall
-        Named and ordered as `ROOM_SIDES`.
+        Walls with the names and the order of `ROOM_SIDES`.
 
     Raises
     ------
@@ -196,14 +194,6 @@ def room_walls(
         "ceiling": ((x, y + b, h), (a, 0.0, 0.0), (0.0, -b, 0.0)),
     }
     return tuple(
-        Wall(
-            name=side,
-            corner_m=corner,
-            edge_u_m=u,
-            edge_v_m=v,
-            material=surfaces[side].material,
-            thickness_m=surfaces[side].thickness_m,
-            roughness_m=surfaces[side].roughness_m,
-        )
+        Wall(name=side, corner_m=corner, edge_u_m=u, edge_v_m=v, **vars(surfaces[side]))
         for side, (corner, u, v) in faces.items()
     )

@@ -10,8 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rtradar.errors import InputError
-from rtradar.scene.materials import MATERIALS, material, own_material
-from rtradar.scene.permittivity import VACUUM_PERMITTIVITY_FPM
+from rtradar.scene.materials import MATERIALS, VACUUM_PERMITTIVITY_FPM, material, own_material
 
 ROOMS = (12e9, 16e9, 77e9, 81e9)
 

@@ -7,7 +7,7 @@ import pytest
 
 from rtradar.radar import Radar
 from rtradar.scene import Scene
-from rtradar.scene.scene import scenes_folder
+from rtradar.scene.scene_file import scenes_folder
 from rtradar.scene.walls import ROOM_SIDES
 
 NAMES = sorted(file.stem for file in scenes_folder().glob("*.toml"))
