@@ -26,7 +26,6 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.process.angles.steering import range_walk
-from rtradar.process.detection.score import cell_noise_power
 from rtradar.process.window_functions import NAMES, WindowName, weights
 from rtradar.radar import Radar
 
@@ -174,10 +173,7 @@ def test_doppler_division_removes_the_copies_as_wide_as_the_window_makes_them(
     assert copies.max() < 1e-6 * power.max()
 
 
-def test_noise_of_a_cell_and_the_clutter_map_take_the_windows() -> None:
-    expected = 2.0 * np.sum(weights("blackman", 64) ** 2) * np.sum(weights("nuttall", CYCLES) ** 2)
-    windows = WindowFunctions("blackman", "nuttall")
-    assert cell_noise_power(2.0, RADAR, window_functions=windows) == pytest.approx(expected)
+def test_the_clutter_map_takes_the_window() -> None:
     overlapping = Radar(
         tx_y=1,
         tx_z=0,

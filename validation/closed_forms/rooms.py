@@ -18,11 +18,11 @@ from typing import Any
 
 import h5py
 import numpy as np
+from detection_score import DetectionScore, cell_noise_power, score, target_cells
 
 import rtradar as rt
 from rtradar.pipeline.agreement import chamfer
 from rtradar.process import CLUTTER_REMOVALS
-from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
 from rtradar.validate.rows import Row, main, reported
 
 ACTIVITY, MARGIN_DB = "walk", 13.0

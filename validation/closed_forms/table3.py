@@ -36,6 +36,7 @@ from typing import NamedTuple
 
 import numpy as np
 from cfar import RANKS, noise_levels, scale_tables
+from detection_score import DetectionScore, cell_noise_power, score, target_cells
 from numpy.typing import NDArray
 from scipy.special import gammaincc, gammainccinv
 from scipy.stats import ncx2
@@ -45,7 +46,6 @@ from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.pipeline.survey import survey
 from rtradar.process import ca_cfar, ca_scale, os_cfar, power_map, range_doppler, range_spectrum
-from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
 from rtradar.process.window_functions import hann
 from rtradar.scatter import build_model
 from rtradar.signal import Noise, synthesize

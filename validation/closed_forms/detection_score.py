@@ -1,7 +1,8 @@
-"""How well a detection mask fits the truth: which cells hold a target, and precision and missing rate (paper, Table 3).
+"""Score a detection mask against the truth, by precision and missing rate (paper, Table 3).
 
-The truth comes from the map without noise: a cell holds a target where its power stands far enough above the noise power
-that the same cell has on average, which is known from the noise of the samples and the windows.
+The truth comes from the map without noise: a cell holds a target where its power exceeds the mean
+noise power of a cell by a margin. That noise power follows from the noise of the IF samples and
+from the window functions.
 """
 
 from __future__ import annotations
@@ -24,11 +25,11 @@ class DetectionScore:
     Parameters
     ----------
     hits : int
-        Detected, and a target.
+        Number of targets that are detected.
     false : int
-        Detected, and none.
+        Number of detections that are no target.
     missed : int
-        A target, and not detected.
+        Number of targets that are not detected.
     """
 
     hits: int = 0
@@ -42,13 +43,13 @@ class DetectionScore:
 
     @property
     def precision(self) -> float:
-        """Share of the detections that are targets; NaN without detections."""
-        return _share(self.hits, self.hits + self.false)
+        """Fraction of the detections that are targets; NaN without detections."""
+        return _fraction(self.hits, self.hits + self.false)
 
     @property
     def missing_rate(self) -> float:
-        """Share of the targets that are not detected; NaN without targets."""
-        return _share(self.missed, self.hits + self.missed)
+        """Fraction of the targets that are not detected; NaN without targets."""
+        return _fraction(self.missed, self.hits + self.missed)
 
 
 def score(mask: ArrayLike, truth: ArrayLike) -> DetectionScore:
@@ -57,7 +58,7 @@ def score(mask: ArrayLike, truth: ArrayLike) -> DetectionScore:
     Parameters
     ----------
     mask, truth : bool arrays of one shape
-        Where something was detected, and where a target is.
+        Cells where something is detected, and cells that hold a target.
 
     Raises
     ------
@@ -67,7 +68,8 @@ def score(mask: ArrayLike, truth: ArrayLike) -> DetectionScore:
     found, real = np.asarray(mask), np.asarray(truth)
     if found.dtype != np.bool_ or real.dtype != np.bool_ or found.shape != real.shape:
         raise InputError(
-            f"score: mask has shape {found.shape}, type {found.dtype}, truth shape {real.shape}, type {real.dtype}; "
+            f"score: mask has shape {found.shape}, type {found.dtype}, "
+            f"truth shape {real.shape}, type {real.dtype}; "
             "both must be boolean and of one shape"
         )
     hits = int((found & real).sum())
@@ -75,15 +77,16 @@ def score(mask: ArrayLike, truth: ArrayLike) -> DetectionScore:
 
 
 def target_cells(power: ArrayLike, noise_power: float, margin_db: float) -> NDArray[np.bool_]:
-    """Cells whose power stands more than a margin above the noise.
+    """Find the cells whose power exceeds the noise by more than a margin.
 
     Parameters
     ----------
     power : float array
-        Of the map without noise, linear, as of `power_map`.
+        Map without noise from `power_map`, linear.
     noise_power : float
         Mean noise power of a cell of that map, see `cell_noise_power`.
     margin_db : float
+        Least ratio of a target's power to the noise power [dB].
 
     Returns
     -------
@@ -110,29 +113,29 @@ def cell_noise_power(
 ) -> float:
     """Mean noise power of a cell of `power_map`.
 
-    White noise of power P a sample leaves P sum(w^2) / sum(w)^2 in a spectrum divided by the sum of its window; so once for
-    fast time and once for slow time, and added up over channels.
+    White noise of power P a sample leaves P sum(w^2) in a spectrum whose weights w have the sum 1.
+    This factor enters for fast time and for slow time, and the channels are added up.
 
     Parameters
     ----------
     noise_power : float
-        Of one complex IF sample, as of `rtradar.signal.Noise` [m^2].
+        Noise power of one complex IF sample, as in `rtradar.signal.Noise` [m^2].
     radar : Radar
         Gives the lengths of the windows.
     looks : int
-        Channels summed in the map.
+        Number of channels that are summed in the map.
     window_functions : WindowFunctions
         Window functions of the map.
 
     Returns
     -------
     float
-        In the unit of ``noise_power``.
+        Mean noise power of a cell, in the unit of ``noise_power``.
     """
     fast = weights(window_functions.range, radar.samples_per_chirp)
     slow = weights(window_functions.doppler, radar.cycles_per_frame)
     return float(looks * noise_power * np.sum(fast**2) * np.sum(slow**2))
 
 
-def _share(part: int, whole: int) -> float:
+def _fraction(part: int, whole: int) -> float:
     return part / whole if whole else math.nan

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 
 import numpy as np
 import pytest
@@ -11,9 +12,20 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from rtradar.errors import InputError
-from rtradar.process import power_map, range_spectrum
-from rtradar.process.detection.score import DetectionScore, cell_noise_power, score, target_cells
+from rtradar.process import WindowFunctions, power_map, range_spectrum
+from rtradar.process.window_functions import weights
 from rtradar.radar import Radar
+from rtradar.validate import validation_folder
+
+sys.path.append(str(validation_folder() / "closed_forms"))
+from detection_score import (
+    DetectionScore,
+    cell_noise_power,
+    score,
+    target_cells,
+)
+
+sys.path.pop()
 
 MASKS = hnp.arrays(np.bool_, (5, 7))
 SMALL = Radar(samples_per_chirp=32, frame_duration_s=0.02)
@@ -78,6 +90,13 @@ def test_noise_power_of_hann_windows_in_closed_form() -> None:
     assert cell_noise_power(2.0, SMALL, looks=3) == pytest.approx(
         3 * 2.0 * 1.5 / 32 * 1.5 / SMALL.cycles_per_frame, rel=1e-12
     )
+
+
+def test_noise_power_follows_the_window_functions() -> None:
+    slow = weights("nuttall", SMALL.cycles_per_frame)
+    expected = 2.0 * np.sum(weights("blackman", 32) ** 2) * np.sum(slow**2)
+    windows = WindowFunctions("blackman", "nuttall")
+    assert cell_noise_power(2.0, SMALL, window_functions=windows) == pytest.approx(expected)
 
 
 @pytest.mark.parametrize(
