@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from rtradar.radar import Radar, register_radar
     from rtradar.scatter import register_model, scattering_length
     from rtradar.scene import Scene
+    from rtradar.settings import RunSettings
 
 __version__ = "0.2.0"
 
@@ -40,6 +41,7 @@ _HOME = {
     "Motion": "motion",
     "Radar": "radar",
     "Result": "pipeline",
+    "RunSettings": "settings",
     "Scene": "scene",
     "ValidityWarning": "errors",
     "compare": "pipeline",
@@ -66,6 +68,7 @@ __all__ = [
     "Motion",
     "Radar",
     "Result",
+    "RunSettings",
     "Scene",
     "ValidityWarning",
     "classify",

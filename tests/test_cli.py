@@ -202,9 +202,9 @@ def test_a_model_option_is_a_number_a_truth_value_or_a_word(text: str, value: ob
 def test_a_model_option_reaches_the_model(tmp_path: Path) -> None:
     words = ["--fidelity", "fresnel", "--model-option", "shadow_rays=8", "--out", tmp_path / "out"]
     assert run("synthetic:punch", *SHORT, *words) == 0
-    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"]["dials"] == {
-        "shadow_rays": 8
-    }
+    assert json.loads((tmp_path / "out" / "summary.json").read_text())["parameters"][
+        "model_options"
+    ] == {"shadow_rays": 8}
 
 
 def _amc(folder: Path, frames: str = FRAMES) -> list[str]:

@@ -10,9 +10,11 @@ import sys
 from collections.abc import Iterator
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args, get_type_hints
 
 import pytest
+
+import rtradar as rt
 
 ROOT = Path(__file__).parents[1]
 LOADED = re.compile(
@@ -88,6 +90,14 @@ def own_fillers() -> set[str]:
     return found
 
 
+def options_of(thing: Any) -> set[str]:
+    """Names of options that a function takes by ``**options: Unpack[...]``."""
+    if not inspect.isfunction(thing) or "Unpack" not in str(thing.__annotations__.get("options")):
+        return set()
+    (options,) = get_args(get_type_hints(thing)["options"])
+    return set(get_type_hints(options))
+
+
 def takes(thing: Any) -> set[str]:
     """Names of what a function takes, or a class that is not told what by its kind: protocols, exceptions, tuples."""
     if isinstance(thing, type) and (
@@ -114,6 +124,9 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
     assert text.strip(), "no docstring"
     names = takes(thing)
     assert names <= told(text, "Parameters"), f"not told of: {names - told(text, 'Parameters')}"
+    if options := options_of(thing):
+        assert "rtradar.RunSettings" in section(text, "Parameters")
+        assert options == told(inspect.getdoc(rt.RunSettings) or "", "Parameters")
     if inspect.isfunction(thing) and names and thing.__annotations__.get("return") != "None":
         assert (section(text, "Returns") + section(text, "Yields")).strip(), (
             "it does not say what it returns"
@@ -123,7 +136,8 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
 def test_a_gap_is_found() -> None:
     text = inspect.getdoc(THINGS["rtradar.run"]) or ""
     assert takes(THINGS["rtradar.run"]) == told(text, "Parameters")
-    assert "pfa" not in told(text.replace("pfa : float", "false alarms : float"), "Parameters")
+    assert "pfa" in options_of(THINGS["rtradar.run"])
+    assert "motion" not in told(text.replace("motion : Motion", "film : Motion"), "Parameters")
     assert not section(text.replace("Returns\n---", "Gives\n---"), "Returns").strip()
 
 

@@ -16,7 +16,7 @@ from rtradar.echoes import Echoes
 from rtradar.pipeline.rooms.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import range_spectrum
+from rtradar.process import ClutterRemoval, Detector, range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -53,6 +53,10 @@ class Capture:
         Whole cycles of the capture.
     windows : (window,) int64
         First cycle of each processing window.
+    removal : ClutterRemoval
+        Filter that removes static clutter before Doppler.
+    detect : Detector
+        Detector that marks the cells of a map.
     title : str
         For pictures and progress.
     stages : Stages
@@ -70,6 +74,8 @@ class Capture:
     noise: Noise
     n_chirps: int
     windows: NDArray[np.int64]
+    removal: ClutterRemoval
+    detect: Detector
     title: str
     stages: Stages
     warmup_s: float

@@ -2,44 +2,36 @@
 
 from __future__ import annotations
 
+from typing import Unpack
+
 from rtradar.motion import Motion
 from rtradar.pipeline.cloud_maker import CloudMaker, Clouds
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.timing import Stages, keep_memory_low
-from rtradar.process import build_detector
-from rtradar.process import clutter_removal as make_removal
 from rtradar.radar import Radar
 from rtradar.scene import Scene
+from rtradar.settings import RunOptions, RunSettings
 
 
 def clouds_of(
-    motion: Motion,
-    radar: Radar,
-    scene: Scene | None = None,
-    *,
-    fidelity: str = "specular",
-    start_s: float = 0.0,
-    duration_s: float | None = None,
-    heading_deg: float = 0.0,
-    snr_db: float = 20.0,
-    pfa: float = 1e-6,
-    seed: int = 0,
-    clutter_removal: str = "none",
+    motion: Motion, radar: Radar, scene: Scene | None = None, **options: Unpack[RunOptions]
 ) -> tuple[Clouds, float]:
-    """The clouds that `run` makes, and nothing else: no maps, no pictures, no files, no progress bar.
+    """Make the clouds that `run` makes, and nothing else: no files, no pictures, no progress bar.
 
     Parameters
     ----------
-    motion, radar, scene, fidelity, start_s, duration_s, heading_deg, snr_db, pfa, seed, clutter_removal
-        As in `run`.
+    motion, radar, scene
+        The same as for `run`.
+    **options
+        Settings, the fields of `rtradar.RunSettings`; ``variant`` is ``cpu`` if left out.
 
     Returns
     -------
     clouds : Clouds
-        The same as those of `run` with these parameters where there is no GPU: one is not used, so that they are the same to the
-        byte on every machine's CPU.
+        The clouds that `run` gives with these settings. On the CPU they are the same to the byte,
+        whatever else the machine has.
     warmup_s : float
-        Seconds that went into what a process does once, such as compiling.
+        Time that went into what a process does once, such as compiling [s].
 
     Raises
     ------
@@ -47,30 +39,15 @@ def clouds_of(
         As in `run`.
     """
     keep_memory_low()
-    removal = make_removal(clutter_removal, radar)
-    capture = prepare(
-        motion,
-        radar,
-        scene or Scene(),
-        stages=Stages(),
-        fidelity=fidelity,
-        start_s=start_s,
-        duration_s=duration_s,
-        heading_deg=heading_deg,
-        snr_db=snr_db,
-        pfa=pfa,
-        seed=seed,
-        variant="cpu",  # workers share the cores, and a sample is the same to the byte whatever else its machine has
-        spreading=True,
-        noise_power_m2=None,
-        model_options=None,
-        body_material="perfect-conductor",
-        order=1,
-        keep_all=False,
-    )
-    detect = build_detector("os-cfar", pfa=pfa, looks=radar.n_channels)
+    options.setdefault("variant", "cpu")  # workers share the cores
+    settings = RunSettings(**options)
+    capture = prepare(motion, radar, scene or Scene(), settings, Stages())
     maker = CloudMaker(
-        capture.radar, detect=detect, seed=seed, stages=capture.stages, removal=removal
+        capture.radar,
+        detect=capture.detect,
+        seed=settings.seed,
+        stages=capture.stages,
+        removal=capture.removal,
     )
     capture.stream(maker, progress=False)
     return maker.finish(), capture.warmup_s

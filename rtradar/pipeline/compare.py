@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import h5py
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
-from rtradar.pipeline.chain import Result, run
+from rtradar.pipeline.chain import Result, simulate
 from rtradar.pipeline.output.output_files import comparison_files
 from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
@@ -29,6 +29,7 @@ from rtradar.report.figures.side_by_side import (
 from rtradar.report.pages.comparison import write_comparison
 from rtradar.scatter import MODELS
 from rtradar.scene import Scene
+from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
 
 _MEASURES = (
@@ -90,7 +91,7 @@ def compare(
     out: str | Path,
     fidelities: Sequence[str] = ("analytic-paper", "analytic", "specular"),
     overwrite: bool = False,
-    **options: Any,
+    **options: Unpack[RunOptions],
 ) -> Comparison:
     """Run several models on the same recording and say what differs.
 
@@ -110,7 +111,7 @@ def compare(
     overwrite : bool
         Whether files that ``out`` holds under names of the new ones are replaced even where no ``compare.json`` lists them.
     **options
-        Of `run`.
+        Settings of all runs, the fields of `rtradar.RunSettings` but ``fidelity``.
 
     Returns
     -------
@@ -133,16 +134,18 @@ def compare(
         raise InputError(
             f"fidelities {', '.join(names) or '(none)'}; name two or more, each once (--fidelities)"
         )
+    if "fidelity" in options:
+        raise InputError("compare has no option 'fidelity'; name the models in fidelities")
+    settings = RunSettings(**options)
     kind = comparison_files(list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         for name in names:
-            shared = (
-                {"noise_power_m2": results[names[0]].summary["noise_power_m2"]} if results else {}
+            results[name] = simulate(
+                motion, radar, scene or Scene(), replace(settings, fidelity=name), folder / name
             )
-            results[name] = run(
-                motion, radar, scene, out=folder / name, fidelity=name, **options, **shared
-            )
+            noise = results[name].summary["noise_power_m2"]  # that of the first model
+            settings = replace(settings, noise_power_m2=noise)
         summary = _summary(results, folder, radar, names[-1])
         mean_power = {name: result.survey.power_at.mean(axis=0) for name, result in results.items()}
         unit = _unit(radar, summary, mean_power.values())

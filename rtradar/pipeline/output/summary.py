@@ -13,7 +13,7 @@ import numpy as np
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.cloud_maker import Clouds
-from rtradar.pipeline.timing import Stages, peak_memory_mb
+from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.scatter import Accountable
 
 _VERSIONS = (
@@ -29,12 +29,14 @@ _VERSIONS = (
 )
 
 
-def cost(stages: Stages, wall_s: float, warmup_s: float, capture_s: float) -> dict[str, Any]:
-    """Seconds and megabytes so far; ``wall_s`` after the warm-up, ``capture_s`` what the capture lasts."""
+def cost(capture: Capture, spent_s: float) -> dict[str, Any]:
+    """Seconds and megabytes so far, ``spent_s`` since the run began, the warm-up among them."""
+    wall_s = spent_s - capture.warmup_s
+    capture_s = capture.n_chirps * capture.radar.chirp_interval_s
     return {
-        "stages": stages.rounded(),
+        "stages": capture.stages.rounded(),
         "wall_s": round(wall_s, 4),
-        "warmup_s": round(warmup_s, 4),
+        "warmup_s": round(capture.warmup_s, 4),
         "capture_s": capture_s,
         "real_time_factor": round(wall_s / capture_s, 4),
         "peak_memory_mb": round(peak_memory_mb(), 1),

@@ -15,6 +15,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.multipath.multipath import FIELD_ERROR, Multipath
 from rtradar.scene import Scene
+from rtradar.settings import RunSettings
 
 _GHOST_STEP_CYCLES = 4
 """Over which the velocity of a ghost is taken."""
@@ -48,14 +49,10 @@ def indoors(
     radar: Radar,
     body: Body,
     scene: Scene,
-    *,
-    variant: str,
-    order: int,
-    seed: int,
+    settings: RunSettings,
     n_chirps: int,
     person_power_m2: float,
     noise_power_m2: float,
-    keep_all: bool,
 ) -> Indoors:
     """Trace a room with a person in it, and leave out what stays below the noise.
 
@@ -67,26 +64,23 @@ def indoors(
         Where it stands in the scene.
     body : Body
     scene : Scene
-    variant : str
-        Mitsuba's backend.
-    order : int
-        Most walls of a path.
-    seed : int
-        Of diffuse returns.
+    settings : RunSettings
+        Settings of the run: the backend, the order of the paths, the seed of diffuse returns, and
+        whether everything is kept.
     n_chirps : int
-        In the capture.
+        Number of chirps in the capture.
     person_power_m2, noise_power_m2 : float
         Mean power of the person's echoes without the room, and of noise, per IF sample [m^2].
-    keep_all : bool
-        Whether nothing is left out.
 
     Returns
     -------
     Indoors
     """
-    noise = 0.0 if keep_all else noise_power_m2
+    noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     paths = model.prune(n_chirps, noise)
-    clutter = Clutter(radar, scene, variant=variant, seed=seed, order=max(order, 1)).prune(noise)
+    clutter = Clutter(
+        radar, scene, variant=variant, seed=settings.seed, order=max(settings.order, 1)
+    ).prune(noise)
     room = RoomIf(clutter, body, variant=variant)
     still = room.power_m2
     account = {

@@ -1,0 +1,155 @@
+"""The settings of a run: one frozen object, validated once and handed on as it is."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypedDict
+
+from rtradar.errors import InputError
+from rtradar.system.seeds import check_seed
+
+MAX_SNR_DB = 200.0
+"""The largest ratio of echo and noise power, either way [dB]: float32 samples hold no more."""
+
+
+class RunOptions(TypedDict, total=False):
+    """The options that `run` and `compare` take by name; `RunSettings` documents them."""
+
+    fidelity: str
+    start_s: float
+    duration_s: float | None
+    heading_deg: float
+    snr_db: float | Literal["physical"]
+    pfa: float
+    seed: int
+    variant: str
+    spreading: bool
+    model_options: Mapping[str, Any] | None
+    clutter_removal: str
+    body_material: str
+    order: int
+    keep_all: bool
+    save_if: bool
+    detector: str
+    noise_power_m2: float | None
+
+
+@dataclass(frozen=True)
+class RunSettings:
+    """The settings of a run, from motion to point cloud.
+
+    Names that belong to a model, a scene or a detector, and options of a model, are validated where
+    these are built.
+
+    Parameters
+    ----------
+    fidelity : str
+        Name of the echo model, one of `rtradar.scatter.MODELS`.
+    start_s : float
+        Start of the simulated interval of the recording [s].
+    duration_s : float, optional
+        Length of the interval [s]; it extends to the end of the recording if left out.
+    heading_deg : float
+        Angle by which the person is turned from the standard placement, anticlockwise seen from
+        above [degree].
+    snr_db : float or "physical"
+        Power of the person's visible echoes over complex noise power per sample [dB]; ``inf`` for
+        no noise. With ``physical`` the noise follows from the radar's transmit power, gains and
+        noise figure.
+    pfa : float
+        False-alarm rate that the detector is designed for in each cell.
+    seed : int
+        Seed of the noise, of diffuse returns and of the sampling of clouds.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend, for models that trace rays. ``auto`` and ``cpu`` take llvm, or scalar
+        where that does not work; ``cuda`` traces the rays on a GPU.
+    spreading : bool
+        Whether amplitudes hold the loss with distance 1 / (R1 R2).
+    model_options : mapping, optional
+        Options of the model, such as ``{"shadow_rays": 256}`` of ``fresnel``; the class of a model
+        documents them.
+    clutter_removal : {"none", "mean", "exponential", "mti"}
+        Filter that removes static clutter before Doppler; see `rtradar.process.clutter`.
+    body_material : {"perfect-conductor", "skin"}
+        Material of the person's surface.
+    order : int
+        Largest number of reflections at walls, floors and ceilings on the way of an echo.
+    keep_all : bool
+        Whether paths, walls and furniture are kept even where they stay below the noise.
+    save_if : bool
+        Whether the IF samples are kept, in ``if.zarr``.
+    detector : str
+        Name of the detector that marks the cells of a map, one of `rtradar.process.DETECTORS`.
+    noise_power_m2 : float, optional
+        Noise power per sample [m^2], in place of ``snr_db``: for runs with the same noise.
+
+    Raises
+    ------
+    InputError
+        If ``snr_db``, ``noise_power_m2``, ``pfa`` or ``seed`` is no such value.
+    """
+
+    fidelity: str = "specular"
+    start_s: float = 0.0
+    duration_s: float | None = None
+    heading_deg: float = 0.0
+    snr_db: float | Literal["physical"] = 20.0
+    pfa: float = 1e-6
+    seed: int = 0
+    variant: str = "auto"
+    spreading: bool = True
+    model_options: Mapping[str, Any] | None = field(default_factory=dict)
+    clutter_removal: str = "none"
+    body_material: str = "perfect-conductor"
+    order: int = 1
+    keep_all: bool = False
+    save_if: bool = False
+    detector: str = "os-cfar"
+    noise_power_m2: float | None = None
+
+    def __post_init__(self) -> None:
+        _check_noise(self.snr_db, self.noise_power_m2)
+        if not 0 < self.pfa < 1:
+            raise InputError(
+                f"pfa = {self.pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)"
+            )
+        check_seed("", self.seed)
+        if self.snr_db == "physical" and not self.spreading:
+            raise InputError(
+                "snr_db = physical needs the loss with distance; "
+                "leave out --no-spreading (spreading=False)"
+            )
+        # A copy, which no one else can change.
+        object.__setattr__(self, "model_options", dict(self.model_options or {}))
+
+    def parameters(self) -> dict[str, Any]:
+        """Return the settings as ``summary.json`` lists them under ``parameters``.
+
+        Returns
+        -------
+        dict
+            All settings but seed and noise power, which the summary has one level up.
+        """
+        listed = dataclasses.asdict(self)
+        del listed["seed"], listed["noise_power_m2"]
+        return listed | {"snr_db": "inf" if self.snr_db == math.inf else self.snr_db}
+
+
+def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
+    if isinstance(snr_db, str):
+        if snr_db != "physical":
+            raise InputError(
+                f"snr_db = {snr_db!r}; it must be a number of decibels, inf, or physical (--snr-db)"
+            )
+    elif not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
+        raise InputError(
+            f"snr_db = {snr_db}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf for no noise "
+            "(--snr-db)"
+        )
+    if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
+        raise InputError(
+            f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0"
+        )
