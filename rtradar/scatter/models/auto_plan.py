@@ -46,15 +46,19 @@ def choose(told: Forecast, power_share: float, complex_share: float | None) -> N
     excess = told.power - told.true[:, None]
 
     def refine() -> None:
-        if complex_share is not None:
-            _raise(chosen, told.wrong + told.optics, complex_share**2 * whole)
-        _raise(chosen, told.wrong, (_INTERFERING * power_share) ** 2 * whole)
-        _raise(chosen, excess, _SYSTEMATIC * power_share * whole)
-        # Facets, once meshed and traced for one part, serve all.
-        by_facets = np.flatnonzero((chosen >= PHYSICAL_OPTICS).any(axis=1))
-        chosen[by_facets] = np.where(
-            chosen[by_facets] == FRESNEL, PHYSICAL_OPTICS, chosen[by_facets]
-        )
+        # What mends one tolerance may break another: until nothing changes, and choices only rise.
+        before = np.full_like(chosen, -1)
+        while not np.array_equal(chosen, before):
+            before[:] = chosen
+            if complex_share is not None:
+                _raise(chosen, told.wrong + told.optics, complex_share**2 * whole)
+            _raise(chosen, told.wrong, (_INTERFERING * power_share) ** 2 * whole)
+            _raise(chosen, excess, _SYSTEMATIC * power_share * whole)
+            # Facets, once meshed and traced for one part, serve all.
+            by_facets = np.flatnonzero((chosen >= PHYSICAL_OPTICS).any(axis=1))
+            chosen[by_facets] = np.where(
+                chosen[by_facets] == FRESNEL, PHYSICAL_OPTICS, chosen[by_facets]
+            )
 
     refine()
     padded = np.pad(chosen, ((1, 1), (0, 0)), mode="edge")
