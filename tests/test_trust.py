@@ -146,7 +146,7 @@ def test_a_pickle_in_a_cloud_is_not_run(tmp_path: Path) -> None:
 
 def test_a_pickle_for_a_checkpoint_is_not_run(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from rtradar.classify.checkpoint import load_checkpoint
+    from rtradar.classify.store import load_checkpoint
 
     harm, plain, zipped = tmp_path / "harm", tmp_path / "plain.pt", tmp_path / "zipped.pt"
     data = pickle.dumps(Harm(harm))

@@ -1,6 +1,6 @@
-"""What a person does, told from a point cloud: PointNet, how it is trained and judged, and what simpler means can do.
+"""Classification of activities from point clouds: PointNet, its training and evaluation, baselines.
 
-It needs the extra ``learn`` (torch, scikit-learn), and says so where that is missing.
+The package needs the extra ``learn`` (torch, scikit-learn), and says so if that is missing.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ if missing := [
 
 if TYPE_CHECKING:
     from rtradar.classify.baselines import judge_baselines
-    from rtradar.classify.outcome import Outcome
     from rtradar.classify.pointnet import PointNet
     from rtradar.classify.prepare import stack_clouds
     from rtradar.classify.recipes import LEAN, PAPER, Recipe
     from rtradar.classify.splits import Split, make_splits
+    from rtradar.classify.store import Outcome
     from rtradar.classify.study import Study, load_network, load_study, train_study
     from rtradar.classify.training import Examples, predict, train_network
 
@@ -35,7 +35,7 @@ _HOME = {
     "LEAN": "recipes",
     "PAPER": "recipes",
     "Examples": "training",
-    "Outcome": "outcome",
+    "Outcome": "store",
     "PointNet": "pointnet",
     "Recipe": "recipes",
     "Split": "splits",
@@ -71,7 +71,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Only what is used is loaded: recipes and splits do without torch."""
+    """Load only what is used: recipes and splits do not need torch."""
     if name in _HOME:
         return getattr(import_module(f"rtradar.classify.{_HOME[name]}"), name)
     raise AttributeError(f"module 'rtradar.classify' has no attribute '{name}'")

@@ -1,4 +1,4 @@
-"""What simpler means reach on the same splits: a network that does no better has learnt nothing that takes a network."""
+"""Baselines on the same splits: simple classifiers that a network should outperform."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from sklearn.preprocessing import StandardScaler
 from tqdm import tqdm
 
 from rtradar.classify.features import metadata_features, rdt_features, spatial_features
-from rtradar.classify.outcome import Outcome, outcome_of
-from rtradar.classify.source import Clouds
 from rtradar.classify.splits import make_splits, values_of
+from rtradar.classify.store import Outcome, outcome_of
 from rtradar.classify.study import Study, classes_of, learnt_from
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 
@@ -32,7 +32,7 @@ def _forest(seed: int) -> BaseEstimator:
 
 
 BASELINES: dict[
-    str, tuple[Callable[[Clouds], NDArray[np.float64]], Callable[[int], BaseEstimator]]
+    str, tuple[Callable[[Collection], NDArray[np.float64]], Callable[[int], BaseEstimator]]
 ] = {
     "nearest centroid, RDT cloud": (rdt_features, _centroid),
     "random forest, RDT cloud": (rdt_features, _forest),
@@ -40,32 +40,37 @@ BASELINES: dict[
     "random forest, spatial cloud": (spatial_features, _forest),
     "random forest, metadata alone": (metadata_features, _forest),
 }
-"""Features and classifier of each; the last should be at chance, or the data set gives its classes away."""
+"""Features and classifier of each baseline.
+
+The last should be at chance, otherwise the provenance reveals the class.
+"""
 
 
-def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
-    """Answers of every baseline to the splits of a study, those of them that are trained.
+def judge_baselines(clouds: Collection, study: Study) -> dict[str, list[Outcome]]:
+    """Evaluate every baseline on those splits of a study that are trained.
 
     Parameters
     ----------
-    clouds : Clouds
-        Those of the study.
+    clouds : Collection
+        Clouds of the study.
     study : Study
+        Study to compare with.
 
     Returns
     -------
     dict
-        From the name in `BASELINES` to an `Outcome` for each split.
+        An `Outcome` for each split, by the name in `BASELINES`.
 
     Raises
     ------
     InputError
-        Where the clouds are not those of the study.
+        If the clouds are not those of the study.
     """
     plan = study.plan
     if not learnt_from(plan, clouds):
         raise InputError(
-            f"the clouds are not those that '{study.folder}' learnt from; name their folder (--data)"
+            f"the clouds are not those that '{study.folder}' learnt from; "
+            "name their folder (--data)"
         )
     trained = {outcome.name for outcome in study.outcomes}
     splits = make_splits(clouds, plan["split"], folds=plan["folds"], seed=plan["seed"])
@@ -73,7 +78,7 @@ def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
     values = values_of(clouds, plan["split"])
     _, truth = classes_of(clouds)
     found: dict[str, list[Outcome]] = {}
-    made: dict[Callable[[Clouds], NDArray[np.float64]], NDArray[np.float64]] = {}
+    made: dict[Callable[[Collection], NDArray[np.float64]], NDArray[np.float64]] = {}
     with tqdm(BASELINES.items(), unit="baseline", disable=None) as bar:
         for name, (features_of, make) in bar:
             bar.set_description(name)
@@ -84,7 +89,7 @@ def judge_baselines(clouds: Clouds, study: Study) -> dict[str, list[Outcome]]:
             for split in splits:
                 model = make(plan["seed"])
                 with warnings.catch_warnings():
-                    # The nearest centroid asks for the spread in a class only where it shrinks, which it does not here.
+                    # Nearest centroid needs the spread within a class only to shrink.
                     warnings.filterwarnings(
                         "ignore", message=".*within_class_std_dev_", category=UserWarning
                     )

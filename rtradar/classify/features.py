@@ -1,4 +1,4 @@
-"""What can be said of a cloud in a few numbers: what the baselines get to see in place of its points."""
+"""Features of clouds: a few statistics that the baselines use in place of the points."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.classify.source import Clouds
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 
 _PERCENTILES = (5, 25, 50, 75, 95)
@@ -28,35 +28,41 @@ METADATA = (
     "scene",
     "fidelity",
 )
-"""Entries of the provenance that say how a cloud was made, not what it shows; those that a data set lacks are left out."""
+"""Provenance entries that state how a cloud was made, not what it shows.
+
+Entries that a data set lacks are left out.
+"""
 
 
-def rdt_features(clouds: Clouds) -> NDArray[np.float64]:
-    """Simple features of RDT clouds, (cloud, feature).
+def rdt_features(clouds: Collection) -> NDArray[np.float64]:
+    """Compute simple features of RDT clouds, (cloud, feature).
 
-    Of time and range from the middle of the cloud, and of velocity: standard deviation, smallest and largest value and the 5th,
-    25th, 50th, 75th and 95th percentile; the three correlations; share of points slower than 0.5 m/s; mean and spread of velocity
-    in each eighth of the time. An empty cloud has zeros.
+    For time and range from the middle of the cloud and for velocity, these are the standard
+    deviation, the minimum, the maximum and the 5th, 25th, 50th, 75th and 95th percentile. Then
+    follow the three correlations, the fraction of points slower than 0.5 m/s, and the mean and
+    spread of velocity in each eighth of the time. The features of an empty cloud are those of one
+    point at zero.
     """
     return np.stack([_rdt(clouds.points(index)) for index in range(len(clouds))])
 
 
-def spatial_features(clouds: Clouds) -> NDArray[np.float64]:
-    """Simple features of spatial clouds, (cloud, feature).
+def spatial_features(clouds: Collection) -> NDArray[np.float64]:
+    """Compute simple features of spatial clouds, (cloud, feature).
 
-    Of x and y from the middle of the cloud, and of z: as `rdt_features`; the three correlations; the logarithm of the number of
-    points, plus 1. Those of a coordinate that the radar has not measured are 0.
+    For x and y from the middle of the cloud and for z, these are the statistics of `rdt_features`.
+    Then follow the three correlations and the logarithm of the number of points plus 1. The
+    features of a coordinate that the radar does not measure are 0.
     """
     return np.stack([_spatial(clouds.spatial(index)) for index in range(len(clouds))])
 
 
-def metadata_features(clouds: Clouds) -> NDArray[np.float64]:
-    """`METADATA` that all clouds have, (cloud, feature): numbers as they are, names as one column of 0 and 1 for each value."""
+def metadata_features(clouds: Collection) -> NDArray[np.float64]:
+    """Return the `METADATA` that all clouds have, (cloud, feature); names are one-hot encoded."""
     columns = [feature for name in METADATA for feature in _metadata(clouds, name)]
     return np.stack(columns, axis=1) if columns else np.zeros((len(clouds), 1))
 
 
-def _metadata(clouds: Clouds, name: str) -> list[NDArray[np.float64]]:
+def _metadata(clouds: Collection, name: str) -> list[NDArray[np.float64]]:
     try:
         column = clouds.column(name).tolist()
     except (KeyError, InputError):
@@ -68,7 +74,8 @@ def _metadata(clouds: Clouds, name: str) -> list[NDArray[np.float64]]:
     except (TypeError, ValueError):  # names, or lists of several lengths
         names = np.array([str(value) for value in column])
         return [(names == value).astype(np.float64) for value in np.unique(names)]
-    # A place has several columns; infinity, as of an SNR without noise, and what is not known are values of their own.
+    # A position has several columns. Infinity (an SNR without noise) and unknown values become
+    # finite numbers of their own.
     numbers = np.nan_to_num(numbers.reshape(len(column), -1), nan=-1e6, posinf=1e6, neginf=-1e6)
     return list(numbers.T)
 

@@ -1,13 +1,16 @@
-"""PointNet: what kind of motion a set of points shows, whatever their order.
+"""PointNet, a classifier of point sets that is invariant to the order of their points.
 
-The network is that of Qi, Su, Mo and Guibas, "PointNet: deep learning on point sets for 3D classification and segmentation"
-(CVPR 2017, arXiv:1612.00593), appendix C. Two things are computed in another order, with the same result up to rounding:
+The network is that of Qi, Su, Mo and Guibas, "PointNet: deep learning on point sets for 3D
+classification and segmentation" (CVPR 2017, arXiv:1612.00593), appendix C. Two steps are computed
+in another order, with the same result up to rounding:
 
-- Batch norm needs the mean and variance of ``W x`` over all points. Both follow from the mean and covariance of ``x``, so they
-  are known before ``W x`` is, and the norm goes into the weights of the matrix product: no pass over the outputs.
-- Of the 1024 wide layers before a maximum over the points only the maxima are ever used. They are searched without gradients,
-  which in bfloat16 is a matter of choosing between near ties, and then computed for the chosen points alone, with gradients, in
-  float32. Backwards these layers, nine tenths of the network, cost next to nothing.
+- Batch norm needs the mean and variance of ``W x`` over all points. Both follow from the mean and
+  covariance of ``x``, so that the norm can be folded into the weights of the matrix product
+  without a pass over the outputs.
+- Only the maxima over the points of the layers with 1024 outputs are used. The points of the maxima
+  are searched without gradients (bfloat16 only decides between near ties there), and the outputs
+  are then computed in float32, with gradients, for these points alone. The backward pass of these
+  layers, nine tenths of the network, then costs almost nothing.
 """
 
 from __future__ import annotations
@@ -19,25 +22,25 @@ from torch.nn import functional
 from rtradar.classify.recipes import Recipe
 
 _GLOBAL_FEATURES = 1024
-_MOMENTUM, _EPSILON = 0.1, 1e-5  # of batch norm, torch's own
+_MOMENTUM, _EPSILON = 0.1, 1e-5  # torch's defaults of batch norm
 
 
-def _share(batches: Tensor) -> float:
-    """Weight of a new batch in running statistics: at first they are the mean of all, and remember no made-up beginning."""
+def _update_weight(batches: Tensor) -> float:
+    """Weight of a new batch in running statistics, which begin as the mean of all batches."""
     return max(_MOMENTUM, 1 / (1 + int(batches)))
 
 
 class _BatchNorm(nn.BatchNorm1d):
-    """Batch norm of clouds, with such running statistics."""
+    """Batch norm of clouds with running statistics weighted by `_update_weight`."""
 
     def forward(self, x: Tensor) -> Tensor:
         if self.training and self.num_batches_tracked is not None:
-            self.momentum = _share(self.num_batches_tracked)
+            self.momentum = _update_weight(self.num_batches_tracked)
         return super().forward(x)
 
 
 class _NormedLinear(nn.Module):
-    """A matrix product and the batch norm of its outputs, as weights for one matrix product."""
+    """Matrix product and batch norm of its outputs, folded into one matrix product."""
 
     running_mean: Tensor
     running_variance: Tensor
@@ -45,7 +48,7 @@ class _NormedLinear(nn.Module):
 
     def __init__(self, inputs: int, outputs: int) -> None:
         super().__init__()
-        # No bias: the norm takes the mean out.
+        # A bias is not needed, because the norm removes the mean.
         self.linear = nn.Linear(inputs, outputs, bias=False)
         self.gain = nn.Parameter(torch.ones(outputs))
         self.shift = nn.Parameter(torch.zeros(outputs))
@@ -54,7 +57,7 @@ class _NormedLinear(nn.Module):
         self.register_buffer("batches", torch.tensor(0))
 
     def folded(self, x: Tensor) -> tuple[Tensor, Tensor]:
-        """Weight ``(output, input)`` and bias ``(output,)`` that give the normed outputs of ``x (row, input)``."""
+        """Weight ``(output, input)`` and bias ``(output,)`` with the norm of ``x (row, input)``."""
         weight = self.linear.weight
         if not self.training:
             scale = self.gain * torch.rsqrt(self.running_variance + _EPSILON)
@@ -62,38 +65,40 @@ class _NormedLinear(nn.Module):
         n_rows = len(x)
         mean_input = x.mean(dim=0)
         centred = x - mean_input
-        # Its gradient is symmetric, so that of one factor, doubled, is that of both: one product backwards in place of two.
+        # The gradient of the covariance is symmetric: the doubled gradient of one factor is that of
+        # both, which saves one product in the backward pass.
         half = centred.detach().T @ centred / n_rows
         covariance = 2 * half - half.detach()
         mean = weight @ mean_input
         variance = ((weight @ covariance) * weight).sum(dim=1).clamp(min=0)
         with torch.no_grad():
-            share = _share(self.batches)
-            self.running_mean.lerp_(mean, share)
-            self.running_variance.lerp_(variance * (n_rows / max(1, n_rows - 1)), share)
+            weight_of_batch = _update_weight(self.batches)
+            self.running_mean.lerp_(mean, weight_of_batch)
+            self.running_variance.lerp_(variance * (n_rows / max(1, n_rows - 1)), weight_of_batch)
             self.batches += 1
         scale = self.gain * torch.rsqrt(variance + _EPSILON)
         return weight * scale[:, None], self.shift - scale * mean
 
 
 class PointwiseLayer(_NormedLinear):
-    """The same matrix product, batch norm and ReLU for every point: ``(cloud, point, input)`` to ``(cloud, point, output)``."""
+    """Matrix product, batch norm and ReLU for every point, ``(cloud, point, input or output)``."""
 
     def forward(self, x: Tensor) -> Tensor:
-        """Features of every point."""
+        """Compute the features of every point."""
         rows = x.flatten(0, 1)
         return functional.relu(functional.linear(rows, *self.folded(rows))).view(*x.shape[:2], -1)
 
 
 class PooledLayer(_NormedLinear):
-    """A pointwise layer and its maximum over the points: ``(cloud, point, input)`` to ``(cloud, output)``.
+    """Pointwise layer and maximum over points: ``(cloud, point, input)`` to ``(cloud, output)``.
 
     Parameters
     ----------
     inputs, outputs : int
-        Features of a point, and of a cloud.
+        Number of features of a point and of a cloud.
     search : torch.dtype
-        Of the search for the point that gives the maximum, while it learns; answers are searched in the type of the points.
+        Type in which the point of the maximum is searched during training. Predictions search in
+        the type of the points.
     """
 
     def __init__(self, inputs: int, outputs: int, search: torch.dtype) -> None:
@@ -101,20 +106,21 @@ class PooledLayer(_NormedLinear):
         self._search = search
 
     def forward(self, x: Tensor) -> Tensor:
-        """Features of every cloud."""
+        """Compute the features of every cloud."""
         weight, bias = self.folded(x.flatten(0, 1))
         with torch.no_grad():
-            # Ties of a coarse search go to the first point: good enough to learn from, but answers depend on no order.
+            # Ties of a coarse search go to the first point. That is good enough for training, but
+            # predictions must not depend on the order.
             search = self._search if self.training else x.dtype
             points, rows = x.to(search), weight.to(search)
             if x.is_cuda:
                 chosen = (rows @ points.transpose(1, 2)).max(dim=2).indices
-            else:  # cloud by cloud: what one gives stays in the cache until its maxima are found
+            else:  # cloud by cloud, so that the outputs of one stay in the cache
                 chosen = torch.stack([(rows @ cloud.T).max(dim=1).indices for cloud in points])
             n_clouds, n_points, _ = x.shape
             chosen += n_points * torch.arange(n_clouds, device=x.device)[:, None]
         inputs = x.flatten(0, 1).index_select(0, chosen.flatten()).view(*chosen.shape, -1)
-        # The ReLU of the maximum is the maximum of the ReLU.
+        # The ReLU of the maximum equals the maximum of the ReLU.
         return functional.relu((inputs * weight).sum(dim=2) + bias)
 
 
@@ -123,14 +129,14 @@ def _dense(inputs: int, outputs: int) -> nn.Sequential:
 
 
 class TransformNet(nn.Module):
-    """T-Net: a square matrix for each cloud, the identity at first, by which its points or features are turned.
+    """T-Net: a square matrix for each cloud, initially the identity, that transforms its features.
 
     Parameters
     ----------
     size : int
-        Of the matrix.
+        Number of rows of the matrix.
     search : torch.dtype
-        As in `PooledLayer`.
+        Type of the search for the maximum, see `PooledLayer`.
     """
 
     def __init__(self, size: int, search: torch.dtype) -> None:
@@ -148,20 +154,20 @@ class TransformNet(nn.Module):
             self.matrix.bias.copy_(torch.eye(size).flatten())
 
     def forward(self, x: Tensor) -> Tensor:
-        """``x (cloud, point, size)`` to ``(cloud, size, size)``."""
+        """Compute the matrices ``(cloud, size, size)`` of ``x (cloud, point, size)``."""
         matrix: Tensor = self.matrix(self.cloud(self.points(x)))
         return matrix.view(-1, self._size, self._size)
 
 
 class PointNet(nn.Module):
-    """The network for a number of classes.
+    """PointNet for a number of classes.
 
     Parameters
     ----------
     n_classes : int
-        Kinds of motion.
+        Number of classes.
     recipe : Recipe
-        Which T-Nets, the dropout and the precision of the search are taken from it.
+        Recipe that defines the T-Nets, the dropout and the precision of the search.
     """
 
     def __init__(self, n_classes: int, recipe: Recipe) -> None:
@@ -188,14 +194,15 @@ class PointNet(nn.Module):
         Parameters
         ----------
         points : (cloud, point, 3)
-            Scaled as the recipe says.
+            Scaled clouds.
 
         Returns
         -------
         log_probabilities : (cloud, class)
+            Log-probability of each class.
         skewness : ()
-            Mean over the clouds of ``|I - A A^T|^2`` (Frobenius), A the feature transform: added to the loss, it keeps A near a
-            rotation. 0 without one.
+            Mean over the clouds of ``|I - A A^T|^2`` (Frobenius), with A the feature transform, or
+            0 without one. Added to the loss, it keeps A near a rotation.
         """
         if self.input_transform is not None:
             points = points @ self.input_transform(points)

@@ -1,13 +1,15 @@
-"""Clouds on their way into the network: one array of them, points drawn, varied and scaled.
+"""Preparation of clouds for the network: stacking, sampling of points, augmentation and scaling.
 
-Time, range and velocity have units of their own. ``unit-sphere``, PointNet's normalisation of shapes, centres a cloud and divides
-all three by one number: what is a second long and what is 8 m/s wide are compared as numbers, and the size of a cloud is lost.
-``physical`` divides each axis by a fixed scale, `PHYSICAL_SCALES`: time and range from the middle of the cloud, for when and
-where somebody moves says nothing of what they do, velocity from zero. The paper normalises; how, and in what units, it leaves
-open.
+Time, range and velocity have different units. ``unit-sphere``, PointNet's normalisation of shapes,
+centres a cloud and divides all three axes by one number, so that seconds and m/s are compared as
+numbers and the size of a cloud is lost. ``physical`` divides each axis by a fixed scale,
+`PHYSICAL_SCALES`. Time and range are counted from the middle of the cloud, as the place and time of
+a motion say nothing of its kind, and velocity from zero. The paper normalises clouds, but states
+neither how nor in what units.
 
-Varied clouds are such as another recording would give: ``physical`` shifts and stretches them as `Variation` says. ``turned`` is
-what the paper's own program does, a turn by any angle in the plane of time and velocity, and jitter; no motion gives such clouds.
+Augmented clouds resemble those of other recordings: ``physical`` shifts and stretches them as
+`Variation` says. ``turned`` is the augmentation of the paper's own program, a rotation by a random
+angle in the plane of time and velocity, and jitter; no motion gives such clouds.
 """
 
 from __future__ import annotations
@@ -20,30 +22,32 @@ import torch
 from torch import Tensor
 
 from rtradar.classify.recipes import Augmentation, Scaling
-from rtradar.classify.source import Clouds
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import stream
 
 PHYSICAL_SCALES = (0.5, 0.5, 2.5)
-"""Time [s], range [m], velocity [m/s] that become 1: about the spread of a person's motion, so that all axes count alike."""
+"""Time [s], range [m] and velocity [m/s] that are scaled to 1, about the spread of a motion."""
 
-_TURNED_JITTER, _TURNED_JITTER_LIMIT = 0.02, 0.05  # of PointNet's own program, on unit spheres
+_ROTATION_JITTER, _ROTATION_JITTER_LIMIT = 0.02, 0.05  # those of PointNet on unit spheres
 
 
 @dataclass(frozen=True)
 class Variation:
-    """How far a training cloud may be from the one that was made; each drawn uniformly, jitter normally.
+    """Ranges of the physical augmentation, drawn uniformly, and of its normally distributed jitter.
 
     Parameters
     ----------
     time_shift_s, range_shift_m : float
-        Largest shift either way.
+        Largest shift in either direction [s], [m].
     tempo : float
-        Largest relative change of tempo: time is divided by what velocity is multiplied by.
+        Largest relative change of tempo. Velocity is multiplied and time divided by it.
     aspect : float
-        Largest relative loss of radial motion, as when somebody faces elsewhere: range and velocity shrink alike.
+        Largest relative loss of radial motion, as of a person who faces another direction. Range
+        and velocity shrink by the same factor.
     jitter : (3,) float
-        Standard deviation of every point: about a third of a cell of the maps.
+        Standard deviation of time [s], range [m] and velocity [m/s] of each point, about a third of
+        a cell of the maps.
     """
 
     time_shift_s: float = 0.1
@@ -54,29 +58,29 @@ class Variation:
 
 
 VARIATION = Variation()
-"""That of the recipe ``lean``."""
+"""Augmentation of the recipe ``lean``."""
 
 
-def stack_clouds(clouds: Clouds, *, seed: int = 0) -> Tensor:
-    """All clouds as one array, each in random order, so that the first points of it are a sample of it.
+def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
+    """Stack all clouds into one array, each in random order, so that its first points are a sample.
 
     Parameters
     ----------
-    clouds : Clouds
-        As of `rtradar.clouds.collection.Collection`.
+    clouds : Collection
+        Labelled clouds.
     seed : int
-        Of the order.
+        Seed of the random order.
 
     Returns
     -------
     (cloud, point, 3) float32
-        As many points as the largest cloud has; smaller ones are filled up with points of their own, empty ones with zeros.
-        Time is counted from the middle of each cloud.
+        Clouds with as many points as the largest one has. Smaller clouds are filled up with points
+        of their own, empty ones with zeros. Time is counted from the middle of each cloud.
 
     Raises
     ------
     InputError
-        Where there are no clouds, or none has points.
+        If there are no clouds, or none has points.
     """
     each = [np.asarray(clouds.points(index), dtype=np.float64) for index in range(len(clouds))]
     n_points = max((len(points) for points in each), default=0)
@@ -97,7 +101,7 @@ def stack_clouds(clouds: Clouds, *, seed: int = 0) -> Tensor:
 
 
 def drawn(stacked: Tensor, n_points: int, *, redraw: bool) -> Tensor:
-    """``n_points`` of every cloud of ``stacked (cloud, point, 3)``: the first, or others at every call (torch's generator)."""
+    """Take ``n_points`` of every cloud: the first ones, or others at every call."""
     if not redraw:
         return stacked[:, :n_points]
     order = torch.rand(stacked.shape[:2]).argsort(dim=1)[:, :n_points]
@@ -105,7 +109,7 @@ def drawn(stacked: Tensor, n_points: int, *, redraw: bool) -> Tensor:
 
 
 def scaled(points: Tensor, scaling: Scaling) -> Tensor:
-    """Points ``(cloud, point, 3)`` [s, m, m/s] as the network takes them, see above."""
+    """Scale points ``(cloud, point, 3)`` [s, m, m/s] for the network (see this module)."""
     if scaling == "unit-sphere":
         centred = points - points.mean(dim=1, keepdim=True)
         radius = centred.norm(dim=2).amax(dim=1)
@@ -115,15 +119,14 @@ def scaled(points: Tensor, scaling: Scaling) -> Tensor:
 
 
 def for_training(points: Tensor, augmentation: Augmentation, scaling: Scaling) -> Tensor:
-    """Varied and scaled clouds; random numbers are those of torch's generator."""
+    """Augment and scale clouds with torch's random generator."""
     if augmentation == "turned":
-        return _turned(scaled(points, scaling))
+        return _rotated(scaled(points, scaling))
     if augmentation == "none":
         return scaled(points, scaling)
-    shift = torch.tensor([VARIATION.time_shift_s, VARIATION.range_shift_m, 0.0]) * _uniform(
-        len(points), 3
-    )
-    # Shifts come after scaling has taken the middle out, or they would be taken out with it.
+    largest = torch.tensor([VARIATION.time_shift_s, VARIATION.range_shift_m, 0.0])
+    shift = largest * _uniform(len(points), 3)
+    # Shifts are added after scaling, because scaling removes the middle of the cloud.
     return scaled(_stretched(points), scaling) + (shift / torch.tensor(PHYSICAL_SCALES))[:, None]
 
 
@@ -143,13 +146,13 @@ def _stretched(points: Tensor) -> Tensor:
     )
 
 
-def _turned(points: Tensor) -> Tensor:
+def _rotated(points: Tensor) -> Tensor:
     angle = math.pi * _uniform(len(points))
     cosine, sine = angle.cos()[:, None], angle.sin()[:, None]
     time, distance, velocity = points.unbind(dim=2)
-    turned = torch.stack(
+    rotated = torch.stack(
         [cosine * time + sine * velocity, distance, cosine * velocity - sine * time], dim=2
     )
-    return turned + (_TURNED_JITTER * torch.randn(points.shape)).clamp(
-        -_TURNED_JITTER_LIMIT, _TURNED_JITTER_LIMIT
+    return rotated + (_ROTATION_JITTER * torch.randn(points.shape)).clamp(
+        -_ROTATION_JITTER_LIMIT, _ROTATION_JITTER_LIMIT
     )

@@ -1,4 +1,4 @@
-"""How a classifier is trained: the paper's way and our own, every number of them in one place."""
+"""Training recipes: every hyperparameter of the paper's training and of our baseline."""
 
 from __future__ import annotations
 
@@ -22,50 +22,57 @@ PRECISIONS: tuple[Precision, ...] = ("float32", "bfloat16")
 
 @dataclass(frozen=True)
 class Recipe:
-    """All that decides what comes of a training, but for the clouds and the seed.
+    """Hyperparameters that, with the clouds and the seed, determine a training.
 
     Parameters
     ----------
     name : str
-        Of the recipe it began as.
+        Name of the predefined recipe it was derived from.
     points : int
-        Points of each cloud that the network sees, at least 1.
+        Number of points that the network takes from each cloud, at least 1.
     batch : int
-        Clouds a step, at least 2. What is left over joins the other batches: no cloud is dropped, none stands alone.
+        Number of clouds in a batch, at least 2. The remainder is spread over the other batches, so
+        that no cloud is dropped and no batch holds a single cloud.
     epochs : int
-        Passes over the training clouds, at least 1.
+        Number of passes over the training clouds, at least 1.
     rate : float
-        Learning rate, the first of ``halving``, the highest of ``one-cycle``.
+        Learning rate: the initial one of ``halving``, the peak of ``one-cycle``.
     schedule : {"halving", "one-cycle"}
-        Halved every ``halve_every`` epochs; or up a line over the first tenth of all steps and down a cosine to nothing.
+        Schedule of the learning rate. ``halving`` is a step schedule that halves the rate every
+        ``halve_every`` epochs. ``one-cycle`` rises linearly over the first tenth of all batches and
+        falls to 0 along a cosine.
     halve_every : int
-        Epochs between two halvings.
+        Number of epochs between two steps of ``halving``.
     stop_below : float
-        ``halving`` ends before the epoch whose rate is less: what follows changes nothing that can be seen. 0: never.
+        Rate below which ``halving`` ends early, because further epochs have no visible effect; 0
+        disables this.
     weight_decay : float
-        Of AdamW, decoupled; 0 makes it Adam.
+        Decoupled weight decay of AdamW; 0 gives Adam.
     input_transform, feature_transform : bool
-        Whether the network turns points (3 x 3) and their features (64 x 64) by T-Nets.
+        Whether T-Nets transform the points (3 x 3) and their features (64 x 64).
     dropout : float
-        Share of the last hidden layer that is left out at a time.
+        Fraction of the last hidden layer that is dropped at random, at least 0 and below 1.
     scaling : {"unit-sphere", "physical"}
-        How time, range and velocity become comparable, see `rtradar.classify.prepare`.
+        Normalisation of time, range and velocity, see `rtradar.classify.prepare`.
     redraw : bool
-        Draw other points of a cloud in every epoch; otherwise the same ones.
+        Whether the points of a cloud are resampled in every epoch; otherwise they stay the same.
     augmentation : {"none", "turned", "physical"}
-        How training clouds are varied, see `rtradar.classify.prepare`.
+        Augmentation of training clouds, see `rtradar.classify.prepare`.
     precision : {"float32", "bfloat16"}
-        Of the search for the largest value over the points while it learns; values, gradients and answers are float32 always.
+        Precision of the search for the maximum over the points during training. Values, gradients
+        and predictions are always float32.
 
     Raises
     ------
     InputError
-        Where a value is out of its range.
+        If a value is out of its range.
 
     Notes
     -----
-    The paper's (section 3.3.2): batches of 3, Adam at 1e-4 halved every 10 epochs, 200 epochs. After 70 epochs the rate is below
-    1e-6, at which its own first trial did not learn in 200. It normalises clouds, and does not tell by what.
+    The defaults are those of the paper (section 3.3.2): batches of 3, Adam at a rate of 1e-4 that
+    is halved every 10 epochs, 200 epochs. After 70 epochs the rate is below 1e-6, at which the
+    paper's first trial did not learn in 200 epochs. The paper normalises clouds but does not say
+    how.
     """
 
     name: str
@@ -113,35 +120,36 @@ class Recipe:
         ):
             if getattr(self, field) not in allowed:
                 raise InputError(
-                    f"recipe: {field} = {getattr(self, field)!r}; it must be one of {', '.join(allowed)}"
+                    f"recipe: {field} = {getattr(self, field)!r}; "
+                    f"it must be one of {', '.join(allowed)}"
                 )
 
     @property
     def epochs_run(self) -> int:
-        """Epochs until the end: all of them, or those before the halved rate falls below ``stop_below``."""
+        """Number of epochs that are run: all, or those with a rate of at least ``stop_below``."""
         if self.schedule == "one-cycle":
             return self.epochs
         return next(
-            (epoch for epoch in range(1, self.epochs) if self._halved(epoch) < self.stop_below),
+            (epoch for epoch in range(1, self.epochs) if self._stepped(epoch) < self.stop_below),
             self.epochs,
         )
 
     def rate_at(self, epoch: int, progress: float) -> float:
-        """Learning rate at a step: ``progress``, 0 to 1, is the share of the epoch's steps that are done.
+        """Return the learning rate of a batch.
 
         Parameters
         ----------
         epoch : int
-            From 0.
+            Number of the epoch, from 0.
         progress : float
-            From 0 to 1.
+            Fraction of the epoch's batches that are done, from 0 to 1.
 
         Returns
         -------
         float
         """
         if self.schedule == "halving":
-            return self._halved(epoch)
+            return self._stepped(epoch)
         done = (epoch + progress) / self.epochs
         warm = 0.1
         return self.rate * (
@@ -150,16 +158,16 @@ class Recipe:
             else (1 + math.cos(math.pi * (done - warm) / (1 - warm))) / 2
         )
 
-    def _halved(self, epoch: int) -> float:
+    def _stepped(self, epoch: int) -> float:
         return self.rate * 0.5 ** (epoch // self.halve_every)
 
     def changed(self, **fields: Any) -> Recipe:
-        """The same with other values; those that are None stay as they are.
+        """Return a copy with other values; fields given as None keep theirs.
 
         Parameters
         ----------
         **fields
-            By the names of the fields.
+            New values by the names of the fields.
 
         Returns
         -------
@@ -170,12 +178,12 @@ class Recipe:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields by their names, plain values."""
+        """Return the fields by name as plain values."""
         return dataclasses.asdict(self)
 
 
 PAPER = Recipe("paper")
-"""The paper's settings, on the whole of every fold (the paper drops a test cloud that does not fill a batch)."""
+"""Settings of the paper. Unlike the paper, no test cloud is dropped for not filling a batch."""
 
 LEAN = Recipe(
     "lean",
@@ -189,7 +197,10 @@ LEAN = Recipe(
     redraw=True,
     augmentation="physical",
 )
-"""Our own: larger batches at a higher rate, no T-Nets (which mix time with velocity), other points every time, varied clouds."""
+"""Our baseline: larger batches at a higher rate, resampled points, augmented clouds, no T-Nets.
+
+T-Nets would mix time with velocity.
+"""
 
 RECIPES = {recipe.name: recipe for recipe in (LEAN, PAPER)}
-"""By their names."""
+"""Predefined recipes by name."""

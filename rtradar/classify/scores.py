@@ -1,4 +1,4 @@
-"""Answers counted: accuracy of every training, confusion, one value of a column against every other; numbers and short tables."""
+"""Scores of outcomes: accuracies, confusion and transfer matrices, as numbers and as tables."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.classify.outcome import Outcome
+from rtradar.classify.store import Outcome
 
 TABLE_4 = {
     500: (94.9, 87.2, 92.3, 69.2, 87.2, 84.6, 84.6, 92.3, 87.2, 76.9),
@@ -16,19 +16,18 @@ TABLE_4 = {
     2000: (94.9, 89.7, 92.3, 76.9, 94.9, 87.2, 87.2, 94.9, 87.2, 82.1),
     3000: (82.1, 79.5, 87.2, 74.4, 71.8, 71.8, 84.6, 84.6, 87.2, 74.4),
 }
-"""The paper's Table 4: points of a cloud, test accuracy of the ten folds [%]."""
+"""Test accuracies of the ten folds [%] by points of a cloud, from the paper's Table 4."""
 
-
-_MOST_COLUMNS = 12
+_MAX_COLUMNS = 12
 
 
 def accuracies(outcomes: Sequence[Outcome]) -> NDArray[np.float64]:
-    """Share of right answers of each, (training,)."""
+    """Return the accuracy of each outcome, (training,)."""
     return np.array([outcome.accuracy for outcome in outcomes])
 
 
 def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
-    """Mean, spread (standard deviation of the trainings), extremes and quartiles of their accuracies, and what they rest on."""
+    """Summarise accuracies: mean, standard deviation, extremes, quartiles, sample sizes."""
     shares = accuracies(outcomes)
     quartiles = np.percentile(shares, [25, 50, 75])
     return {
@@ -45,7 +44,7 @@ def summary(outcomes: Sequence[Outcome]) -> dict[str, Any]:
 
 
 def confusion(outcomes: Sequence[Outcome], n_classes: int) -> NDArray[np.int64]:
-    """Number of test clouds by what they show and what was answered, (truth, answer), over all trainings."""
+    """Count test clouds by true and predicted class, (truth, prediction), over all trainings."""
     counts = np.zeros((n_classes, n_classes), dtype=np.int64)
     for outcome in outcomes:
         np.add.at(counts, (outcome.truth, outcome.predicted), 1)
@@ -53,7 +52,7 @@ def confusion(outcomes: Sequence[Outcome], n_classes: int) -> NDArray[np.int64]:
 
 
 def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
-    """Independent recordings that the test clouds of each class come from, over all trainings."""
+    """Count the independent recordings behind the test clouds of each class."""
     found: list[set[str]] = [set() for _ in range(n_classes)]
     for outcome in outcomes:
         for shown, recording in zip(
@@ -66,19 +65,19 @@ def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
 def transfer(
     outcomes: Sequence[Outcome],
 ) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64]]:
-    """Learnt from one value of a column, asked about another.
+    """Compute the accuracy for each pair of training value and test value of a column.
 
     Parameters
     ----------
     outcomes : sequence of Outcome
-        Of the scheme ``across``.
+        Outcomes of the scheme ``across``.
 
     Returns
     -------
     values : list of str
-        Of the column.
+        Values of the column.
     mean, spread : (trained_on, tested_on) float64
-        Accuracy over the folds and its standard deviation; NaN where there is none.
+        Mean accuracy over the folds and its standard deviation, NaN if there is none.
     """
     values = sorted(
         {outcome.trained_on for outcome in outcomes}
@@ -100,15 +99,16 @@ def transfer(
 
 
 def accuracy_table(rows: Sequence[tuple[str, Sequence[float], str]]) -> str:
-    """Like the paper's Table 4.
+    """Format accuracies as a table like the paper's Table 4.
 
     Parameters
     ----------
     rows : sequence of (title, accuracies, remark)
-        Accuracies between 0 and 1, one a training; of more than `_MOST_COLUMNS` only their mean and spread are told.
+        Accuracies between 0 and 1, one for each training. For more than `_MAX_COLUMNS` trainings
+        only mean and spread are shown.
     """
     width = max(len("accuracy in %"), *(len(title) for title, _, _ in rows))
-    columns = max((len(shares) for _, shares, _ in rows if len(shares) <= _MOST_COLUMNS), default=0)
+    columns = max((len(shares) for _, shares, _ in rows if len(shares) <= _MAX_COLUMNS), default=0)
     head = (
         f"{'accuracy in %':<{width}}  "
         + "".join(f"{number:>6}" for number in range(1, columns + 1))
@@ -122,16 +122,16 @@ def accuracy_table(rows: Sequence[tuple[str, Sequence[float], str]]) -> str:
             if len(shares) <= columns
             else f"  {len(shares)} trainings"
         )
-        lines.append(
-            f"{title:<{width}}  {each:<{6 * columns}}{100 * np.mean(shares):8.1f}{spread}{'  ' + remark if remark else ''}"
-        )
+        mean = f"{100 * np.mean(shares):8.1f}"
+        end = "  " + remark if remark else ""
+        lines.append(f"{title:<{width}}  {each:<{6 * columns}}{mean}{spread}{end}")
     return "\n".join(lines)
 
 
 def confusion_table(
     counts: NDArray[np.int64], classes: Sequence[str], recordings: Sequence[int]
 ) -> str:
-    """What clouds show (rows) and what was answered (columns), and how many recordings of it were asked about."""
+    """Format a confusion matrix (true class down, predicted class across) with recordings."""
     width = max(8, *(len(name) for name in classes)) + 2
     lines = [
         f"{'shows':<{width}}"
@@ -152,7 +152,7 @@ def confusion_table(
 def transfer_table(
     values: Sequence[str], mean: NDArray[np.float64], spread: NDArray[np.float64]
 ) -> str:
-    """Trained on (rows), asked about (columns): accuracy and spread over the folds in %."""
+    """Format accuracies and spreads [%] by training value (down) and test value (across)."""
     width = max(14, *(len(value) for value in values)) + 2
     lines = [f"{'trained on':<{width}}" + "".join(f"{value:>{width}}" for value in values)]
     for value, shares, errors in zip(values, mean, spread, strict=True):

@@ -1,8 +1,8 @@
-"""Who learns from what and is asked about what: training and test sets that never share a moment of a recording.
+"""Splits into training and test sets that never share an interval of a recording.
 
-Clouds of one interval (another radar, seed, scene or fidelity), or of intervals that overlap, show the same motion: a network
-that has learnt the one has seen the other. Every scheme keeps them together, and every split is checked for it before it is
-handed out.
+Clouds of one interval (for another radar, seed, scene or fidelity), or of overlapping intervals,
+show the same motion, so that a test on one of them is biased if another was used for training.
+Every scheme keeps them together, and every split is checked for this before it is returned.
 """
 
 from __future__ import annotations
@@ -15,29 +15,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.classify.source import Clouds
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 
 SCHEMES = ("folds", "recording", "subject", "recorded", "across:COLUMN")
-"""Folds over clouds (the paper's), recordings, subjects; synthetic to recorded; each value of a column to every other."""
+"""Schemes: folds over clouds (the paper's), recordings or subjects; recorded; across a column."""
 
 _ACROSS = "across:"
-_MOST_FOLDS = {"folds": 10, "recording": 10, "subject": 10, _ACROSS: 5}
+_MAX_FOLDS = {"folds": 10, "recording": 10, "subject": 10, _ACROSS: 5}
 
 
 @dataclass(frozen=True)
 class Split:
-    """One training and its test.
+    """Training and test clouds of one training.
 
     Parameters
     ----------
     name : str
-        For tables.
+        Name of the split in tables.
     train, test : (n,) int64
-        Indices of clouds, ascending.
+        Indices of the clouds, ascending.
     trained_on : str
-        Value of the column that the training clouds share; empty but in ``across``.
+        Column value of the training clouds in the scheme ``across``, otherwise empty.
     """
 
     name: str
@@ -47,40 +47,42 @@ class Split:
 
 
 def make_splits(
-    clouds: Clouds, scheme: str, *, folds: int | None = None, seed: int = 0
+    clouds: Collection, scheme: str, *, folds: int | None = None, seed: int = 0
 ) -> list[Split]:
-    """All splits of a scheme.
+    """Make all splits of a scheme.
 
     Parameters
     ----------
-    clouds : Clouds
-        Only labels and provenance are read.
+    clouds : Collection
+        Labelled clouds, of which only labels and provenance are read.
     scheme : str
-        ``folds``: the paper's, stratified over clouds. ``recording``, ``subject``: each recording or subject on one side only.
-        ``recorded``: learn from synthetic motion, be asked about recorded. ``across:COLUMN`` (or ``across:A,B``): for every value
-        of the column(s) and every fold over recordings, learn from the clouds of that value and be asked about the clouds of all
-        values, of other recordings.
+        Scheme of the splits. ``folds``: the paper's, stratified over clouds. ``recording``,
+        ``subject``: each recording or subject is on one side only. ``recorded``: train on synthetic
+        motion, test on recorded motion. ``across:COLUMN`` (or ``across:A,B``): for every value of
+        the column(s) and every fold over recordings, train on the clouds of that value, test on
+        clouds of all values from other recordings.
     folds : int, optional
-        At least 2; default 10 (``across``: 5), or as many as there are groups in the class with the fewest.
+        Number of folds, at least 2. The default is 10 (``across``: 5), or the number of groups in
+        the class with the fewest.
     seed : int
-        Of the shuffling.
+        Seed of the shuffling.
 
     Returns
     -------
     list of Split
-        Stratified as far as the groups allow (scikit-learn's StratifiedGroupKFold).
+        Splits, stratified as far as the groups allow (scikit-learn's StratifiedGroupKFold).
 
     Raises
     ------
     InputError
-        Where the scheme is unknown, there are too few groups, or a class to be asked about is never learnt.
+        If the scheme is unknown, there are too few groups, or a test class has no training cloud.
     """
     moments, recordings = moments_of(clouds), recordings_of(clouds)
     if scheme == "recorded":
         splits = _synthetic_to_recorded(clouds)
     elif scheme.startswith(_ACROSS):
         values = values_of(clouds, scheme)
-        parts = _folds(clouds, "recording", recordings, folds, _MOST_FOLDS[_ACROSS], seed)
+        parts = _folds(clouds, "recording", recordings, folds, _MAX_FOLDS[_ACROSS], seed)
         splits = [
             Split(
                 f"{value}, fold {number}", part.train[values[part.train] == value], part.test, value
@@ -88,7 +90,7 @@ def make_splits(
             for value in np.unique(values).tolist()
             for number, part in enumerate(parts, start=1)
         ]
-    elif scheme in _MOST_FOLDS:
+    elif scheme in _MAX_FOLDS:
         groups = (
             moments
             if scheme == "folds"
@@ -96,7 +98,7 @@ def make_splits(
             if scheme == "recording"
             else _numbered(clouds.column(scheme))
         )
-        splits = _folds(clouds, scheme, groups, folds, _MOST_FOLDS[scheme], seed)
+        splits = _folds(clouds, scheme, groups, folds, _MAX_FOLDS[scheme], seed)
     else:
         raise InputError(f"split '{scheme}' is unknown; give one of {', '.join(SCHEMES)}")
     for split in splits:
@@ -104,8 +106,8 @@ def make_splits(
     return splits
 
 
-def values_of(clouds: Clouds, scheme: str) -> NDArray[np.str_]:
-    """Value of the column(s) that ``across:...`` names, for every cloud, (cloud,); empty strings for other schemes."""
+def values_of(clouds: Collection, scheme: str) -> NDArray[np.str_]:
+    """Return the value that ``across:...`` compares, (cloud,); empty strings for other schemes."""
     if not scheme.startswith(_ACROSS):
         return np.full(len(clouds), "")
     names = [name.strip() for name in scheme.removeprefix(_ACROSS).split(",")]
@@ -113,15 +115,15 @@ def values_of(clouds: Clouds, scheme: str) -> NDArray[np.str_]:
     return np.array([" / ".join(str(value) for value in row) for row in zip(*columns, strict=True)])
 
 
-def moments_of(clouds: Clouds) -> NDArray[np.int64]:
-    """A number for every cloud, (cloud,), the same for clouds whose intervals of one recording are the same or overlap."""
+def moments_of(clouds: Collection) -> NDArray[np.int64]:
+    """Number the groups of clouds of equal or overlapping intervals of a recording, (cloud,)."""
     recording = recordings_of(clouds)
     start = clouds.column("start_s").astype(np.float64)
     end = start + clouds.column("duration_s").astype(np.float64)
     moments = np.zeros(len(clouds), dtype=np.int64)
     number, last, begun, until = -1, -1, -np.inf, -np.inf
     for index in np.lexsort((start, recording)):
-        # The same start is the same interval even where it has no length.
+        # Intervals with the same start are the same even if they have no length.
         if recording[index] != last or not (start[index] < until or start[index] == begun):
             number, last, until = number + 1, recording[index], -np.inf
         begun, until = start[index], max(until, end[index])
@@ -129,17 +131,17 @@ def moments_of(clouds: Clouds) -> NDArray[np.int64]:
     return moments
 
 
-def recordings_of(clouds: Clouds) -> NDArray[np.int64]:
-    """A number for every cloud, (cloud,), the same for clouds of one recording: one file has several names in several folders."""
+def recordings_of(clouds: Collection) -> NDArray[np.int64]:
+    """Number the recordings, (cloud,); one file may have several names in several folders."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     names = _numbered(clouds.column("recording"))
     try:
         contents = clouds.column("recording_digest").astype(str)
-    except (KeyError, InputError):  # of none of them
+    except (KeyError, InputError):
         return names
-    # Those that share a name or a content, or share one of them with others that do.
+    # Clouds belong together if a chain of equal names or equal contents connects them.
     known = np.flatnonzero((contents != "") & (contents != "None"))
     ends = names.max() + 1 + np.unique(contents[known], return_inverse=True)[1]
     n_nodes = names.max() + 1 + len(known)
@@ -148,7 +150,7 @@ def recordings_of(clouds: Clouds) -> NDArray[np.int64]:
 
 
 def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) -> None:
-    """Raise where a split is not one: a side is empty, a moment is on both, or a class is asked about that was not learnt."""
+    """Raise InputError if a side is empty, an interval is on both, or a test class is new."""
     if not len(split.train) or not len(split.test):
         side = "training" if not len(split.train) else "test"
         raise InputError(
@@ -158,27 +160,35 @@ def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) ->
     if both.size:
         index = split.train[np.isin(moments[split.train], both)][0]
         raise InputError(
-            f"split '{split.name}': {both.size} intervals are on both sides, the first is that of cloud {index}; "
+            f"split '{split.name}': {both.size} intervals are on both sides, "
+            f"the first is that of cloud {index}; "
             "take care that a recording has one subject and one source"
         )
     if unknown := sorted(set(labels[split.test].tolist()) - set(labels[split.train].tolist())):
         raise InputError(
-            f"split '{split.name}': no training cloud shows {', '.join(unknown)}; give fewer folds, or add recordings of it"
+            f"split '{split.name}': no training cloud shows {', '.join(unknown)}; "
+            "give fewer folds, or add recordings of it"
         )
 
 
-def _synthetic_to_recorded(clouds: Clouds) -> list[Split]:
+def _synthetic_to_recorded(clouds: Collection) -> list[Split]:
     source = _column(clouds, "source").astype(str)
     known = {name: np.flatnonzero(source == name) for name in ("synthetic", "recorded")}
     if lacking := [name for name, those in known.items() if not len(those)]:
         raise InputError(
-            f"split 'recorded': no cloud has source '{lacking[0]}'; build a data set of synthetic and recorded motion"
+            f"split 'recorded': no cloud has source '{lacking[0]}'; "
+            "build a data set of synthetic and recorded motion"
         )
     return [Split("synthetic to recorded", known["synthetic"], known["recorded"])]
 
 
 def _folds(
-    clouds: Clouds, what: str, groups: NDArray[np.int64], folds: int | None, most: int, seed: int
+    clouds: Collection,
+    what: str,
+    groups: NDArray[np.int64],
+    folds: int | None,
+    most: int,
+    seed: int,
 ) -> list[Split]:
     from sklearn.model_selection import StratifiedGroupKFold
 
@@ -193,11 +203,11 @@ def _folds(
         )
     if fewest[0] < 2:
         raise InputError(
-            f"split '{what}': {fewest[1]} has one independent group of clouds; it takes two, to learn and to be asked"
+            f"split '{what}': {fewest[1]} has one independent group of clouds; "
+            "it takes two, to learn and to be asked"
         )
     n_folds = min(most, fewest[0]) if folds is None else folds
-    # scikit-learn counts clouds where groups count, and would warn or refuse: said above in groups.
-
+    # scikit-learn warns about the number of clouds, but groups count, which are checked above.
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class", category=UserWarning)
         parts = list(
@@ -212,11 +222,11 @@ def _folds(
 
 
 def _numbered(column: NDArray[Any]) -> NDArray[np.int64]:
-    """Groups by the values of a column, as numbers."""
+    """Number the groups of equal values of a column."""
     return np.unique(column.astype(str), return_inverse=True)[1].astype(np.int64)
 
 
-def _column(clouds: Clouds, name: str) -> NDArray[Any]:
+def _column(clouds: Collection, name: str) -> NDArray[Any]:
     try:
         return np.asarray(clouds.column(name))
     except KeyError:
@@ -226,7 +236,7 @@ def _column(clouds: Clouds, name: str) -> NDArray[Any]:
 
 
 def chosen(splits: Sequence[Split], numbers: Sequence[int] | None) -> list[int]:
-    """Places of the splits that are asked for by number, from 1; all of them without."""
+    """Return the indices of the splits with these numbers, from 1; of all splits for None."""
     if numbers is None:
         return list(range(len(splits)))
     if wrong := [number for number in numbers if not 1 <= number <= len(splits)]:

@@ -1,4 +1,4 @@
-"""A folder of trainings: one recipe, one way to split one data set, as many trainings as that has."""
+"""Studies: all trainings of one recipe on the splits of one data set, in one folder."""
 
 from __future__ import annotations
 
@@ -15,15 +15,23 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
-from rtradar.classify.checkpoint import load_checkpoint
-from rtradar.classify.outcome import Outcome, load_outcome, outcome_of, save_outcome
-from rtradar.classify.plan import PLAN, check_plan, read_plan, write_plan
 from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
-from rtradar.classify.source import Clouds
 from rtradar.classify.splits import chosen, make_splits, values_of
+from rtradar.classify.store import (
+    PLAN,
+    Outcome,
+    check_plan,
+    load_checkpoint,
+    load_outcome,
+    outcome_of,
+    read_plan,
+    save_outcome,
+    write_plan,
+)
 from rtradar.classify.training import Examples, check_points, predict, train_network
+from rtradar.clouds.collection import Collection
 from rtradar.errors import InputError
 from rtradar.system.files import remove_parts
 
@@ -43,22 +51,23 @@ _MADE = (
     "clutter_removal",
     "version",
 )
-"""Entries of the provenance that say how clouds of the same intervals may differ; those that a data set lacks are left out."""
+"""Provenance entries by which clouds of the same intervals may differ, if the data set has them."""
 
 
 @dataclass(frozen=True)
 class Study:
-    """What lies in a folder of trainings.
+    """Plan and outcomes of a folder of trainings.
 
     Parameters
     ----------
     folder : path
+        Folder of the trainings.
     plan : dict
-        ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (of labels and intervals), ``made`` (the same
-        of how they were made; None where an older folder does not tell), ``classes``, ``recipe``, ``split``, ``folds``, ``seed``,
-        ``trainings`` (names).
+        ``data`` (folders of the clouds), ``clouds`` (their number), ``fingerprint`` (hash of labels
+        and intervals), ``made`` (hash of how the clouds were made, None in older folders),
+        ``classes``, ``recipe``, ``split``, ``folds``, ``seed``, ``trainings`` (names).
     outcomes : list of Outcome
-        Of the trainings that are done, in their order.
+        Outcomes of the finished trainings, in order.
     """
 
     folder: Path
@@ -67,12 +76,12 @@ class Study:
 
     @property
     def title(self) -> str:
-        """For tables."""
+        """Title of the study in tables."""
         return f"{self.plan['recipe']['name']}, {self.plan['recipe']['points']} points"
 
 
 def train_study(
-    clouds: Clouds,
+    clouds: Collection,
     out: Path,
     recipe: Recipe,
     *,
@@ -83,22 +92,24 @@ def train_study(
     only: Sequence[int] | None = None,
     device: torch.device | None = None,
 ) -> Study:
-    """Train what is not trained yet.
+    """Run the trainings of a study that are not finished yet.
 
     Parameters
     ----------
-    clouds : Clouds
+    clouds : Collection
+        Labelled clouds.
     out : path
-        Made if it is not there; a folder of the same plan is taken up where it was left.
+        Output folder, which is created if necessary. A folder of the same plan is continued.
     recipe : Recipe
+        Hyperparameters of the trainings.
     data : sequence of str
-        Folders where the clouds are, for the plan.
+        Folders of the clouds, to be stated in the plan.
     split, folds, seed
-        As of `rtradar.classify.splits.make_splits`; the seed is that of the trainings too.
+        Arguments of `rtradar.classify.splits.make_splits`. The seed is used for the trainings too.
     only : sequence of int, optional
-        Numbers of the trainings, from 1; default: all.
+        Numbers of the trainings to run, from 1; all by default.
     device : torch.device, optional
-        Default: the CPU.
+        Device of the network, the CPU by default.
 
     Returns
     -------
@@ -107,7 +118,7 @@ def train_study(
     Raises
     ------
     InputError
-        Where the folder holds another plan or cannot be written, or the split is not possible.
+        If the folder holds another plan or cannot be written, or the split is impossible.
     """
     splits = make_splits(clouds, split, folds=folds, seed=seed)
     numbers = chosen(splits, only)
@@ -140,7 +151,8 @@ def train_study(
             folder.mkdir(exist_ok=True)
             if folder.is_symlink():
                 raise InputError(
-                    f"'{folder}' is a link, and its training would be written elsewhere; give another folder (--out)"
+                    f"'{folder}' is a link, and its training would be written elsewhere; "
+                    "give another folder (--out)"
                 )
             remove_parts(folder, rf"{re.escape(_CHECKPOINT)}|{re.escape(_OUTCOME)}")
             start = bar.n
@@ -172,12 +184,12 @@ def train_study(
 
 
 def load_study(folder: Path) -> Study:
-    """Read the plan and what is done; InputError where there is none of it.
+    """Read the plan of a folder and the outcomes of its finished trainings.
 
     Parameters
     ----------
     folder : path
-        Of the trainings.
+        Folder of the trainings.
 
     Returns
     -------
@@ -186,7 +198,7 @@ def load_study(folder: Path) -> Study:
     Raises
     ------
     InputError
-        Where it holds no plan, a damaged one, or no training that is done.
+        If the plan is missing or damaged, or no training is finished.
     """
     plan = read_plan(folder)
     names = plan["trainings"]
@@ -198,34 +210,35 @@ def load_study(folder: Path) -> Study:
         )
     if not outcomes:
         raise InputError(
-            f"'{folder}': none of its {len(names)} trainings is done; start rtradar train again, it goes on"
+            f"'{folder}': none of its {len(names)} trainings is done; "
+            "start rtradar train again, it goes on"
         )
     return Study(folder, plan, outcomes)
 
 
 def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple[str, ...]]:
-    """A trained network, to ask about other clouds.
+    """Load a trained network, to classify other clouds.
 
     Parameters
     ----------
     folder : path
-        Of the trainings.
+        Folder of the trainings.
     number : int
-        Of the training, from 1.
+        Number of the training, from 1.
 
     Returns
     -------
     network : PointNet
-        Ready for answers, see `rtradar.classify.training.predict`.
+        Network in evaluation mode, see `rtradar.classify.training.predict`.
     recipe : Recipe
-        How clouds are drawn and scaled for it.
+        Recipe by which clouds are sampled and scaled for the network.
     classes : tuple of str
-        Names of what it answers.
+        Names of the classes.
 
     Raises
     ------
     InputError
-        Where there is no such training, or its checkpoint cannot be read safely.
+        If there is no such training, or its checkpoint cannot be read safely.
     """
     plan = read_plan(folder)
     recipe, classes = Recipe(**plan["recipe"]), tuple(plan["classes"])
@@ -235,23 +248,25 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
         network.load_state_dict(load_checkpoint(path).network)
     except (RuntimeError, TypeError, AttributeError):
         raise InputError(
-            f"'{path}' is of another network than '{folder / PLAN}' says; train anew, in another folder"
+            f"'{path}' is of another network than '{folder / PLAN}' says; "
+            "train anew, in another folder"
         ) from None
     return network.eval(), recipe, classes
 
 
-def classes_of(clouds: Clouds) -> tuple[tuple[str, ...], NDArray[np.int64]]:
-    """Names of the classes in alphabetical order, and the place among them of every cloud, (cloud,)."""
+def classes_of(clouds: Collection) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Return the class names in alphabetical order and the class number of each cloud, (cloud,)."""
     names, places = np.unique(clouds.labels, return_inverse=True)
     if len(names) < 2:
         raise InputError(
-            f"all {len(clouds)} clouds show the same activity ({', '.join(names)}); it takes two to tell them apart"
+            f"all {len(clouds)} clouds show the same activity ({', '.join(names)}); "
+            "it takes two to tell them apart"
         )
     return tuple(names.tolist()), places.astype(np.int64)
 
 
-def fingerprint(clouds: Clouds) -> str:
-    """Changes when the clouds, their order, their labels or their intervals do."""
+def fingerprint(clouds: Collection) -> str:
+    """Hash of the order, labels and intervals of the clouds."""
     return _digest(
         [
             clouds.labels,
@@ -260,8 +275,8 @@ def fingerprint(clouds: Clouds) -> str:
     )
 
 
-def made(clouds: Clouds) -> str:
-    """Changes when the radar, the model or anything else changes that clouds of the same intervals are made by."""
+def made(clouds: Collection) -> str:
+    """Hash of how the clouds were made: radar, scene, echo model and so on."""
     columns = []
     for name in _MADE:
         with suppress(KeyError, InputError):
@@ -269,8 +284,8 @@ def made(clouds: Clouds) -> str:
     return _digest(columns)
 
 
-def learnt_from(plan: dict[str, Any], clouds: Clouds) -> bool:
-    """Whether these are the clouds of the plan."""
+def learnt_from(plan: dict[str, Any], clouds: Collection) -> bool:
+    """Return whether these are the clouds of the plan."""
     return bool(
         plan["fingerprint"] == fingerprint(clouds) and plan.get("made") in (None, made(clouds))
     )
@@ -285,5 +300,5 @@ def _digest(columns: Sequence[NDArray[Any]]) -> str:
 
 
 def training_folder(out: Path, number: int) -> Path:
-    """Where training ``number``, from 0, is kept."""
+    """Folder of a training, numbered from 0."""
     return out / f"training-{number + 1:02d}"

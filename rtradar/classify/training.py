@@ -1,4 +1,4 @@
-"""One training: a network for the training clouds of a split, epoch by epoch, that can be stopped and taken up at any time."""
+"""Training of one network, epoch by epoch; it can be interrupted and continued at any time."""
 
 from __future__ import annotations
 
@@ -14,37 +14,36 @@ from numpy.typing import NDArray
 from torch import Tensor
 from torch.nn import functional
 
-from rtradar.classify.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import drawn, for_training, scaled
 from rtradar.classify.recipes import Precision, Recipe
+from rtradar.classify.store import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.errors import BackendError, InputError
 from rtradar.system.seeds import stream
 
 SKEWNESS_WEIGHT = 1e-3
-"""Of the feature transform's distance from a rotation, in the loss (Qi et al.)."""
+"""Weight in the loss of the feature transform's distance from a rotation (Qi et al.)."""
 
 SAVE_EVERY_S = 15.0
-"""Between checkpoints: what a kill costs at most, beside one epoch."""
+"""Time between checkpoints [s], the most that a kill costs beside one epoch."""
 
-_WATCHED = 100
-"""Most test clouds that the curves follow; the result is of all."""
+_MAX_MONITORED = 100  # test clouds of the learning curves; the outcome uses all
 
 Row = dict[str, float]
 
 
 @dataclass(frozen=True)
 class Examples:
-    """Clouds and what they show.
+    """Clouds with their classes.
 
     Parameters
     ----------
     points : (cloud, point, 3) float32 tensor
-        As of `rtradar.classify.prepare.stack_clouds`.
+        Clouds from `rtradar.classify.prepare.stack_clouds`.
     classes : (cloud,) int64 tensor
-        Places in ``names``.
+        Class numbers, indices into ``names``.
     names : tuple of str
-        Of the classes.
+        Names of the classes.
     """
 
     points: Tensor
@@ -52,12 +51,12 @@ class Examples:
     names: tuple[str, ...]
 
     def of(self, indices: NDArray[np.int64]) -> Examples:
-        """Some of them.
+        """Return a subset.
 
         Parameters
         ----------
         indices : (cloud,) int64
-            Which.
+            Indices of the clouds.
 
         Returns
         -------
@@ -68,28 +67,30 @@ class Examples:
 
 
 def check_points(examples: Examples, recipe: Recipe) -> None:
-    """Raise where clouds have fewer points than the recipe asks for."""
+    """Raise InputError if the clouds have fewer points than the recipe needs."""
     if recipe.points > examples.points.shape[1]:
         raise InputError(
-            f"--points {recipe.points}: the clouds hold {examples.points.shape[1]} points; give no more"
+            f"--points {recipe.points}: the clouds hold {examples.points.shape[1]} points; "
+            "give no more"
         )
 
 
 def pick_device(name: str) -> torch.device:
-    """``auto``: a CUDA device where there is one. ``cpu``, ``cuda``: that one; BackendError where it is not there."""
+    """Return the device ``cpu`` or ``cuda`` (BackendError without one); ``auto`` prefers CUDA."""
     there = torch.cuda.is_available()
     if name == "cuda" and not there:
         raise BackendError(
-            "--device cuda: torch finds no CUDA device here; give --device cpu, or install a CUDA build of torch"
+            "--device cuda: torch finds no CUDA device here; "
+            "give --device cpu, or install a CUDA build of torch"
         )
     return torch.device("cuda" if there and name != "cpu" else "cpu")
 
 
 def pick_precision(device: torch.device) -> Precision:
-    """bfloat16 where the device multiplies in it, and is faster so; else float32."""
+    """Return bfloat16 if the device multiplies in it, which is faster, otherwise float32."""
     if device.type == "cuda":
         return "bfloat16" if torch.cuda.is_bf16_supported() else "float32"
-    # Older versions of torch do not tell.
+    # Older versions of torch lack this function.
     known: dict[str, object] = getattr(torch.cpu, "get_capabilities", dict)()
     return "bfloat16" if known.get("avx512_bf16") or known.get("amx_bf16") else "float32"
 
@@ -104,37 +105,40 @@ def train_network(
     checkpoint: Path | None = None,
     on_epoch: Callable[[int, Row], None] = lambda epoch, row: None,
 ) -> tuple[PointNet, list[Row]]:
-    """Train to the end of the recipe, from the checkpoint where there is one.
+    """Train a network to the end of the recipe, continuing from the checkpoint if there is one.
 
-    The same clouds, recipe and seed give the same network on a CPU with the same number of threads, stopped in between or not:
-    each epoch begins random numbers of its own, so nothing but whole epochs counts. On CUDA sums may be taken in another order.
+    On a CPU the same clouds, recipe, seed and number of threads give the same network, interrupted
+    or not, because each epoch seeds its own random numbers. On CUDA the order of sums may vary.
 
     Parameters
     ----------
     train, test : Examples
-        The test clouds are only watched: they choose nothing.
+        Training and test clouds. The test clouds are only monitored and do not affect the training.
     recipe : Recipe
+        Hyperparameters.
     seed : int
-        Of the weights, the order, the points drawn, the variations and the dropout.
+        Seed of the weights, the order of clouds, the points, the augmentation and the dropout.
     device : torch.device, optional
-        Default: the CPU.
+        Device of the network, the CPU by default.
     checkpoint : path, optional
-        Where the state is kept, every `SAVE_EVERY_S` seconds and at the end.
+        File of the state, which is saved every `SAVE_EVERY_S` seconds and at the end.
     on_epoch : callable
-        Told the number of epochs done and the last row of the history.
+        Function called after each epoch with the number of epochs and the last history entry.
 
     Returns
     -------
     network : PointNet
+        Trained network in evaluation mode.
     history : list of dict
-        An epoch each: ``rate``, ``train_loss`` and ``train_accuracy`` while it learns, with dropout and variations, ``test_loss``
-        and ``test_accuracy`` of at most 100 of the test clouds, ``seconds``.
+        One entry for each epoch: ``rate``; ``train_loss`` and ``train_accuracy`` during training,
+        with dropout and augmentation; ``test_loss`` and ``test_accuracy`` of at most 100 of the
+        test clouds; ``seconds``.
 
     Raises
     ------
     InputError
-        Where clouds have fewer points than the recipe asks for, there are fewer than two to learn from, or the checkpoint cannot
-        be used or written.
+        If the clouds have fewer points than the recipe needs, there are fewer than two training
+        clouds, or the checkpoint cannot be used or written.
     """
     check_points(train, recipe)
     if len(train.points) < 2:
@@ -153,13 +157,13 @@ def train_network(
             finished = len(history) == recipe.epochs_run
             if history:
                 on_epoch(len(history), history[-1])
-        watched = test.of(np.arange(0, len(test.points), -(-len(test.points) // _WATCHED)))
+        monitored = test.of(np.arange(0, len(test.points), -(-len(test.points) // _MAX_MONITORED)))
         saved = time.monotonic()
         for epoch in range(len(history), recipe.epochs_run):
             began = time.perf_counter()
             torch.manual_seed(_number(seed, 1 + epoch))
-            row = _epoch(network, optimiser, train, recipe, epoch, device) | _watch(
-                network, watched, recipe
+            row = _epoch(network, optimiser, train, recipe, epoch, device) | _evaluate(
+                network, monitored, recipe
             )
             history.append(row | {"seconds": time.perf_counter() - began})
             if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY_S:
@@ -170,21 +174,22 @@ def train_network(
                 saved = time.monotonic()
             on_epoch(len(history), history[-1])
         if checkpoint is not None and not finished:
-            # What is done needs no optimiser: two thirds of the file.
+            # A finished training needs no optimiser state, two thirds of the file.
             save_checkpoint(checkpoint, Checkpoint(network.state_dict(), {}, len(history), history))
     return network.eval(), history
 
 
 def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np.float32]:
-    """Logarithm of the probability of every class, (cloud, class), from the first points of every cloud.
+    """Predict the log-probability of every class from the first points of every cloud.
 
     Parameters
     ----------
     network : PointNet
+        Trained network.
     examples : Examples
-        Their clouds.
+        Clouds to classify.
     recipe : Recipe
-        That of the network.
+        Recipe of the network.
 
     Returns
     -------
@@ -194,7 +199,7 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
     network.eval()
     with torch.no_grad():
         points = drawn(examples.points, recipe.points, redraw=False)
-        # One scaled cloud does not depend on the others: batches are only for the memory.
+        # Clouds are independent of each other; batches only limit the memory.
         found = [
             network(scaled(some, recipe.scaling).to(device))[0].cpu()
             for some in torch.split(points, 32)
@@ -231,7 +236,7 @@ def _epoch(
     return {"rate": rate, "train_loss": loss_sum / n_clouds, "train_accuracy": right / n_clouds}
 
 
-def _watch(network: PointNet, test: Examples, recipe: Recipe) -> Row:
+def _evaluate(network: PointNet, test: Examples, recipe: Recipe) -> Row:
     log_probabilities = torch.from_numpy(predict(network, test, recipe))
     right = (log_probabilities.argmax(dim=1) == test.classes).float().mean()
     return {
@@ -243,7 +248,7 @@ def _watch(network: PointNet, test: Examples, recipe: Recipe) -> Row:
 def _restore(
     path: Path, network: PointNet, optimiser: torch.optim.Optimizer, recipe: Recipe
 ) -> list[Row]:
-    """Put the state of a checkpoint in place; its history is returned."""
+    """Load the state of a checkpoint and return its history."""
     state = load_checkpoint(path)
     try:
         network.load_state_dict(state.network)
@@ -263,12 +268,12 @@ def _restore(
 
 
 def _number(seed: int, epoch: int) -> int:
-    """One number for a seed and an epoch, unlike any other's."""
+    """Derive a seed for torch from the seed and the epoch."""
     return int(stream(seed, epoch).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
 @contextmanager
 def _random_numbers(device: torch.device) -> Iterator[None]:
-    """Torch's random numbers are the caller's again afterwards."""
+    """Restore torch's random state afterwards."""
     with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         yield

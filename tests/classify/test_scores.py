@@ -3,7 +3,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtradar.classify.outcome import Outcome
 from rtradar.classify.scores import (
     TABLE_4,
     accuracy_table,
@@ -14,6 +13,7 @@ from rtradar.classify.scores import (
     transfer,
     transfer_table,
 )
+from rtradar.classify.store import Outcome
 
 
 def outcome(

@@ -10,9 +10,9 @@ import pytest
 import torch
 
 from rtradar.classify import training
-from rtradar.classify.checkpoint import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import LEAN, PAPER, Recipe
+from rtradar.classify.store import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.classify.study import classes_of
 from rtradar.classify.training import Examples, Row, pick_device, pick_precision, train_network
 from rtradar.errors import BackendError, InputError

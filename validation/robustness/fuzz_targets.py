@@ -19,9 +19,8 @@ from fuzz_kit import Target, npy, written
 
 from rtradar.body import Body
 from rtradar.campaign.spec_file import read_spec
-from rtradar.classify.checkpoint import load_checkpoint
-from rtradar.classify.outcome import load_outcome
 from rtradar.classify.recipes import LEAN
+from rtradar.classify.store import load_checkpoint, load_outcome
 from rtradar.classify.study import load_network, load_study
 from rtradar.clouds import Collection
 from rtradar.clouds.dataset_store import Sample, write_index, write_sample

@@ -9,7 +9,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from rtradar.classify.outcome import Outcome
 from rtradar.classify.scores import (
     TABLE_4,
     accuracies,
@@ -21,6 +20,7 @@ from rtradar.classify.scores import (
     transfer,
     transfer_table,
 )
+from rtradar.classify.store import Outcome
 from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.classifier import (
