@@ -348,7 +348,7 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
     ],
 )
-def test_stamps_of_the_package_have_what_is_taken_in(
+def test_stamps_of_the_package_have_what_is_inlined(
     monkeypatch: pytest.MonkeyPatch, inlined: str, by: str, not_by: str
 ) -> None:
     def named(name: str) -> Any:

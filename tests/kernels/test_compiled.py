@@ -54,7 +54,7 @@ def test_dividing_by_zero_raises_nothing() -> None:
     assert uncached(lambda number: number / 0.0)(1.0) == math.inf
 
 
-def test_what_is_taken_in_is_called_by_python_and_by_compiled_functions() -> None:
+def test_what_is_inlined_is_called_by_python_and_by_compiled_functions() -> None:
     assert half(3.0) == uncached(lambda number: half(number))(3.0) == 1.5
 
 

@@ -34,8 +34,10 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
 ATTENUATION_DB = 160.0
-FACETED = tuple(rung for rung in ("reference", "physical-optics", "rays") if rung in MODELS)
-OPTICAL = tuple(rung for rung in ("analytic", "specular", "fresnel") if rung in MODELS)
+FACETED = tuple(
+    fidelity for fidelity in ("reference", "physical-optics", "rays") if fidelity in MODELS
+)
+OPTICAL = tuple(fidelity for fidelity in ("analytic", "specular", "fresnel") if fidelity in MODELS)
 OVER_REFERENCE_DB = 3.0
 
 
@@ -158,14 +160,14 @@ class Floor:
 
 
 def floor_of(
-    radar: rt.Radar, body: Moving, rung: str, bands: dict[tuple[int, int], tuple[float, float]]
+    radar: rt.Radar, body: Moving, fidelity: str, bands: dict[tuple[int, int], tuple[float, float]]
 ) -> Floor:
     n = radar.cycles_per_frame
     chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(fidelity, radar, body).echoes(chirps)  # type: ignore[arg-type]
     x = rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps)))
     spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
     found = []
@@ -201,18 +203,22 @@ def optical_rows(
     bands = bands_of(radar, body, channels)
     claim = f"{radar.name}, {name}"
     # A turning body has another Doppler by the paper's model, which takes the range of its centre.
-    for rung in (*OPTICAL, *(("analytic-paper",) if isinstance(body, FlyingSphere) else ())):
-        floor = floor_of(radar, body, rung, bands)
+    for fidelity in (*OPTICAL, *(("analytic-paper",) if isinstance(body, FlyingSphere) else ())):
+        floor = floor_of(radar, body, fidelity, bands)
         # -80 dB is what was asked; -160 dB is what the windows leave. What crosses range bins has a wider lobe than the
         # window's, for each bin sees it come and go: that stands in the first figure and is gone in the second.
-        quantity = f"{rung}: highest cell outside, worst of {len(bands)} channels"
+        quantity = f"{fidelity}: highest cell outside, worst of {len(bands)} channels"
         motion = "sphere in flight" if isinstance(body, FlyingSphere) else "turning ellipsoid"
-        says = f"Doppler floor of `{rung}`: {motion}, highest cell"
+        says = f"Doppler floor of `{fidelity}`: {motion}, highest cell"
         yield judged(
             claim, quantity, "dB", floor.highest, -80.0, key="doppler", says=says, cases=len(bands)
         )
         yield reported(
-            claim, f"{rung}: highest cell twice as far outside", "dB", floor.farther, key="doppler"
+            claim,
+            f"{fidelity}: highest cell twice as far outside",
+            "dB",
+            floor.farther,
+            key="doppler",
         )
     widths = [(most - least) / radar.velocity_bin_mps for least, most in bands.values()]
     yield reported(claim, "width of the true Doppler", "bins", max(widths), key="doppler")
@@ -222,14 +228,14 @@ def faceted_rows(radar: rt.Radar, name: str, body: Moving) -> Iterator[Row]:
     bands = bands_of(radar, body, [(0, 0), (0, 1)])
     claim = f"{radar.name}, {name}"
     highest = {}
-    for rung in FACETED:
-        floor = floor_of(radar, body, rung, bands)
-        highest[rung] = floor.highest
+    for fidelity in FACETED:
+        floor = floor_of(radar, body, fidelity, bands)
+        highest[fidelity] = floor.highest
         if isinstance(body, FlyingSphere):
-            says = f"Doppler floor of `{rung}`: sphere in flight, highest cell"
+            says = f"Doppler floor of `{fidelity}`: sphere in flight, highest cell"
             yield judged(
                 claim,
-                f"{rung}: highest cell outside",
+                f"{fidelity}: highest cell outside",
                 "dB",
                 floor.highest,
                 -80.0,
@@ -237,10 +243,10 @@ def faceted_rows(radar: rt.Radar, name: str, body: Moving) -> Iterator[Row]:
                 says=says,
             )
         else:
-            says = f"Doppler floor of `{rung}`: turning ellipsoid, median"
+            says = f"Doppler floor of `{fidelity}`: turning ellipsoid, median"
             yield judged(
                 claim,
-                f"{rung}: median of the cells outside",
+                f"{fidelity}: median of the cells outside",
                 "dB",
                 floor.median,
                 -80.0,
@@ -248,12 +254,12 @@ def faceted_rows(radar: rt.Radar, name: str, body: Moving) -> Iterator[Row]:
                 says=says,
             )
             yield reported(
-                claim, f"{rung}: highest cell outside", "dB", floor.highest, key="doppler"
+                claim, f"{fidelity}: highest cell outside", "dB", floor.highest, key="doppler"
             )
-            if rung != "reference":
+            if fidelity != "reference":
                 over = floor.highest - highest["reference"]
-                quantity = f"{rung}: highest cell outside, over reference"
-                says = f"Doppler floor of `{rung}`: turning ellipsoid, highest cell over that of `reference`"
+                quantity = f"{fidelity}: highest cell outside, over reference"
+                says = f"Doppler floor of `{fidelity}`: turning ellipsoid, highest cell over that of `reference`"
                 yield judged(
                     claim, quantity, "dB", over, OVER_REFERENCE_DB, key="doppler", says=says
                 )
@@ -284,4 +290,4 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Doppler floor of smooth motion on every rung.", measure))
+    sys.exit(main("Doppler floor of smooth motion on every model.", measure))

@@ -129,18 +129,18 @@ def far_rows(quick: bool) -> Iterator[Row]:
                 target = rt.Ellipsoids([np.zeros(3)], [frame], [axes])
                 reference = np.sqrt(np.pi / gaussian_curvature(axes, u, v))
                 turned = {"analytic": 1.0, "specular": mirror_polarization(to_tx, to_rx, normal)}
-                for rung, error in errors.items():
+                for fidelity, error in errors.items():
                     # Where the mirror turns the field across, nothing is left to compare.
-                    clear = np.broadcast_to(turned[rung] > 0.1, n)
+                    clear = np.broadcast_to(turned[fidelity] > 0.1, n)
                     field = rt.scattering_length(
-                        target, FAR_M * to_tx, FAR_M * to_rx, FREQUENCY_HZ, rung
+                        target, FAR_M * to_tx, FAR_M * to_rx, FREQUENCY_HZ, fidelity
                     )
-                    ratio = np.abs(field) / (reference * turned[rung])
+                    ratio = np.abs(field) / (reference * turned[fidelity])
                     error.append(float(np.abs(20 * np.log10(ratio[clear])).max(initial=0.0)))
-        for rung, error in errors.items():
+        for fidelity, error in errors.items():
             # Radii up to 25 m seen from 1000 km: the bent wavefront takes 2e-4 dB.
-            says = f"ellipsoids by `{rung}` from afar against pi R1 R2, Tx and Rx 0 to 140 degrees apart"
-            claim = f"{rung}, 1000 km, {bistatic_deg:g} deg apart"
+            says = f"ellipsoids by `{fidelity}` from afar against pi R1 R2, Tx and Rx 0 to 140 degrees apart"
+            claim = f"{fidelity}, 1000 km, {bistatic_deg:g} deg apart"
             yield judged(
                 claim,
                 "worst |dB| to pi R1 R2",
@@ -159,7 +159,7 @@ def measure(quick: bool) -> list[Row]:
 if __name__ == "__main__":
     sys.exit(
         main(
-            "Ellipsoids far away: the closed form and both closed-form rungs against curvature.",
+            "Ellipsoids far away: the closed form and both closed-form models against curvature.",
             measure,
         )
     )

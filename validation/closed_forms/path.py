@@ -192,7 +192,7 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                     )[0]
                     worst = max(worst, abs(float(Decimal(float(length[0, 0, 0])) - reference)))
                 claim = f"mirror, {distance:g} m, {shape}, {apart}"
-                says = "path over the mirror point against 60 digits, 4 m to 10 km, one place to bistatic"
+                says = "path over the specular point against 60 digits, 4 m to 10 km, one place to bistatic"
                 quantity = f"worst error of the path, {count} cases"
                 yield judged(claim, quantity, "m", worst, TOLERANCE_M, says=says, cases=count)
     yield judged(
@@ -228,7 +228,7 @@ class Shifted:
         return Poses(poses.centres + self.by_m, poses.frames, poses.semi_axes)
 
 
-def rung_rows(quick: bool) -> Iterator[Row]:
+def model_rows(quick: bool) -> Iterator[Row]:
     bodies: dict[str, Moving] = {
         "flying sphere": FlyingSphere((2.0, 0.3, 0.1)),
         "turning ellipsoid": TurningEllipsoid(5.0, (0.05, 0.09, 0.2)),
@@ -244,11 +244,11 @@ def rung_rows(quick: bool) -> Iterator[Row]:
                 there = Shifted(body, shift)
                 place = shift + away * np.array([-0.96, 0.28, 0.01])
                 radar = dataclasses.replace(whole, position_m=tuple(place.tolist()))
-                for rung in MODELS:
-                    if rung == "rays" and (quick or away > 1e3):
+                for fidelity in MODELS:
+                    if fidelity == "rays" and (quick or away > 1e3):
                         continue  # a minute
                     # The model asks a body for its poses, its parts and its duration: this one has them.
-                    echoes = build_model(rung, radar, there).echoes(chirps)  # type: ignore[arg-type]
+                    echoes = build_model(fidelity, radar, there).echoes(chirps)  # type: ignore[arg-type]
                     poses = there.at((chirps + 0.5) * radar.chirp_duration_s)
                     worst = 0.0
                     for index, chirp in enumerate(chirps):
@@ -265,8 +265,8 @@ def rung_rows(quick: bool) -> Iterator[Row]:
                                 worst,
                                 abs(float(Decimal(float(echoes.length[index, rx, 0])) - reference)),
                             )
-                    claim = f"{rung}, radar {away / 1e3:g} km away, {name} {where}"
-                    says = f"path of a moving body by every rung, radar {away / 1e3:g} km away, scene up to 10 km from its origin"
+                    claim = f"{fidelity}, radar {away / 1e3:g} km away, {name} {where}"
+                    says = f"path of a moving body by every model, radar {away / 1e3:g} km away, scene up to 10 km from its origin"
                     yield judged(
                         claim,
                         "worst error of the path",
@@ -279,7 +279,7 @@ def rung_rows(quick: bool) -> Iterator[Row]:
 
 
 def measure(quick: bool) -> list[Row]:
-    return [*mirror_rows(quick), *rung_rows(quick)]
+    return [*mirror_rows(quick), *model_rows(quick)]
 
 
 if __name__ == "__main__":

@@ -50,10 +50,14 @@ def decibels(field: complex, reference: float) -> float:
 
 
 def field_of(
-    target: rt.Ellipsoids | trimesh.Trimesh, tx: Array, rx: Array, frequency: float, **dials: object
+    target: rt.Ellipsoids | trimesh.Trimesh,
+    tx: Array,
+    rx: Array,
+    frequency: float,
+    **options: object,
 ) -> complex:
     one = rays_scattering(
-        target, np.atleast_2d(tx), np.atleast_2d(rx), np.array([frequency]), **dials
+        target, np.atleast_2d(tx), np.atleast_2d(rx), np.array([frequency]), **options
     )  # type: ignore[arg-type]
     return complex(one[0])
 
@@ -76,13 +80,13 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
     cases = [(0.1, 14e9), (0.25, 14e9), (0.05, 14e9)] + ([] if quick else [(0.1, 79e9)])
     for radius, frequency in cases:
         reference = complex(rt.rcs.sphere(radius, frequency, "po"))
-        for dial in (1.0, 2.0, 3.0, 4.0, 6.0):
+        for density in (1.0, 2.0, 3.0, 4.0, 6.0):
             field_of(
                 spheres((0, 0, 0), radius=radius),
                 tx,
                 tx,
                 frequency,
-                rays_per_wavelength=dial,
+                rays_per_wavelength=density,
                 bounces=1,
             )
             start = time.perf_counter()
@@ -91,22 +95,22 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
                 tx,
                 tx,
                 frequency,
-                rays_per_wavelength=dial,
+                rays_per_wavelength=density,
                 bounces=1,
             )
             taken = time.perf_counter() - start
-            what = f"radius {radius} m, {frequency / 1e9:.0f} GHz, {dial:g} rays per wavelength"
+            what = f"radius {radius} m, {frequency / 1e9:.0f} GHz, {density:g} rays per wavelength"
             error = 100 * abs(field / reference - 1)
-            if dial == 3:
+            if density == 3:
                 # 0.1 dB is what was asked of traced physical optics.
                 says = "a sphere by `rays`, 3 per wavelength, against physical optics' closed form"
                 power = abs(decibels(field, abs(reference)))
                 yield judged("sphere", f"{what}: power", "dB", power, 0.1, key="sphere", says=says)
             yield reported("sphere", f"{what}: complex error", "%", error, key="sphere")
-            if dial in (1, 3):
+            if density in (1, 3):
                 tubes = len(
                     EllipsoidGrid.cover(
-                        np.full((1, 3), radius), SPEED_OF_LIGHT / frequency / dial
+                        np.full((1, 3), radius), SPEED_OF_LIGHT / frequency / density
                     ).part
                 )
                 yield reported("sphere", f"{what}: tubes", "1", tubes, key="sphere")
@@ -204,12 +208,12 @@ def trihedral_rows(quick: bool) -> Iterator[Row]:
     tx = FAR * np.ones(3) / np.sqrt(3)
     for frequency in (12e9, 24e9) if quick else (12e9, 24e9, 77e9):
         reference = np.sqrt(4 * np.pi / 3) * a * a * frequency / SPEED_OF_LIGHT
-        for dial in (1.0, 2.0, 3.0) if frequency == 12e9 and not quick else (3.0,):
+        for density in (1.0, 2.0, 3.0) if frequency == 12e9 and not quick else (3.0,):
             two, three = (
-                field_of(corner, tx, tx, frequency, bounces=n, rays_per_wavelength=dial)
+                field_of(corner, tx, tx, frequency, bounces=n, rays_per_wavelength=density)
                 for n in (2, 3)
             )
-            what = f"edge {a} m, {frequency / 1e9:.0f} GHz, {dial:g} rays per wavelength"
+            what = f"edge {a} m, {frequency / 1e9:.0f} GHz, {density:g} rays per wavelength"
             against = "trihedral by `rays`, 12, 24 and 77 GHz, against 4 pi a⁴ / (3 λ²)"
             for name, field, limit in (
                 ("third bounce alone", three - two, 0.03),
@@ -220,7 +224,7 @@ def trihedral_rows(quick: bool) -> Iterator[Row]:
                     f"{what}: {name}",
                     f"{against}: {name}",
                 )
-                if dial == 3:
+                if density == 3:
                     yield judged(
                         "trihedral", quantity, "dB", error, limit, key="trihedral", says=says
                     )
@@ -426,9 +430,11 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
     bodies: dict[str, Moving] = {name: MOTIONS[name] for name in list(MOTIONS)[: 1 if quick else 3]}
     for name, body in bodies.items():
         least, most = true_velocities(radar, body, 0, radar.rx[0])
-        for dial, anchors in ((3.0, 10e-3),) if quick else ((1.0, 0.0), (3.0, 0.0), (3.0, 10e-3)):
-            rung = Rays(radar, body, rays_per_wavelength=dial, bounces=1, anchor_s=anchors)  # type: ignore[arg-type]
-            x = rt.signal.synthesize(rung.echoes(np.arange(n)), radar, radar.chirp_times(n))
+        for density, anchors in (
+            ((3.0, 10e-3),) if quick else ((1.0, 0.0), (3.0, 0.0), (3.0, 10e-3))
+        ):
+            model = Rays(radar, body, rays_per_wavelength=density, bounces=1, anchor_s=anchors)  # type: ignore[arg-type]
+            x = rt.signal.synthesize(model.echoes(np.arange(n)), radar, radar.chirp_times(n))
             spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
             power = np.abs(spectrum.values[:, :, 0]) ** 2
             outside = beyond(
@@ -436,9 +442,9 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
             )
             floor = float(10 * np.log10(power[:, outside].max() / power.max()))
             shots = f"shot every {1e3 * anchors:g} ms" if anchors else "shot at every chirp"
-            what = f"{dial:g} rays per wavelength, {shots}: floor"
+            what = f"{density:g} rays per wavelength, {shots}: floor"
             if name.startswith("sphere"):
-                says = "Doppler floor of `rays` by its dials: sphere in flight, highest cell"
+                says = "Doppler floor of `rays` by its options: sphere in flight, highest cell"
                 yield judged(name, what, "dB", floor, -80.0, key="doppler", says=says)
             else:
                 # The terminator of a turning body moves over it: a wave that physical optics has, and no other model.

@@ -40,7 +40,7 @@ PLACES = {
 
 
 def image_rows() -> Iterator[Row]:
-    """Every image of a convex box is heard, at its distance."""
+    """Every image of a convex box is received, at its distance."""
     metal = Surface(material=material("perfect-conductor"), thickness_m=0.1)
     scene = rt.Scene(name="box", walls=room_walls(SIZE, CORNER, dict.fromkeys(PLACES, metal)))
     radar = replace(rt.Radar.preset("paper-12ghz"), samples_per_chirp=1024)
@@ -129,7 +129,7 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
         going, coming = places - tx, rx - places
         r1, r2 = (np.linalg.norm(way, axis=1) for way in (going, coming))
         d, s = going / r1[:, None], coming / r2[:, None]
-        sent, heard = (_vector(way, polarization) for way in (-d, s))
+        sent, received = (_vector(way, polarization) for way in (-d, s))
         cosine = -d @ normal
         # v is TE and h TM for antennas in one horizontal plane, as they are here.
         eta = complex(wall.material.eta(frequency))
@@ -140,7 +140,7 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
                 -1 if polarization == "v" else 1
             )
         current = 2 * np.cross(normal, np.cross(d, sent)) * mirror[:, None]
-        total += ((current * heard).sum(axis=1) / (r1 * r2) * np.exp(-1j * k * (r1 + r2))).sum()
+        total += ((current * received).sum(axis=1) / (r1 * r2) * np.exp(-1j * k * (r1 + r2))).sum()
     # The field is -jk / (4 pi) of this; a scattering length counts it against what a conductor turns round.
     return complex(1j * k / np.sqrt(4 * np.pi) * total * area)
 

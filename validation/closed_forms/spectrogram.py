@@ -168,16 +168,16 @@ def walk_spectrogram(
     radar: rt.Radar, body: Body, fidelity: str, snr_db: float = 20.0
 ) -> Spectrogram:
     """Channel 0, through the pieces of the chain."""
-    rung = build_model(fidelity, radar, body)
+    model = build_model(fidelity, radar, body)
     n_chirps = int(body.duration_s / radar.cycle_duration_s) * radar.n_tx
-    noise = Noise.for_snr(survey(rung, radar, body, n_chirps).power, snr_db, seed=0)
+    noise = Noise.for_snr(survey(model, radar, body, n_chirps).power, snr_db, seed=0)
     block = 34 * radar.n_tx
 
     def blocks() -> Iterator[NDArray[np.complex64]]:
         for first in range(0, n_chirps, block):
             chirps = np.arange(first, min(first + block, n_chirps))
             samples = synthesize(
-                rung.echoes(chirps),
+                model.echoes(chirps),
                 radar,
                 radar.chirp_times(len(chirps), first),
                 dtype=np.complex64,

@@ -75,7 +75,7 @@ GUARD, REACH = 2, 6
 class Capture(NamedTuple):
     """One activity before the radar."""
 
-    rung: rt.scatter.EchoModel
+    model: rt.scatter.EchoModel
     starts: NDArray[np.int64]
     echo_power: float
 
@@ -83,16 +83,16 @@ class Capture(NamedTuple):
     def of(cls, activity: str, fidelity: str, every: int, *, spreading: bool = True) -> Capture:
         body = Body.from_motion(place(rt.synthetic_motion(activity, seed=0)))
         n_chirps = math.floor(body.duration_s / RADAR.cycle_duration_s) * RADAR.n_tx
-        rung = build_model(fidelity, RADAR, body, spreading=spreading)
-        power = survey(rung, RADAR, body, n_chirps, spreading=spreading).power
-        return cls(rung, RADAR.window_starts(n_chirps)[::every], power)
+        model = build_model(fidelity, RADAR, body, spreading=spreading)
+        power = survey(model, RADAR, body, n_chirps, spreading=spreading).power
+        return cls(model, RADAR.window_starts(n_chirps)[::every], power)
 
     def samples(self, start: int) -> NDArray[np.complex64]:
         """Noise-free IF of the window that starts at this cycle."""
         chirps = np.arange(RADAR.chirps_per_frame) + start * RADAR.n_tx
         times = RADAR.chirp_times(len(chirps), int(chirps[0]))
         return np.asarray(
-            synthesize(self.rung.echoes(chirps), RADAR, times, dtype=np.complex64),
+            synthesize(self.model.echoes(chirps), RADAR, times, dtype=np.complex64),
             dtype=np.complex64,
         )
 

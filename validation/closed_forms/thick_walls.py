@@ -199,7 +199,7 @@ def exact_echo(
     point = centre
     for _ in range(200):
         point = centre + RADIUS_M * unit(sum(unit(start - point) for start in starts))
-    (field, way, r1), (heard, _, r2) = (
+    (field, way, r1), (received, _, r2) = (
         arrived(antenna, point, wall, mirrored, frequency)
         for antenna, (wall, mirrored) in ((tx, out), (rx, back))
     )
@@ -215,7 +215,7 @@ def exact_echo(
     )
     turned = 2 * (field @ normal)[:, None] * normal - field
     # A conductor that sends the field straight back counts as +1.
-    share = -(turned * heard).sum(axis=1)
+    share = -(turned * received).sum(axis=1)
     return np.asarray(strength * share * np.exp(-2j * np.pi * frequency / C * (r1 + r2)))
 
 
@@ -283,8 +283,8 @@ def behind_rows(quick: bool) -> Iterator[Row]:
                 places.items() if not quick else [("35 degrees", places["35 degrees"])]
             ):
                 body = Ball(centre, velocity=(0.5, 1.5, 0.0))
-                rung = Multipath(radar, body, Scene(walls=(wall,)), order=0)  # type: ignore[arg-type]
-                echoes = rung.echoes(chirps)
+                model = Multipath(radar, body, Scene(walls=(wall,)), order=0)  # type: ignore[arg-type]
+                echoes = model.echoes(chirps)
                 ours = spectrum(echoes.length, echoes.amplitude, echoes.frequency, frequency)
                 rx = radar.rx[radar.rx_of_tx]
                 channels = [(i, j) for i in range(radar.n_tx) for j in range(0, radar.n_rx, 3)]
@@ -354,9 +354,9 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                 "53 degrees": (2.0, -0.3, 1.2),
                 "32 degrees": (0.0, 0.1, 0.8),
             }.items():
-                rung = Multipath(radar, Ball(centre), Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
-                echoes = rung.echoes(chirps)
-                names = np.array(rung.path_names)
+                model = Multipath(radar, Ball(centre), Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
+                echoes = model.echoes(chirps)
+                names = np.array(model.path_names)
                 for path, sides in {
                     "left > body": (True, False),
                     "left > body > left": (True, True),
@@ -423,7 +423,7 @@ def of_strongest(ours: Field, exact: Field) -> float:
     return float(np.abs(ours - exact).max() / np.abs(exact).max())
 
 
-def heard(
+def received(
     radar: rt.Radar, walls: tuple[Wall, ...], furniture: tuple[Furniture, ...] = ()
 ) -> tuple[RoomEchoes, ...] | str:
     """Clutter of a room, or the one line by which it is refused."""
@@ -476,7 +476,7 @@ def clutter_rows(quick: bool) -> Iterator[Row]:
                 ).T
                 if np.abs(exact).max() < 1e-3:
                     continue
-                objects = heard(radar, room)
+                objects = received(radar, room)
                 if isinstance(objects, str):
                     yield clutter_row(claim, label, objects)
                     continue
@@ -537,11 +537,11 @@ def furniture_rows(quick: bool) -> Iterator[Row]:
                 ("a reflector behind a wall", "reflector", (), (box,)),
                 ("a rough conductor behind a wall", "rough", (rough,), ()),
             ):
-                objects = heard(radar, (*walls, pane), furniture)
+                objects = received(radar, (*walls, pane), furniture)
                 if isinstance(objects, str):
                     yield clutter_row(claim, label, objects)
                     continue
-                rooms = objects, heard(radar, walls, furniture)
+                rooms = objects, received(radar, walls, furniture)
                 ours, exact = (next(own for own in room if own.kind == kind) for room in rooms)
                 mine = spectrum(ours.length, ours.amplitude, ours.frequency, frequency)
                 points = exact.points[0, 0, :, 0]

@@ -76,15 +76,15 @@ def measure(quick: bool) -> list[Row]:
             ).ravel()
             truth = spectrum(build_model("reference", radar, body), radar, chirps)
 
-            rungs: list[tuple[str, str, dict[str, Any]]] = [(fixed, fixed, {}) for fixed in FIXED]
+            models: list[tuple[str, str, dict[str, Any]]] = [(fixed, fixed, {}) for fixed in FIXED]
             tolerances = TOLERANCES[name][::2] if quick else TOLERANCES[name]
-            rungs += [
+            models += [
                 (f"auto {key} {value:g}", "auto", {key: value})
-                for dials in tolerances
-                for key, value in dials.items()
+                for options in tolerances
+                for key, value in options.items()
             ]
-            for label, fidelity, dials in rungs:
-                found = spectrum(build_model(fidelity, radar, body, **dials), radar, chirps)
+            for label, fidelity, options in models:
+                found = spectrum(build_model(fidelity, radar, body, **options), radar, chirps)
                 powers = [
                     (np.abs(field) ** 2).reshape(3, n_frames, -1).mean(axis=(0, 2))
                     for field in (found, truth)
@@ -99,18 +99,20 @@ def measure(quick: bool) -> list[Row]:
                     (claim, "complex error, rms", "", wrong),
                 )
                 says = "four activities by `auto` against `reference`, 3 s"
-                for figure, dial, judges in (
+                for figure, option, judges in (
                     (of_power, "tolerance_db", f"{says}: power of the worst frame"),
                     (of_field, "tolerance_complex", f"{says}: complex error"),
                 ):
                     rows.append(
-                        judged(*figure, dials[dial], says=judges)
-                        if dial in dials
+                        judged(*figure, options[option], says=judges)
+                        if option in options
                         else reported(*figure)
                     )
                 meets.setdefault(label, []).append(worst <= LOOSE["tolerance_db"])
-                if not quick and (fidelity in FIXED or dials == LOOSE):
-                    cost.setdefault(label, []).append(_cost(fidelity, dials, radar, body, n_frames))
+                if not quick and (fidelity in FIXED or options == LOOSE):
+                    cost.setdefault(label, []).append(
+                        _cost(fidelity, options, radar, body, n_frames)
+                    )
                     rows.append(
                         reported(
                             claim,
@@ -138,13 +140,13 @@ def measure(quick: bool) -> list[Row]:
 
 
 def _cost(
-    fidelity: str, dials: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int
+    fidelity: str, options: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int
 ) -> float:
     """Seconds of every third frame [s], by a new model, for models keep what they traced."""
-    seconds(build_model(fidelity, radar, body, **dials), radar, 0)
-    rung = build_model(fidelity, radar, body, **dials)
+    seconds(build_model(fidelity, radar, body, **options), radar, 0)
+    model = build_model(fidelity, radar, body, **options)
     return sum(
-        seconds(rung, radar, frame * radar.chirps_per_frame) for frame in range(0, n_frames, 3)
+        seconds(model, radar, frame * radar.chirps_per_frame) for frame in range(0, n_frames, 3)
     )
 
 

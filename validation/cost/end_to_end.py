@@ -49,7 +49,8 @@ def measure(quick: bool) -> list[Row]:
             motion = rt.synthetic_motion(activity, seed=0, duration_s=3.0)
             with tempfile.TemporaryDirectory() as folder:
                 analytic, optics = (
-                    seconds(motion, radar, rung, folder) for rung in ("analytic", "physical-optics")
+                    seconds(motion, radar, fidelity, folder)
+                    for fidelity in ("analytic", "physical-optics")
                 )
             claim = f"{name}, {activity}, a frame of 100 ms"
             found.append(reported(claim, "analytic, motion to cloud", "s", analytic))

@@ -6,7 +6,7 @@ same run; each is first run a little, so that nothing is compiled, and is the be
 minutes a frame, are timed on a part of it: `rays` on one Tx over the time between two anchors, `reference` on two TDM cycles.
 
 What is measured goes to ``--json FILE`` at once, and what is there is not measured again: to go on after a stop, or to add a
-line to `MODELS` or `DIALS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
+line to `MODELS` or `OPTIONS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
 
     python validation/cost/trade.py --json FILE [--figure validation/cost/trade.png] [--costs] [--quick]
 """
@@ -52,7 +52,7 @@ SLOW = ("rays", "reference")  # minutes a frame: after all others
 
 
 @dataclass(frozen=True)
-class Dial:
+class ModelOption:
     """Settings of one option, from cheap to dear, for each radar; that which the model takes by itself is among them."""
 
     fidelity: str
@@ -66,21 +66,21 @@ def for_both(values: Any) -> dict[str, Any]:
     return dict.fromkeys(PRESETS, values)
 
 
-DIALS = (
-    Dial("fresnel", "shadow_rays", for_both((16, 64, 256)), for_both(64), "-"),
-    Dial(
+OPTIONS = (
+    ModelOption("fresnel", "shadow_rays", for_both((16, 64, 256)), for_both(64), "-"),
+    ModelOption(
         "physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"
     ),
-    Dial(
+    ModelOption(
         "physical-optics",
         "facets",
         {"paper-12ghz": (320, 1280, 5120, 20480), "paper-77ghz": (1280, 5120, 20480)},
         {"paper-12ghz": 5120, "paper-77ghz": 20480},
         "-",
     ),
-    Dial("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
-    Dial("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
-    Dial(
+    ModelOption("auto", "tolerance_db", for_both((2.0, 1.0, 0.5, 0.2)), for_both(0.5), "-"),
+    ModelOption("auto", "tolerance_complex", for_both((0.2, 0.1, 0.05)), for_both(math.inf), "--"),
+    ModelOption(
         "rays",
         "rays_per_wavelength",
         {"paper-12ghz": (1.0, 2.0, 3.0), "paper-77ghz": (3.0,)},
@@ -106,16 +106,16 @@ class Setting:
     """A model with its own options, or one of them turned."""
 
     fidelity: str
-    dial: str = ""
+    option: str = ""
     value: float = 0.0
 
     @property
-    def dials(self) -> dict[str, float]:
-        return {self.dial: self.value} if self.dial else {}
+    def options(self) -> dict[str, float]:
+        return {self.option: self.value} if self.option else {}
 
     @property
     def label(self) -> str:
-        return f"{self.fidelity} {self.dial}={self.value:g}" if self.dial else self.fidelity
+        return f"{self.fidelity} {self.option}={self.value:g}" if self.option else self.fidelity
 
 
 @dataclass
@@ -131,24 +131,26 @@ class Point:
     cost: float = 0.0  # over that of `analytic`
 
 
-def settings_of(dial: Dial, preset: str) -> list[tuple[float, Setting]]:
+def settings_of(option: ModelOption, preset: str) -> list[tuple[float, Setting]]:
     """Along an option, each with its value; where it stands by itself is the model as it is."""
 
     def at(value: float) -> Setting:
         return (
-            Setting(dial.fidelity)
-            if value == dial.default[preset]
-            else Setting(dial.fidelity, dial.name, value)
+            Setting(option.fidelity)
+            if value == option.default[preset]
+            else Setting(option.fidelity, option.name, value)
         )
 
-    return [(value, at(value)) for value in dial.values[preset]]
+    return [(value, at(value)) for value in option.values[preset]]
 
 
 def settings(preset: str, quick: bool) -> list[Setting]:
     """Each once, `analytic` first."""
     found = [Setting(CHEAPEST), *(Setting(fidelity) for fidelity in MODELS)]
     found += (
-        [] if quick else [setting for dial in DIALS for _, setting in settings_of(dial, preset)]
+        []
+        if quick
+        else [setting for option in OPTIONS for _, setting in settings_of(option, preset)]
     )
     return list(dict.fromkeys(found))
 
@@ -156,43 +158,43 @@ def settings(preset: str, quick: bool) -> list[Setting]:
 # -- cost -----------------------------------------------------------------------------------------------------------
 
 
-def seconds(rung: EchoModel, radar: rt.Radar, first: int) -> float:
+def seconds(model: EchoModel, radar: rt.Radar, first: int) -> float:
     """Of echoes and IF samples of the frame that begins at this chirp."""
     step, end = 33 * radar.n_tx, first + radar.chirps_per_frame
     return sum(
-        timed(rung, radar, np.arange(begin, min(begin + step, end)))
+        timed(model, radar, np.arange(begin, min(begin + step, end)))
         for begin in range(first, end, step)
     )
 
 
-def timed(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
+def timed(model: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float:
     began = time.perf_counter()
     at = (chirps + 0.5) * radar.chirp_duration_s
-    rt.signal.synthesize(rung.echoes(chirps), radar, at, dtype=np.complex64)
+    rt.signal.synthesize(model.echoes(chirps), radar, at, dtype=np.complex64)
     return time.perf_counter() - began
 
 
 def seconds_of(scene: Scene, setting: Setting) -> float:
     """The same for a setting, by a model that has traced nothing of it yet; of those that take minutes, from a part of it."""
     radar, first = scene.radar, scene.first_chirp
-    rung = build_model(setting.fidelity, radar, scene.body, **setting.dials)
+    model = build_model(setting.fidelity, radar, scene.body, **setting.options)
     if setting.fidelity == "reference":
         chirps = np.arange(first, first + 2 * radar.n_tx)
-        timed(rung, radar, chirps)
-        return timed(rung, radar, chirps + len(chirps)) * radar.cycles_per_frame / 2
+        timed(model, radar, chirps)
+        return timed(model, radar, chirps + len(chirps)) * radar.cycles_per_frame / 2
     if setting.fidelity == "rays":
         # From one anchor to the next, one of all Tx.
         step = round(ANCHOR_S / radar.chirp_duration_s)
         begin = -(-first // step) * step
         before, chirps = (np.arange(at, at + step) for at in (begin, begin + step))
-        timed(rung, radar, before[before % radar.n_tx == 0])
+        timed(model, radar, before[before % radar.n_tx == 0])
         return (
-            timed(rung, radar, chirps[chirps % radar.n_tx == 0])
+            timed(model, radar, chirps[chirps % radar.n_tx == 0])
             * radar.n_tx
             * radar.chirps_per_frame
             / step
         )
-    return seconds(rung, radar, first)
+    return seconds(model, radar, first)
 
 
 def best_seconds(scene: Scene, setting: Setting) -> float:
@@ -209,9 +211,9 @@ def warm_up(scene: Scene, fidelity: str) -> None:
     if fidelity in SLOW:
         return  # begun anyway
     chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
-    rung = build_model(fidelity, scene.radar, scene.body)
+    model = build_model(fidelity, scene.radar, scene.body)
     rt.signal.synthesize(
-        rung.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64
+        model.echoes(chirps), scene.radar, scene.radar.chirp_times(len(chirps)), dtype=np.complex64
     )
 
 
@@ -247,7 +249,7 @@ def measure_points(
             error, power_db = (
                 (0.0, 0.0)
                 if exact
-                else scene.compared(scene.spectrum(setting.fidelity, **setting.dials))
+                else scene.compared(scene.spectrum(setting.fidelity, **setting.options))
             )
             point = points[key] = Point(*key, error, power_db)
         if base is None:
@@ -284,7 +286,7 @@ def figures(points: list[Point]) -> str:
 def table(points: dict[tuple[str, str, str], Point]) -> str:
     """For docs/choosing-a-level.md: a line a model, then a line a setting of an option; from and to over the activities."""
     lines = [
-        "| rung | "
+        "| model | "
         + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS)
         + " |"
     ]
@@ -304,13 +306,15 @@ def table(points: dict[tuple[str, str, str], Point]) -> str:
 
     for fidelity in MODELS:
         line(f"`{fidelity}`", dict.fromkeys(PRESETS, fidelity))
-    for dial in DIALS:
+    for option in OPTIONS:
         at = {
-            (value, each): setting for each in PRESETS for value, setting in settings_of(dial, each)
+            (value, each): setting
+            for each in PRESETS
+            for value, setting in settings_of(option, each)
         }
         for value in sorted({value for value, _ in at}):
             labels = {each: at[value, each].label for each in PRESETS if (value, each) in at}
-            line(f"`{dial.fidelity}`, {dial.name} {value:g}", labels)
+            line(f"`{option.fidelity}`, {option.name} {value:g}", labels)
     return "\n".join(lines)
 
 
@@ -327,11 +331,11 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
     )
     for axes, preset in zip(panels, PRESETS, strict=True):
         for (of, activity, _), point in points.items():
-            fidelity, _, dial = point.setting.partition(" ")
+            fidelity, _, changed = point.setting.partition(" ")
             if of == preset and point.error > 0:
                 style: dict[str, Any] = (
                     {"s": 14, "alpha": 0.6}
-                    if dial
+                    if changed
                     else {"s": 42, "edgecolors": "black", "linewidths": 0.6}
                 )
                 axes.scatter(
@@ -342,19 +346,19 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                     zorder=3,
                     **style,
                 )
-        for dial in DIALS:
+        for option in OPTIONS:
             for activity in FRAMES:
                 along = [
                     (value, points.get((preset, activity, each.label)))
-                    for value, each in settings_of(dial, preset)
+                    for value, each in settings_of(option, preset)
                 ]
                 found = [(value, point) for value, point in along if point is not None]
                 x, y = [point.cost for _, point in found], [100 * point.error for _, point in found]
                 axes.plot(
                     x,
                     y,
-                    dial.style,
-                    color=COLOURS[dial.fidelity],
+                    option.style,
+                    color=COLOURS[option.fidelity],
                     linewidth=0.8,
                     alpha=0.6,
                     zorder=2,
@@ -362,7 +366,7 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                 # The ends of the option, once.
                 if activity == "walk" and len(found) > 1:
                     for value, point in (found[0], found[-1]):
-                        text = f"{1e3 * value:g} ms" if dial.name == "anchor_s" else f"{value:g}"
+                        text = f"{1e3 * value:g} ms" if option.name == "anchor_s" else f"{value:g}"
                         place = (point.cost, 100 * point.error)
                         axes.annotate(
                             text,
@@ -370,7 +374,7 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                             (4, 4),
                             textcoords="offset points",
                             fontsize=6.5,
-                            color=COLOURS[dial.fidelity],
+                            color=COLOURS[option.fidelity],
                         )
         dearest = [
             point.cost
@@ -408,11 +412,11 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
         Line2D(
             [],
             [],
-            color=COLOURS[dial.fidelity],
-            linestyle=dial.style,
-            label=f"{dial.fidelity}: {dial.name}",
+            color=COLOURS[option.fidelity],
+            linestyle=option.style,
+            label=f"{option.fidelity}: {option.name}",
         )
-        for dial in DIALS
+        for option in OPTIONS
     ]
     figure.legend(handles=keys, loc="outside right upper", fontsize=7)
     figure.savefig(path, dpi=110)
@@ -431,7 +435,7 @@ def main() -> int:
     )
     parser.add_argument("--costs", action="store_true", help="measure the cost of all points anew")
     parser.add_argument(
-        "--quick", action="store_true", help="one activity at 12 GHz, without dials"
+        "--quick", action="store_true", help="one activity at 12 GHz, without options"
     )
     options = parser.parse_args()
     began = time.perf_counter()

@@ -36,7 +36,7 @@ def main() -> None:
     if not folder:
         raise SystemExit("set RTRADAR_MOCAP to the folder of real recordings")
     print(
-        f"{'recording':34} {'activity':14} {'radar':12} {'rung':9} {'points':>6} "
+        f"{'recording':34} {'activity':14} {'radar':12} {'model':9} {'points':>6} "
         f"{'detections':>10} {'wall s':>7} {'capture s':>9} {'MB':>6}"
     )
     for file, skeleton, activity, start_s, duration_s in RECORDINGS:

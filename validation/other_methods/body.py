@@ -156,16 +156,19 @@ def compared_rows(preset: str) -> Iterator[Row]:
             fidelities=("analytic", "specular"),
             duration_s=duration,
         )
-    rungs = found.summary["fidelities"]
+    by_fidelity = found.summary["fidelities"]
     body = rt.Body.from_motion(place(motion, duration_s=duration))
     n_chirps = radar.n_tx * int(body.duration_s / radar.cycle_duration_s * (1 + 1e-12))
     near, far = near_and_far(radar, body, n_chirps)
     factor = dict(zip(body.part_names, near.mean(axis=0) / far.mean(axis=0), strict=True))
     claim = f"compare, standing, {preset}"
-    hidden = rungs["specular"]["part_hidden_share"]
+    hidden = by_fidelity["specular"]["part_hidden_share"]
     seen = [part for part, share in hidden.items() if share == 0]
     for part in seen:
-        ratio = rungs["specular"]["part_power_m2"][part] / rungs["analytic"]["part_power_m2"][part]
+        ratio = (
+            by_fidelity["specular"]["part_power_m2"][part]
+            / by_fidelity["analytic"]["part_power_m2"][part]
+        )
         expected = float(decibels(factor[part]))
         quantity = f"{part}: specular over analytic, ref. near field"
         says = "`compare` of `analytic` with `specular`, standing: parts fully seen, echo power once near field is counted"
@@ -199,11 +202,11 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
         found = {
-            rung: survey(build_model(rung, radar, body), radar, body, n_chirps)
-            for rung in ("analytic", "specular")
+            fidelity: survey(build_model(fidelity, radar, body), radar, body, n_chirps)
+            for fidelity in ("analytic", "specular")
         }
     near, far = near_and_far(radar, body, n_chirps)
-    analytic, specular = (found[rung].power_at for rung in ("analytic", "specular"))
+    analytic, specular = (found[fidelity].power_at for fidelity in ("analytic", "specular"))
     hidden = found["specular"].hidden_at
     seen = hidden == 0
     claim = f"{activity}, {preset}, {duration_s:g} s"

@@ -81,10 +81,10 @@ class Scene:
         ends = (self.radar.rx_y - 1) * self.radar.rx_spacing_wavelengths
         return dataclasses.replace(self.radar, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)
 
-    def spectrum(self, fidelity: str, **dials: Any) -> NDArray[np.complex128]:
+    def spectrum(self, fidelity: str, **options: Any) -> NDArray[np.complex128]:
         """What a model receives (frequency, chirp, rx)."""
         radar = self.corner_radar if fidelity in BY_RECEIVER else self.radar
-        return spectrum(build_model(fidelity, radar, self.body, **dials), radar, self.chirps)
+        return spectrum(build_model(fidelity, radar, self.body, **options), radar, self.chirps)
 
     @cached_property
     def reference(self) -> NDArray[np.complex128]:
@@ -97,9 +97,11 @@ class Scene:
         return error, float(10 * np.log10((np.abs(found) ** 2).mean() / power))
 
 
-def spectrum(rung: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> NDArray[np.complex128]:
+def spectrum(
+    model: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]
+) -> NDArray[np.complex128]:
     """Received spectrum (frequency, chirp, rx) at the first and last receiver of each line."""
-    echoes = rung.echoes(chirps)
+    echoes = model.echoes(chirps)
     frequencies = radar.start_frequency_hz + radar.bandwidth_hz * np.array([0.0, 0.5, 1.0])
     nodes = echoes.frequency
     # Polynomial through the nodes, as the contract of `Echoes` says.
@@ -120,7 +122,7 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
     hidden = build_model("specular", scene.radar, scene.body).echoes(scene.chirps).amplitude == 0
     yield reported(
         case,
-        "share of part, time and channel whose mirror point is hidden",
+        "share of part, time and channel whose specular point is hidden",
         "",
         float(hidden.mean()),
     )
@@ -172,4 +174,4 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(main("Whole body: every rung against `reference`.", measure))
+    sys.exit(main("Whole body: every model against `reference`.", measure))

@@ -155,12 +155,12 @@ def length_rows(quick: bool) -> Iterator[Row]:
                 Rotation.random(random_state=seed).as_matrix(),
                 (-1.2, 0.6, 0.1),
             )
-            rung = Multipath(radar, body, Scene(walls=box()), order=2)  # type: ignore[arg-type]
+            model = Multipath(radar, body, Scene(walls=box()), order=2)  # type: ignore[arg-type]
             # Between two anchors, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
-            echoes = rung.echoes(chirps)
+            echoes = model.echoes(chirps)
             poses = body.at((chirps + 0.5) * radar.chirp_duration_s)
-            for number, path in enumerate(rung.paths):
+            for number, path in enumerate(model.paths):
                 if path.order == 0:
                     continue
                 for i, chirp in enumerate(chirps):
@@ -250,11 +250,11 @@ def vector_optics(
             )
         )
         facing = facing - np.sum(normal * ways, axis=1) / 2
-    (way, field), (_, heard) = fields
+    (way, field), (_, received) = fields
     current = np.cross(normal, np.cross(way, field))
     # The reference's weights hold scalar obliquity and spreading about the centre; in their place come those of the vectors.
     area = quadrature.weight / facing / (np.linalg.norm(tx - centre) * np.linalg.norm(rx - centre))
-    share = np.sum(heard * current, axis=1)
+    share = np.sum(received * current, axis=1)
     k = np.array([wave_number(f) for f in sweep])[:, None]
     return np.asarray(
         1j
@@ -285,11 +285,11 @@ def ours(
     radar = rt.Radar(
         tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=tuple(antenna), polarization=polarization
     )  # type: ignore[arg-type]
-    rung = Multipath(radar, body, Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
     # Chirp 0 is 31 us late, in which nobody gets far.
-    echoes = rung.echoes(np.zeros(1, dtype=np.int64))
+    echoes = model.echoes(np.zeros(1, dtype=np.int64))
     found = {}
-    for number, path in enumerate(rung.paths):
+    for number, path in enumerate(model.paths):
         phase = np.exp(-2j * np.pi * sweep / 299_792_458.0 * echoes.length[0, 0, number])
         found[bool(path.out), bool(path.back)] = np.conj(echoes.amplitude[0, 0, 0, number]) * phase
     return found
@@ -416,9 +416,9 @@ class Ghost(NamedTuple):
 def ghosts_of(
     radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int
 ) -> dict[str, list[float]]:
-    rung = Multipath(radar, body, Scene(walls=walls), order=order)  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=walls), order=order)  # type: ignore[arg-type]
     chirps = np.arange(radar.chirps_per_frame)
-    echoes = rung.echoes(chirps)
+    echoes = model.echoes(chirps)
     x = synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64)
     spectra = range_spectrum(x, radar).reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
     power = np.asarray(power_map(spectra, radar))
@@ -426,9 +426,9 @@ def ghosts_of(
     strength = (np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1))
     # There and back over a wall are one ghost.
     ghosts = [
-        predicted(radar, body, walls_of(rung.paths[i]), middle, strength[i])
+        predicted(radar, body, walls_of(model.paths[i]), middle, strength[i])
         for i in np.flatnonzero(strength)
-        if walls_of(rung.paths[i]) <= walls_of(rung.paths[i])[::-1]
+        if walls_of(model.paths[i]) <= walls_of(model.paths[i])[::-1]
     ]
     axis = radar.velocity_mps(radar.cycles_per_frame)
     found: dict[str, list[float]] = {"range": [], "velocity": [], "azimuth": [], "elevation": []}
@@ -489,9 +489,9 @@ def predicted(
 
 
 def ways_over(radar: rt.Radar, out: Array, back: Array) -> Array:
-    heard = radar.rx[radar.rx_of_tx]
+    received = radar.rx[radar.rx_of_tx]
     return np.asarray(
-        np.linalg.norm(radar.tx - out, axis=1)[:, None] + np.linalg.norm(heard - back, axis=2)
+        np.linalg.norm(radar.tx - out, axis=1)[:, None] + np.linalg.norm(received - back, axis=2)
     )
 
 
@@ -553,12 +553,12 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
     fields = {}
     for apart_s in (2.5e-3, multipath.ANCHORS_S):
         with mock.patch.object(multipath, "ANCHORS_S", apart_s):
-            rung = Multipath(radar, body, scene)
-            echoes = rung.echoes(chirps)
+            model = Multipath(radar, body, scene)
+            echoes = model.echoes(chirps)
         phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
         field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
         # What slabs delay comes in several echoes of one path and part.
-        owned = list(zip(rung.path_names, echoes.part.tolist(), strict=True))
+        owned = list(zip(model.path_names, echoes.part.tolist(), strict=True))
         paths = sorted(
             {own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1}
         )

@@ -328,8 +328,8 @@ def fade_rows(quick: bool) -> Iterator[Row]:
             for shift in late:
                 moved = Passing(speed, passing.instant + shift * band.cycle_s)
                 # The model asks a body for its poses, its parts and its duration: this one has them.
-                rung = build_model("specular", band.radar, moved)  # type: ignore[arg-type]
-                amplitude = rung.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
+                model = build_model("specular", band.radar, moved)  # type: ignore[arg-type]
+                amplitude = model.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
                 floors.append(beside_db(amplitude, band))
                 first = late.max() - shift
                 errors.append(

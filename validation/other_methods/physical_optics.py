@@ -90,7 +90,7 @@ def lit_points(
     return Quadrature(points.reshape(-1, 3), weight.ravel(), _path(points, tx, rx).ravel())
 
 
-def mirror_contribution(
+def specular_contribution(
     tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0
 ) -> complex:
     """What the specular point alone adds to the integral, with all of its higher orders: PO without its terminator [m].

@@ -159,11 +159,11 @@ def chain(
     return result, [str(warning.message) for warning in caught]
 
 
-def spectrum(radar: rt.Radar, body: Ball, rung: str = "analytic") -> Any:
+def spectrum(radar: rt.Radar, body: Ball, fidelity: str = "analytic") -> Any:
     """Range-Doppler of one window of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_model(rung, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(fidelity, radar, body).echoes(chirps)  # type: ignore[arg-type]
     return rt.process.range_doppler(
         rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar
     )

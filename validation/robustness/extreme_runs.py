@@ -170,7 +170,8 @@ def _() -> str:
 
 
 @case(
-    "every rung: one Tx, one Rx, one chirp, one sample, 0 and 100 m/s", "finite echoes and spectrum"
+    "every model: one Tx, one Rx, one chirp, one sample, 0 and 100 m/s",
+    "finite echoes and spectrum",
 )
 def _() -> str:
     radars = [
@@ -178,16 +179,16 @@ def _() -> str:
         small_radar(tx_y=1, chirp_duration_s=50e-3),
         small_radar(tx_y=2, rx_y=1, chirp_duration_s=1e-3),
     ]
-    for rung in ("analytic", *TRACED, "reference"):
+    for fidelity in ("analytic", *TRACED, "reference"):
         for radar in radars:
             for speed in (0.0, 100.0):
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", rt.ValidityWarning)
                     values = spectrum(
-                        radar, Ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), rung
+                        radar, Ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), fidelity
                     ).values
-                assert np.isfinite(values).all(), (rung, radar, speed)
-                assert np.abs(values).max() > 0, (rung, radar, speed)
+                assert np.isfinite(values).all(), (fidelity, radar, speed)
+                assert np.abs(values).max() > 0, (fidelity, radar, speed)
     return "finite, and not empty"
 
 

@@ -39,7 +39,7 @@ CASES, case = collector()
 # -- frequency, distance, size, shape -------------------------------------------------------------------------------
 
 
-@case("1, 12, 77, 300 GHz: a sphere of 0.5 m, both rungs", "near-field closed form, phase and all")
+@case("1, 12, 77, 300 GHz: a sphere of 0.5 m, both models", "near-field closed form, phase and all")
 def _() -> str:
     pairs = []
     for frequency in (1e9, 12e9, 77e9, 300e9):
@@ -134,10 +134,10 @@ def _() -> str:
 @case("specular and analytic below ka = 5", "a warning, and the optical answer")
 def _() -> str:
     said = ""
-    for rung in MODELS:
+    for fidelity in MODELS:
         field, said = warned(
-            lambda rung=rung: rt.scattering_length(
-                alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, rung
+            lambda fidelity=fidelity: rt.scattering_length(
+                alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, fidelity
             ),  # type: ignore[misc]
             "radius of curvature",
         )
@@ -146,7 +146,7 @@ def _() -> str:
 
 
 @case(
-    "needles and discs, 1000:1, along each axis, both rungs", "closed form, finite everywhere else"
+    "needles and discs, 1000:1, along each axis, both models", "closed form, finite everywhere else"
 )
 def _() -> str:
     pairs = []
@@ -154,11 +154,11 @@ def _() -> str:
     sight = rng.normal(size=(50, 3))
     sight *= 4 / np.linalg.norm(sight, axis=1, keepdims=True)
     for axes in ((1e-3, 1e-3, 1.0), (0.5, 0.5, 5e-4), (1e-3, 0.03, 1.0)):
-        for rung in MODELS:
+        for fidelity in MODELS:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", rt.ValidityWarning)
                 assert np.isfinite(
-                    rt.scattering_length(alone(*axes), sight, sight + BESIDE, 77e9, rung)
+                    rt.scattering_length(alone(*axes), sight, sight + BESIDE, 77e9, fidelity)
                 ).all()
         for axis in range(3):
             others = [axes[i] ** 2 / axes[axis] for i in range(3) if i != axis]
@@ -182,8 +182,8 @@ def _() -> str:
         for ka in (5.01, 50.0):
             far = [1e5 * ka / k, 0.0, 0.0]
             reference = abs(complex(rt.rcs.sphere(ka / k, frequency, "po")))
-            for rung in ("physical-optics", "rays"):
-                field = rt.scattering_length(alone(*[ka / k] * 3), far, far, frequency, rung)[0]
+            for fidelity in ("physical-optics", "rays"):
+                field = rt.scattering_length(alone(*[ka / k] * 3), far, far, frequency, fidelity)[0]
                 worst = max(worst, abs(20 * np.log10(abs(field) / reference)))
     assert worst < 0.1, worst
     return f"within {worst:.2f} dB"
@@ -204,19 +204,21 @@ def _() -> str:
     "finite; at 10 km the closed form, phase and all, 2 %",
 )
 def _() -> str:
-    for rung in ("physical-optics", "rays", "fresnel"):
+    for fidelity in ("physical-optics", "rays", "fresnel"):
         fields = []
         for gap in (0.1, 1e4):
             antenna = [gap + 0.05, 0.0, 0.0]
             fields.append(
                 complex(
-                    rt.scattering_length(alone(0.05, 0.05, 0.05), antenna, antenna, 24e9, rung)[0]
+                    rt.scattering_length(alone(0.05, 0.05, 0.05), antenna, antenna, 24e9, fidelity)[
+                        0
+                    ]
                 )
             )
-        assert np.isfinite(fields).all(), (rung, fields)
-        expected = rt.rcs.sphere(0.05, 24e9, "go" if rung == "fresnel" else "po")
+        assert np.isfinite(fields).all(), (fidelity, fields)
+        expected = rt.rcs.sphere(0.05, 24e9, "go" if fidelity == "fresnel" else "po")
         # 0.02: facets; their phase at 10 km, where float32 would know it to 0.5 rad.
-        assert abs(fields[1] / complex(expected) - 1) < 0.02, (rung, fields[1], expected)
+        assert abs(fields[1] / complex(expected) - 1) < 0.02, (fidelity, fields[1], expected)
     return "finite; phase and all to 2 % at 10 km"
 
 
@@ -225,15 +227,17 @@ def _() -> str:
     sight = np.array([[4.0, 0, 0], [0, 0, 4.0], [2.0, 1.0, 3.0]])
     said = []
     for axes in ((1e-3, 1e-3, 1.0), (0.3, 0.3, 3e-4)):
-        for rung in ("fresnel", "physical-optics", "rays"):
+        for fidelity in ("fresnel", "physical-optics", "rays"):
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", rt.ValidityWarning)
                 try:
-                    field = rt.scattering_length(alone(*axes), sight, sight + BESIDE, 12e9, rung)
+                    field = rt.scattering_length(
+                        alone(*axes), sight, sight + BESIDE, 12e9, fidelity
+                    )
                 except rt.InputError as error:
-                    said.append(f"{rung} refused: {error}")
+                    said.append(f"{fidelity} refused: {error}")
                 else:
-                    assert np.isfinite(field).all(), (rung, axes, field)
+                    assert np.isfinite(field).all(), (fidelity, axes, field)
     return f"finite; {said[0]}" if said else "finite"
 
 
@@ -276,19 +280,19 @@ def _() -> str:
     return refused(lambda: alone(0.1, 0.1, 0.0), "positive")
 
 
-@case("parts inside parts, every traced rung", "the outer one alone")
+@case("parts inside parts, every traced model", "the outer one alone")
 def _() -> str:
     outer = alone(0.2, 0.3, 0.4)
     inner = alone(0.05, 0.1, 0.1, centre=(0.05, 0.05, 0.05))
     worst = 0.0
-    for rung in TRACED:
+    for fidelity in TRACED:
         for antenna in ([4.0, 0, 0], [-3.0, 2.0, 1.0], [0, 0, -5.0]):
             with warnings.catch_warnings():
                 warnings.simplefilter(
                     "ignore", rt.ValidityWarning
                 )  # the inner one alone would be small for 3 GHz
                 whole, one = (
-                    rt.scattering_length(target, antenna, antenna, 3e9, rung)[0]
+                    rt.scattering_length(target, antenna, antenna, 3e9, fidelity)[0]
                     for target in (together(outer, inner), outer)
                 )
             worst = max(worst, abs(whole / one - 1))
@@ -296,12 +300,14 @@ def _() -> str:
     return f"the same to {worst:.0e}"
 
 
-@case("an antenna inside a part, every rung", "refused")
+@case("an antenna inside a part, every model", "refused")
 def _() -> str:
     ball = alone(0.2, 0.2, 0.2)
-    for rung in ("analytic", *TRACED):
+    for fidelity in ("analytic", *TRACED):
         said = refused(
-            lambda rung=rung: rt.scattering_length(ball, [0.1, 0, 0], [4.0, 0, 0], 12e9, rung),  # type: ignore[misc]
+            lambda fidelity=fidelity: rt.scattering_length(
+                ball, [0.1, 0, 0], [4.0, 0, 0], 12e9, fidelity
+            ),  # type: ignore[misc]
             "is inside ellipsoid 0",
         )
     return said
@@ -323,10 +329,12 @@ def _() -> str:
     return worst_error([(complex(there), reference), (complex(beside), reference)], 1e-6)
 
 
-@case("Tx and Rx on opposite sides of the body, every rung", "nothing comes back: 0")
+@case("Tx and Rx on opposite sides of the body, every model", "nothing comes back: 0")
 def _() -> str:
-    for rung in ("analytic", *TRACED):
-        field = rt.scattering_length(alone(0.1, 0.1, 0.1), [4.0, 0, 0], [-4.0, 0, 0], 12e9, rung)
+    for fidelity in ("analytic", *TRACED):
+        field = rt.scattering_length(
+            alone(0.1, 0.1, 0.1), [4.0, 0, 0], [-4.0, 0, 0], 12e9, fidelity
+        )
         assert field[0] == 0, field
     return "0"
 
@@ -373,9 +381,9 @@ def _() -> str:
     )
     chirps = np.arange(0, 4000, 401)
     worst_length = worst_amplitude = 0.0
-    for rung in (*MODELS, "fresnel"):
+    for fidelity in (*MODELS, "fresnel"):
         here, away = (
-            build_model(rung, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved))
+            build_model(fidelity, r, b).echoes(chirps) for r, b in ((radar, body), (there, moved))
         )
         worst_length = max(worst_length, float(np.abs(here.length - away.length).max()))
         largest = float(np.abs(here.amplitude).max())

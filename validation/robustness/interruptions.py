@@ -111,8 +111,8 @@ def cases(work: Path, quick: bool) -> list[Case]:
             "{out}",
         ),
         (
-            Stage("first rung", "writes .rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
-            Stage("second rung", "writes .rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
+            Stage("first model", "writes .rtradar-*/analytic/.rtradar-*/maps.h5", 0.2),
+            Stage("second model", "writes .rtradar-*/specular/.rtradar-*/maps.h5", 0.2),
         ),
         anew=False,
     )

@@ -49,7 +49,7 @@ def far_field_echo(
 
     Notes
     -----
-    Equations :eq:`mirror-point-far` and :eq:`rcs-ellipsoid` of the theory page.
+    Equations :eq:`specular-point-far` and :eq:`rcs-ellipsoid` of the theory page.
     """
     tx, rx, centres, frames, semi_axes = (
         np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes)

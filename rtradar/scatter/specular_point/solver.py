@@ -356,7 +356,7 @@ def mirror(
 
     Notes
     -----
-    Equations :eq:`mirror-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page, times :eq:`polarization`.
+    Equations :eq:`specular-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page, times :eq:`polarization`.
     """
     tx, rx, centres, frames, semi_axes = (
         np.ascontiguousarray(a, dtype=np.float64) for a in (tx, rx, centres, frames, semi_axes)
