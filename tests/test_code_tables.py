@@ -112,3 +112,14 @@ def test_every_key_at_the_top_is_on_its_page(tmp_path: Path) -> None:
 def test_every_name_that_is_drawn_is_on_its_page(tmp_path: Path) -> None:
     keys = allowed(read_spec, DATA_SET["[drawn]"], tmp_path / "data.toml")
     assert set(first_column(TABLES["drawn"]())) == keys
+
+
+def test_no_line_of_a_page_is_taken_for_a_comment() -> None:
+    """A line that begins with a percent sign is a comment of MyST, and its sentence would be lost."""
+    lost = [
+        f"{path.name}: {line}"
+        for path in (ROOT / "docs").glob("*.md")
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if line.lstrip().startswith("%")
+    ]
+    assert lost == []
