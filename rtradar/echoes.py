@@ -15,11 +15,13 @@ class Echoes:
     Parameters
     ----------
     length : (chirp, rx, echo) float64
-        Full path Tx..Rx [m] at the centre of the chirp.
+        Length of the whole path from Tx to Rx at the centre of the chirp [m].
     amplitude : (node, chirp, rx, echo) complex
-        Conjugate of the scattering length, the phase of ``length`` taken out, spreading included [m]; hidden is 0.
+        Conjugate of the scattering length, the phase of ``length`` taken out, spreading included
+        [m]; hidden is 0.
     frequency : (node,) float64
-        Frequencies [Hz] at which ``amplitude`` is given: the polynomial through the nodes; one node means constant.
+        Frequencies [Hz] at which ``amplitude`` is given: the polynomial through the nodes; one node
+        means constant.
     tx : (chirp,) int64
         Transmitter of each chirp.
     part : (echo,) int64
@@ -34,7 +36,8 @@ class Echoes:
 
     Notes
     -----
-    Equation :eq:`received-spectrum` of the theory page has what they stand for; :eq:`if-signal` what is made of them.
+    Equation :eq:`received-spectrum` of the theory page has what they stand for; :eq:`if-signal`
+    what is made of them.
     """
 
     length: NDArray[np.float64]
@@ -64,7 +67,8 @@ class Echoes:
         for field, shape in expected.items():
             if getattr(self, field).shape != shape:
                 raise ValueError(
-                    f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it must be {shape}"
+                    f"Echoes.{field} has shape {getattr(self, field).shape}; with this length it "
+                    f"must be {shape}"
                 )
         if len(set(self.frequency.tolist())) < self.frequency.size:
             raise ValueError(

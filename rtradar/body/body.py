@@ -102,7 +102,8 @@ class Body:
         if not good.all():
             part = int(np.argmin(good))
             raise InputError(
-                f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes of {axes[part].tolist()} m; "
+                f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes "
+                f"of {axes[part].tolist()} m; "
                 "semi_axes must be positive and finite: give the bone a length"
             )
         object.__setattr__(self, "semi_axes", axes)
@@ -114,7 +115,8 @@ class Body:
         Parameters
         ----------
         motion : Motion
-            Of any skeleton that `rtradar.motion.retarget.to_nodes` understands; its ``girth`` multiplies the radii.
+            Of any skeleton that `rtradar.motion.retarget.to_nodes` understands; its ``girth``
+            multiplies the radii.
 
         Returns
         -------
@@ -192,7 +194,8 @@ class Body:
         """Frames (part, 3, 3) of the ellipsoids in the axes of their bones."""
         along = self.motion.offsets[1:] / (2 * self.semi_axes[:, 2:])
         along = along / np.linalg.norm(along, axis=1, keepdims=True)
-        # Any direction across will do, for a = b, but it must be the same at all times: the axis most across the bone.
+        # Any direction across will do, for a = b, but it must be the same at all times: the axis
+        # most across the bone.
         across = np.cross(np.eye(3)[np.argmin(np.abs(along), axis=1)], along)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         return np.stack([across, np.cross(along, across), along], axis=2)
@@ -200,10 +203,10 @@ class Body:
 
 @compiled(fastmath={"contract"})
 def _stand(positions, quaternions, parents, rest, centres, frames):
-    """Fill ``centres (time, part, 3)`` and ``frames (time, part, 3, 3)`` from joints (time, joint, 3).
+    """Fill centres (time, part, 3) and frames (time, part, 3, 3) from joints (time, joint, 3).
 
-    Frames are rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last. The first joint is the root, which has
-    no bone.
+    Frames are rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last. The first
+    joint is the root, which has no bone.
     """
     for time in range(frames.shape[0]):
         for part in range(frames.shape[1]):

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 
 _SAME = 1e-4
-"""Of its least semi-axis: where two parts are no farther apart than this anywhere, rays cannot tell which is in front."""
+"""Distance of two parts, relative to the least semi-axis, at which rays find the same surface."""
 
 
 @dataclass(frozen=True)
@@ -22,14 +22,16 @@ class Ellipsoids:
     centres : (part, 3) float64
         World [m].
     frames : (part, 3, 3) float64
-        Proper rotations: world = centre + frame @ local, so the COLUMNS are the directions of the semi-axes.
+        Proper rotations: world = centre + frame @ local, so the COLUMNS are the directions of the
+        semi-axes.
     semi_axes : (part, 3) float64
         a, b, c [m].
 
     Raises
     ------
     InputError
-        Where shapes do not fit, a value is not finite, a semi-axis is not positive, or a frame is no rotation.
+        Where shapes do not fit, a value is not finite, a semi-axis is not positive, or a frame is
+        no rotation.
     """
 
     centres: NDArray[np.float64]
@@ -48,7 +50,8 @@ class Ellipsoids:
         ):
             if array.shape != shape or not parts or parts[0] == 0:
                 raise InputError(
-                    f"Ellipsoids.{name} has shape {array.shape}; it must be {('part', *shape[1:])}, alike and at least 1 in part"
+                    f"Ellipsoids.{name} has shape {array.shape}; it must be "
+                    f"{('part', *shape[1:])}, alike and at least 1 in part"
                 )
             if not np.isfinite(array).all():
                 raise InputError(
@@ -57,16 +60,18 @@ class Ellipsoids:
             object.__setattr__(self, name, array)
         if not (axis_array > 0).all():
             raise InputError(
-                f"Ellipsoids.semi_axes: the least is {axis_array.min()} m; every semi-axis must be positive"
+                f"Ellipsoids.semi_axes: the least is {axis_array.min()} m; every semi-axis must be "
+                "positive"
             )
         error = np.abs(np.swapaxes(frame_array, 1, 2) @ frame_array - np.eye(3)).max(initial=0.0)
         if error > 1e-6 or (np.linalg.det(frame_array) < 0).any():
             raise InputError(
-                "Ellipsoids.frames: not proper rotations; columns must be orthonormal and right-handed"
+                "Ellipsoids.frames: not proper rotations; columns must be orthonormal and "
+                "right-handed"
             )
 
     def without_repeats(self) -> Ellipsoids:
-        """The parts but those that fill the same place as one before them.
+        """Leave out each part that coincides with one before it.
 
         Two of those are one body: whichever of them rays meet first is an accident of rounding.
 
@@ -74,7 +79,8 @@ class Ellipsoids:
         -------
         Ellipsoids
         """
-        # x.S^-1 x = 1 on the surface about the centre: frames that differ in signs or order of axes make the same S.
+        # x.S^-1 x = 1 on the surface about the centre: frames that differ in signs or order of axes
+        # make the same S.
         stretch = self.frames * self.semi_axes[:, None]
         shape = stretch @ np.swapaxes(stretch, 1, 2)
         kept: list[int] = []

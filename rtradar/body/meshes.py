@@ -16,9 +16,10 @@ MAXIMUM_SUBDIVISIONS = 8
 
 @lru_cache(maxsize=4)
 def unit_sphere(subdivisions: int) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Icosphere of 20 x 4^subdivisions triangles, closed, normals outward, the size of a unit sphere in the mean.
+    """Make an icosphere of 20 x 4^subdivisions triangles, closed, with the mean radius 1.
 
-    Its vertices lie a little outside the unit sphere, so that the mean of ``|x|^2`` over its surface is 1.
+    Its vertices lie a little outside the unit sphere, so that the mean of ``|x|^2`` over its
+    surface is 1.
 
     Parameters
     ----------

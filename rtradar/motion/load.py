@@ -36,12 +36,13 @@ def load_motion(
     Parameters
     ----------
     path : path
-        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and HDM05, or an ending of `READERS`.
+        ``.amc`` (120 Hz, with its ``skeleton``), ``.bvh``, ``.c3d`` with the markers of CMU and
+        HDM05, or an ending of `READERS`.
     skeleton : path, optional
         The subject's ``.asf``; needed by ``.amc``.
     unit_m : float, optional
-        Metres in one length unit of a ``.bvh``, which does not say; found from the person's size where not given. Of a
-        ``.c3d`` that does not say.
+        Metres in one length unit of a ``.bvh``, which does not say; found from the person's size
+        where not given. Of a ``.c3d`` that does not say.
 
     Returns
     -------
@@ -60,10 +61,12 @@ def load_motion(
     if name not in READERS:
         known = ", ".join(f".{known}" for known in READERS)
         raise InputError(
-            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc with its .asf)"
+            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc "
+            "with its .asf)"
         )
     if kind := special_kind(file):
-        # Readers of other packages may take folders, and names of what is no file; nobody's may wait.
+        # Readers of other packages may take folders, and names of what is no file; nobody's may
+        # wait.
         raise InputError(f"{file}: it is {kind}, not a motion file; check the path")
     read = READERS[name]
     with READERS.guarded(name):

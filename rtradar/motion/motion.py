@@ -13,16 +13,18 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
 from rtradar.errors import InputError
-from rtradar.motion.quaternions import rotate, sign_continuous
+from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
 _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
 
-_STRETCH_FRAMES, _STRETCH_MARGIN, _STRETCHES_KEPT = 256, 32, 2
-"""Frames that one spline serves, and those on either side that it is made from as well. A cubic spline forgets 73 % of what
-is farther with every frame: beyond 32 frames nothing is left in float64."""
+_BLOCK_FRAMES, _BLOCK_MARGIN, _BLOCKS_KEPT = 256, 32, 2
+"""Numbers of frames that a spline serves, of frames beside them that it uses, and of blocks kept.
+
+The influence of a frame on a cubic spline falls by 73 % from frame to frame: beyond 32 frames
+nothing of it is left in float64."""
 
 _splines_lock = threading.Lock()  # not of each motion, which has to go to other processes
 
@@ -31,14 +33,15 @@ _splines_lock = threading.Lock()  # not of each motion, which has to go to other
 class Motion:
     """A recording of a rigid skeleton, in world axes.
 
-    A joint is the end of one bone. ``rotations[:, j]`` is the world orientation of the bone that ENDS in joint j, so
-    ``position_j = position_parent + R_j @ offsets_j``: an ASF bone's own rotation, a BVH parent joint's global one.
-    That holds between frames too, so bones never change length.
+    A joint is the end of one bone. ``rotations[:, j]`` is the world orientation of the bone that
+    ENDS in joint j, so ``position_j = position_parent + R_j @ offsets_j``: an ASF bone's own
+    rotation, a BVH parent joint's global one. That holds between frames too, so bones never change
+    length.
 
     Parameters
     ----------
     name : str
-        Shown in reports.
+        Name that reports show.
     joints : tuple of str
         Unique names, parents before children, the root first.
     parents : tuple of int
@@ -46,15 +49,15 @@ class Motion:
     offsets : (joint, 3) float64
         Bone vectors in the bone's own axes [m]; the root's is ignored.
     root_positions : (frame, 3) float64
-        World [m].
+        Positions of the root, world [m].
     rotations : (frame, joint, 4) float64
         Unit quaternions, scalar last, world. The root's is that of the pelvis.
     rate_hz : float
-        Frames per second.
+        Number of frames per second [Hz].
     first_frame_s : float
-        Time of the first frame; zero or less. Frames before time zero only serve interpolation.
+        Time of the first frame, zero or less [s]. Frames before time zero serve interpolation only.
     length_s : float, optional
-        Duration where it ends before the last frame does.
+        Duration, where the motion ends before its last frame [s].
     girth : float
         Thickness of the subject relative to the nominal body.
 
@@ -92,7 +95,8 @@ class Motion:
         ):
             if getattr(self, field).shape != shape or not frames or not count:
                 raise InputError(
-                    f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must be {shape}"
+                    f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must "
+                    f"be {shape}"
                 )
         if len(set(self.joints)) != count:
             raise InputError(
@@ -104,7 +108,8 @@ class Motion:
             or any(not 0 <= p < j for j, p in enumerate(self.parents) if j)
         ):
             raise InputError(
-                f"Motion {self.name}: parents must name one root first (-1), and stand before their children"
+                f"Motion {self.name}: parents must name one root first (-1), and stand before "
+                "their children"
             )
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
             raise InputError(f"Motion {self.name}: rate_hz = {self.rate_hz}; it must be positive")
@@ -114,17 +119,19 @@ class Motion:
         least, largest = extremes[:, 0].min(), extremes[:, 1].max()
         if least < 1 - 1e-6 or largest > 1 + 1e-6:
             raise InputError(
-                f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})"
+                f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to "
+                f"{largest:.3g})"
             )
         last = self.first_frame_s + (frames - 1) / self.rate_hz
         if self.first_frame_s > 0 or (
             self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S
         ):
             raise InputError(
-                f"Motion {self.name}: frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to {self.length_s} s"
+                f"Motion {self.name}: frames from {self.first_frame_s:.6g} to {last:.6g} s do not "
+                f"cover 0 to {self.length_s} s"
             )
 
-    # -- what there is ---------------------------------------------------------------------------------------------
+    # -- the recording -----------------------------------------------------------------------------
 
     @property
     def duration_s(self) -> float:
@@ -135,7 +142,7 @@ class Motion:
 
     @property
     def frame_times(self) -> NDArray[np.float64]:
-        """Time of each frame (frame,) [s]; those outside [0, duration_s] only serve interpolation."""
+        """Time of each frame (frame,) [s]; others than 0 to `duration_s` serve interpolation."""
         return self.first_frame_s + np.arange(len(self.root_positions)) / self.rate_hz
 
     @cached_property
@@ -145,39 +152,39 @@ class Motion:
             self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations)
         )
 
-    # -- at any time -----------------------------------------------------------------------------------------------
+    # -- at any time -------------------------------------------------------------------------------
 
     def at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Pose at any time, bones exactly rigid.
+        """Interpolate the pose at any time, with exactly rigid bones.
 
-        Rotations go through a C2 cubic spline of the sign-continuous quaternion components, normalised; the root goes
-        through PCHIP. ``validation/measurements/interpolation.py`` measures the choice. With every second frame left out, cubic,
-        makima and ``RotationSpline`` meet the left-out frames of 120 Hz recordings alike (kicks: 0.41 mm rms, PCHIP 0.46,
-        slerp 0.64), where noise decides; at 30 Hz the cubic is the nearest (2.7 mm, makima 3.1, PCHIP 3.7,
-        slerp 5.5). On smooth motion it leaves false Doppler lines of a swinging limb at -71 dB of a 77 GHz echo, where
-        makima and PCHIP leave -17 dB and slerp, whose angular velocity jumps at every frame, 0 dB. A spike of one frame
-        rings on with 13 % of its height and falls by 3.7 from frame to frame.
+        Rotations go through a C2 cubic spline of the sign-continuous quaternion components,
+        normalised; the root goes through PCHIP. ``validation/measurements/interpolation.py``
+        measures the choice. With every second frame left out, cubic, makima and ``RotationSpline``
+        meet the left-out frames of 120 Hz recordings alike (kicks: 0.41 mm rms, PCHIP 0.46, slerp
+        0.64), where noise decides; at 30 Hz the cubic is the nearest (2.7 mm, makima 3.1, PCHIP
+        3.7, slerp 5.5). On smooth motion it leaves false Doppler lines of a swinging limb at -71 dB
+        of a 77 GHz echo, where makima and PCHIP leave -17 dB and slerp, whose angular velocity
+        jumps at every frame, 0 dB. A spike of one frame rings on with 13 % of its height and falls
+        by 3.7 from frame to frame.
 
         Parameters
         ----------
         times : (time,) float64
-            Seconds from the beginning of the recording.
+            Time since the beginning of the recording [s].
 
         Returns
         -------
         positions : (time, joint, 3) float64
-            World [m].
+            Positions of the joints, world [m].
         quaternions : (time, joint, 4) float64
-            World, scalar last.
+            Rotations of the bones, world, scalar last.
 
         Raises
         ------
         InputError
             Where a time lies outside [0, duration_s].
         """
-        from rtradar.motion.posing import (
-            pose,
-        )  # Numba is loaded when poses are asked for, not to read a file
+        from rtradar.motion.posing import pose  # Numba is not needed to read a file
 
         instants = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if instants.ndim != 1:
@@ -188,7 +195,8 @@ class Motion:
         if not ok.all():
             wrong = instants[~ok][0]
             raise InputError(
-                f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to {self.duration_s:.6g} s"
+                f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to "
+                f"{self.duration_s:.6g} s"
             )
         instants = np.clip(instants, 0.0, self.duration_s)
         if len(self.root_positions) == 1:
@@ -198,16 +206,16 @@ class Motion:
             ), quaternions
         positions = np.empty((len(instants), len(self.joints), 3))
         quaternions = np.empty((len(instants), len(self.joints), 4))
-        stretches = np.floor(
-            (instants - self.first_frame_s) * self.rate_hz / _STRETCH_FRAMES
-        ).astype(np.int64)
+        blocks = np.floor((instants - self.first_frame_s) * self.rate_hz / _BLOCK_FRAMES).astype(
+            np.int64
+        )
         skeleton = (
             np.ascontiguousarray(self.offsets, dtype=np.float64),
             np.asarray(self.parents, dtype=np.int64),
         )
-        for stretch in sorted(set(stretches.tolist())):
-            here = np.flatnonzero(stretches == stretch)
-            root, rotation = self._splines(stretch)
+        for block in sorted(set(blocks.tolist())):
+            here = np.flatnonzero(blocks == block)
+            root, rotation = self._splines(block)
             cubics = root.c, rotation.c.reshape(*rotation.c.shape[:2], -1)
             pose(
                 instants,
@@ -220,13 +228,13 @@ class Motion:
             )
         return positions, quaternions
 
-    def _splines(self, stretch: int) -> tuple[PPoly, PPoly]:
-        """Splines of the root and of the rotations for one stretch of frames: those of a long recording take much memory."""
+    def _splines(self, block: int) -> tuple[PPoly, PPoly]:
+        """Splines of the root and the rotations for one block of frames, which saves memory."""
         with _splines_lock:
-            found = self._kept_splines.get(stretch)
+            found = self._kept_splines.get(block)
             if found is None:
-                first = max(0, stretch * _STRETCH_FRAMES - _STRETCH_MARGIN)
-                frames = slice(first, (stretch + 1) * _STRETCH_FRAMES + _STRETCH_MARGIN + 1)
+                first = max(0, block * _BLOCK_FRAMES - _BLOCK_MARGIN)
+                frames = slice(first, (block + 1) * _BLOCK_FRAMES + _BLOCK_MARGIN + 1)
                 times = (
                     self.first_frame_s
                     + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
@@ -236,9 +244,9 @@ class Motion:
                     CubicSpline(times, self.rotations[frames]),
                 )
                 release_pages(self.root_positions, self.rotations)
-                while len(self._kept_splines) >= _STRETCHES_KEPT:
+                while len(self._kept_splines) >= _BLOCKS_KEPT:
                     self._kept_splines.pop(next(iter(self._kept_splines)))
-                self._kept_splines[stretch] = found
+                self._kept_splines[block] = found
             return found
 
     @cached_property
@@ -248,21 +256,21 @@ class Motion:
     def _forward(
         self, roots: NDArray[np.float64], quaternions: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        positions = rotate(quaternions, self.offsets)
+        positions = quaternion_rotate(quaternions, self.offsets)
         positions[:, 0] = roots
         for joint, parent in enumerate(self.parents[1:], start=1):
             positions[:, joint] += positions[:, parent]
         return positions
 
-    # -- the same motion elsewhere ---------------------------------------------------------------------------------
+    # -- the same motion elsewhere -----------------------------------------------------------------
 
     def scaled(self, factor: float) -> Motion:
-        """The same motion by a subject ``factor`` times as tall and as thick, about the world's origin on the floor.
+        """Scale the motion about the world's origin on the floor.
 
         Parameters
         ----------
         factor : float
-            Positive.
+            Factor of the subject's height and thickness, positive.
 
         Returns
         -------
@@ -276,12 +284,12 @@ class Motion:
         )
 
     def turned(self, yaw_rad: float) -> Motion:
-        """The same motion turned about the world's vertical axis through the origin, anticlockwise seen from above.
+        """Rotate the motion about the world's vertical axis.
 
         Parameters
         ----------
         yaw_rad : float
-            [rad].
+            Angle of the rotation, anticlockwise seen from above [rad].
 
         Returns
         -------
@@ -297,18 +305,18 @@ class Motion:
         return dataclasses.replace(
             self,
             root_positions=file_backed(
-                rotate(half, roots) for (roots,) in in_blocks(self.root_positions)
+                quaternion_rotate(half, roots) for (roots,) in in_blocks(self.root_positions)
             ),
             rotations=file_backed(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
         )
 
     def shifted(self, by_m: ArrayLike) -> Motion:
-        """The same motion moved by ``by_m`` (3,) [m].
+        """Shift the motion.
 
         Parameters
         ----------
         by_m : (3,) array_like
-            World [m].
+            Displacement in world axes [m].
 
         Returns
         -------

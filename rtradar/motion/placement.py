@@ -1,4 +1,4 @@
-"""Where the recording stands before the radar: interval, place on the floor, one yaw."""
+"""Placement of a recording before the radar: an interval, a position on the floor, and a yaw."""
 
 from __future__ import annotations
 
@@ -17,17 +17,22 @@ from rtradar.system.row_files import column
 MARGIN_FRAMES = 16
 """Frames kept before and after the interval, where there are any.
 
-What lies further away moves a cubic spline by less than 3.7^-16, 1e-9: the ends are as good as the middle."""
+What lies further away moves a cubic spline by less than 3.7^-16, 1e-9: the ends are as good as the
+middle."""
 
 WALK_DISTANCE_M = 1.1
-"""A walk gets at least this far from where it began; a kick steps less. Short cuts of straight walks stay below, and then
-face by their hips, which look the same way ..."""
+"""Least distance of a walk from its beginning [m]; a kick steps less.
+
+Short intervals of straight walks stay below it, and then face by their hips, which look the same
+way."""
 
 WALK_STRAIGHTNESS = 0.5
-"""... and its way there is at most twice as long as the straight line."""
+"""Least ratio of the straight line to the length of the path of a walk."""
 
 WALK_ALONG_HEADING = 0.5
-"""... and in the median the hips look along or against it, within 60 degrees: a fighter who steps sideways does not walk."""
+"""Least median cosine between the path of a walk and the hips' heading, or against it.
+
+A fighter who steps sideways does not walk."""
 
 
 def place(
@@ -38,22 +43,24 @@ def place(
 ) -> Motion:
     """Cut an interval out of a recording and put it before the radar.
 
-    The interval's mean horizontal root position goes to the origin; heights stay as recorded. One yaw turns the whole:
-    a walk, as of `walk_direction`, moves along -x, toward the radar; everything else faces -x by the median heading of its hips.
+    The interval's mean horizontal root position goes to the origin; heights stay as recorded. One
+    yaw turns the whole: a walk, as of `walk_direction`, moves along -x, toward the radar;
+    everything else faces -x by the median heading of its hips.
 
     Parameters
     ----------
     motion : Motion
-        Of a skeleton that `to_nodes` understands.
+        Recording whose skeleton is of a known kind.
     start_s, duration_s : float
-        The interval; to the end where no duration is given. ``start_s`` becomes time zero.
+        Begin and duration of the interval [s]; by default it ends with the recording. ``start_s``
+        becomes time zero.
     heading_deg : float
-        Added to the yaw, anticlockwise seen from above.
+        Angle added to the yaw, anticlockwise seen from above [deg].
 
     Returns
     -------
     Motion
-        With up to `MARGIN_FRAMES` frames beyond the interval on each side, for interpolation only.
+        Interval with up to `MARGIN_FRAMES` frames beyond it on each side, for interpolation only.
 
     Raises
     ------
@@ -90,7 +97,8 @@ def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg
             raise InputError(f"duration {duration_s:g} s; it must be positive ({there})")
         if start_s + duration_s > motion.duration_s + 1e-6:
             raise InputError(
-                f"start {start_s:g} s and duration {duration_s:g} s end past the recording: {there}, "
+                f"start {start_s:g} s and duration {duration_s:g} s end past the recording: "
+                f"{there}, "
                 f"at most {motion.duration_s - start_s:.6g} s from there"
             )
     if not math.isfinite(heading_deg):
@@ -98,18 +106,19 @@ def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg
 
 
 def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
-    """An interval inside a recording, with the frames that `place` needs and no more; ``start_s`` becomes time zero.
+    """Cut an interval out of a recording; ``start_s`` becomes time zero.
 
     Parameters
     ----------
     motion : Motion
+        Recording.
     start_s, length_s : float
-        Where the interval begins, and how long it is [s].
+        Begin and length of the interval [s].
 
     Returns
     -------
     Motion
-        With up to `MARGIN_FRAMES` frames more on each side.
+        Interval with up to `MARGIN_FRAMES` frames more on each side, which `place` needs.
     """
     frames = len(motion.root_positions)
     begin = (start_s - motion.first_frame_s) * motion.rate_hz
@@ -128,7 +137,7 @@ def cut(motion: Motion, start_s: float, length_s: float) -> Motion:
 
 
 def hip_headings(nodes: Motion) -> NDArray[np.float64]:
-    """Horizontal unit vectors (frame, 2) that the hips face: from right to left hip, turned clockwise by 90 degrees."""
+    """Horizontal unit vectors (frame, 2) of the hips' heading, at right angles to the hip axis."""
     hips = [column(nodes.positions, NODES.index(hip)) for hip in ("l_hip", "r_hip")]
     left = hips[0][:, :2] - hips[1][:, :2]
     return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(
@@ -137,12 +146,12 @@ def hip_headings(nodes: Motion) -> NDArray[np.float64]:
 
 
 def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vector (2,) along the median of the headings (frame, 2): of their angles to the mean heading.
+    """Unit vector (2,) along the median of the angles of headings (frame, 2) to their mean.
 
-    A median of each component would not turn with the recording.
+    A median of each component would not rotate with the recording.
     """
     mean = headings.mean(axis=0)
-    # Where the headings cancel out their mean says nothing, and the first frame stands for it.
+    # Where the headings cancel out, their mean says nothing, and the first frame is used instead.
     along = mean if float(np.linalg.norm(mean)) > 1e-6 else headings[0]
     to_the_left = along[0] * headings[:, 1] - along[1] * headings[:, 0]
     angle = math.atan2(along[1], along[0]) + float(
@@ -156,9 +165,10 @@ def walk_direction(
 ) -> NDArray[np.float64] | None:
     """Direction (2,) of a walk, or None where it is none.
 
-    It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a way not longer than
-    1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point, along the ``headings`` (frame, 2) of the hips.
-    The direction is that of the farthest point, so a walk there and back counts, and goes there first.
+    It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a
+    way not longer than 1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point, along
+    the ``headings`` (frame, 2) of the hips. The direction is that of the farthest point, so a walk
+    there and back counts, and goes there first.
     """
     farthest = _farthest(roots)
     distance = float(np.linalg.norm(farthest))

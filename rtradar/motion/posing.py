@@ -9,10 +9,11 @@ from rtradar.kernels.jit import compiled
 
 @compiled(fastmath={"contract"})
 def pose(times, which, knots, root, rotation, offsets, parents, positions, quaternions):
-    """Fill ``positions (time, joint, 3)`` and ``quaternions (time, joint * 4)`` for those of ``times`` that are ``which``.
+    """Fill positions (time, joint, 3) and quaternions (time, joint * 4) at ``times[which]``.
 
-    ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power, interval, joint * 4)`` are the
-    cubics from each to the next, the highest power first, as of `scipy.interpolate.PPoly`. Quaternions are normalised here.
+    ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power,
+    interval, joint * 4)`` are the cubics from each to the next, the highest power first, as of
+    `scipy.interpolate.PPoly`. Quaternions are normalised here.
     """
     rate, last = (len(knots) - 1) / (knots[-1] - knots[0]), len(knots) - 2
     for k in range(len(which)):
@@ -39,7 +40,7 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
             for i in range(4):
                 four[i] *= scale
             if joint > 0:
-                # As `rtradar.motion.quaternions.rotate` does it.
+                # As `rtradar.motion.quaternions.quaternion_rotate` does it.
                 x, y, z, w = four[0], four[1], four[2], four[3]
                 a, b, c = offsets[joint, 0], offsets[joint, 1], offsets[joint, 2]
                 u, v, s = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)

@@ -1,4 +1,4 @@
-"""Unit quaternions, scalar last."""
+"""Unit quaternions, scalar last, and the change from mocap axes to world axes."""
 
 from __future__ import annotations
 
@@ -9,23 +9,30 @@ from numpy.typing import NDArray
 
 from rtradar.system.row_files import file_backed, in_blocks
 
+WORLD_FROM_MOCAP = (2, 0, 1)
+"""Component of a y-up mocap vector that becomes world x, y, z: world (x, y, z) = mocap (z, x, y).
 
-def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Rotate vectors by unit quaternions; leading axes broadcast.
+It is an even permutation, hence a rotation."""
 
-    Parameters
-    ----------
-    quaternions : (..., 4) float64
-        Scalar last: x, y, z, w.
-    vectors : (..., 3) float64
 
-    Returns
-    -------
-    (..., 3) float64
-    """
+def to_world(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert vectors (..., 3) from mocap to world axes."""
+    return np.ascontiguousarray(vectors[..., WORLD_FROM_MOCAP])
+
+
+def quaternions_to_world(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Convert rotations (..., 4) from mocap to world axes; only their vector parts are permuted."""
+    return np.ascontiguousarray(quaternions[..., (*WORLD_FROM_MOCAP, 3)])
+
+
+def quaternion_rotate(
+    quaternions: NDArray[np.float64], vectors: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Rotate vectors (..., 3) by unit quaternions (..., 4); leading axes broadcast."""
     x, y, z, w = (quaternions[..., k] for k in range(4))
     a, b, c = (vectors[..., k] for k in range(3))
-    # Rodrigues' form v + w t + u x t with t = 2 u x v; numpy.cross is several times slower on short last axes.
+    # Rodrigues' form v + w t + u x t with t = 2 u x v, several times faster than numpy.cross or
+    # scipy's Rotation on short last axes.
     tx, ty, tz = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
     return np.stack(
         [a + w * tx + y * tz - z * ty, b + w * ty + z * tx - x * tz, c + w * tz + x * ty - y * tx],
@@ -33,14 +40,29 @@ def rotate(quaternions: NDArray[np.float64], vectors: NDArray[np.float64]) -> ND
     )
 
 
+def quaternion_multiply(
+    left: NDArray[np.float64], right: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Multiply quaternions (..., 4): the rotation by ``right``, followed by that by ``left``."""
+    vector = (
+        left[..., 3:] * right[..., :3]
+        + right[..., 3:] * left[..., :3]
+        + np.cross(left[..., :3], right[..., :3])
+    )
+    scalar = left[..., 3:] * right[..., 3:] - np.sum(
+        left[..., :3] * right[..., :3], axis=-1, keepdims=True
+    )
+    return np.concatenate([vector, scalar], axis=-1)
+
+
 def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Choose the sign of each quaternion (frame, ..., 4) so that it lies in the half-space of the frame before it."""
+    """Choose the signs of quaternions (frame, ..., 4) so that each is nearest to the one before."""
     if all(same_side.all() for _, same_side in _sides(quaternions)):
-        return quaternions  # not copied: a recording that was only moved shares its rotations with the one before
-    return file_backed(_turned_over(quaternions))
+        return quaternions  # without a copy, which a recording that was only moved need not have
+    return file_backed(_with_signs(quaternions))
 
 
-def _turned_over(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+def _with_signs(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
     sign = np.ones(quaternions.shape[1:-1])
     for frames, same_side in _sides(quaternions):
         signs = sign * np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
@@ -51,7 +73,7 @@ def _turned_over(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float6
 def _sides(
     quaternions: NDArray[np.float64],
 ) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
-    """Some frames at a time, and whether each is in the half-space of the frame before it; the first frame is in its own."""
+    """Yield blocks of frames, and whether each is in the half-space of the frame before it."""
     before = quaternions[:1]
     for (frames,) in in_blocks(quaternions):
         with_before = np.concatenate([before, frames])

@@ -1,9 +1,10 @@
-"""From whatever skeleton a recording has to the 22 nodes of the paper's body, a rigid tree.
+"""Retargeting of any skeleton to the 22 nodes of the paper's body, a rigid tree.
 
-Where one bone of the recording joins two nodes, that bone is taken as it is. Where a chain joins them (ankle to toe tip
-over the ball of the foot, elbow to wrist over the twist joint, wrist to finger tips, base to top of the head, thorax to
-shoulder in a BVH whose neck and collar are separate) the part is one rigid bone that always points from the one joint to
-the other and has the median of their distances as its length. Toe tips are up to 3 cm off by that in push-off, the others
+Where one bone of the recording joins two nodes, that bone is taken as it is. Where a chain joins
+them (ankle to toe tip over the ball of the foot, elbow to wrist over the twist joint, wrist to
+finger tips, base to top of the head, thorax to shoulder in a BVH whose neck and collar are
+separate) the part is one rigid bone that always points from the one joint to the other and has the
+median of their distances as its length. Toe tips are up to 3 cm off by that in push-off, the others
 millimetres.
 """
 
@@ -19,7 +20,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import rotate
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate
 from rtradar.motion.skeleton_names import CONVENTIONS, NODE_PARENT, NODES, Convention, plain
 from rtradar.system.row_files import FileBackedRows, in_blocks
 
@@ -27,18 +28,27 @@ MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""
 
 HEAD_OF_THIGH = 0.130 / 0.245
-"""Height of the head over the length of the thigh (Drillis and Contini 1966), for skeletons that end at its base."""
+"""Ratio of the head's height to the thigh's length (Drillis and Contini 1966).
+
+Skeletons that end at the base of the head need it."""
 
 HAND_OF_FOREARM = 0.108 / 0.146
-"""Length of the hand over that of the forearm (Drillis and Contini 1966), for skeletons that end at the wrist."""
+"""Ratio of the lengths of hand and forearm (Drillis and Contini 1966).
+
+Skeletons that end at the wrist need it."""
 
 TOES_OF_FOOT = 0.5
-"""Ball of the foot to toe tip over ankle to ball (HDM05 skeletons), for skeletons that end at the ball."""
+"""Ratio of the distances from ball to toe tip and from ankle to ball of the foot (HDM05).
+
+Skeletons that end at the ball of the foot need it."""
 
 
 @dataclass(frozen=True)
 class _Bone:
-    """A vector in the bone's own axes, and what gives its rotations (frame, 4) by those frames of all positions and rotations."""
+    """A vector in the bone's own axes, and a function that gives its rotations (frame, 4).
+
+    The function takes the positions and rotations of all joints in some frames.
+    """
 
     offset: NDArray[np.float64]
     rotations: Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
@@ -49,12 +59,13 @@ class _Bone:
 
 
 def to_nodes(motion: Motion) -> Motion:
-    """The same motion on the 22 nodes, a rigid tree whose 21 bones are the body parts.
+    """Retarget a motion to the 22-node skeleton, a rigid tree whose 21 bones are the body parts.
 
     Raises
     ------
     InputError
-        Where the skeleton is of no known kind (naming the joint that is missing), or a part would have no length.
+        Where the skeleton is of no known kind (naming the joint that is missing), or a part would
+        have no length.
     """
     if motion.joints == NODES:
         return motion
@@ -80,7 +91,8 @@ def to_nodes(motion: Motion) -> Motion:
                 motion.joints[joints[end]] for end in (NODE_PARENT[node], node) if end in joints
             ]
             raise InputError(
-                f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} mm long ({' to '.join(ends)}); "
+                f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} "
+                f"mm long ({' to '.join(ends)}); "
                 f"every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, mend the skeleton"
             )
     root_positions, rotations = FileBackedRows(), FileBackedRows()
@@ -123,12 +135,14 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
             wanted = " or ".join(convention.joints[missing[0]])
             best = (
                 len(missing),
-                f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name} skeleton",
+                f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name} "
+                "skeleton",
             )
     if best is None or best[0] > len(NODES) / 2:
         known = "; ".join(convention.name for convention in CONVENTIONS)
         raise InputError(
-            f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no kind of skeleton that is "
+            f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no "
+            "kind of skeleton that is "
             f"known: {known}; rename them after one of these"
         )
     raise InputError(
@@ -137,7 +151,7 @@ def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
 
 
 def _between(motion: Motion, first: int, last: int) -> _Bone:
-    """One rigid bone from a joint to another: the recording's own, or one that points along the chain between them."""
+    """Make a rigid bone between two joints: the recording's own, or one along the chain between."""
 
     def carried(_: NDArray[np.float64], rotations: NDArray[np.float64]) -> NDArray[np.float64]:
         return rotations[:, last]
@@ -148,7 +162,7 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     def chord(
         positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        return rotate(
+        return quaternion_rotate(
             rotations[:, last] * [-1, -1, -1, 1], positions[:, last] - positions[:, first]
         )
 
@@ -164,12 +178,13 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     def pointing(
         positions: NDArray[np.float64], rotations: NDArray[np.float64]
     ) -> NDArray[np.float64]:
-        # The smallest turn that takes the rest direction to where the chord points in this frame.
+        # The smallest rotation that takes the rest direction to where the chord points in this
+        # frame.
         directions = _directions(chord(positions, rotations))
         swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
         norms = np.linalg.norm(swing, axis=1, keepdims=True)
         swing = np.where(norms > 1e-9, swing / np.maximum(norms, 1e-9), [1.0, 0.0, 0.0, 0.0])
-        return multiply(rotations[:, last], swing)
+        return quaternion_multiply(rotations[:, last], swing)
 
     return _Bone(length * rest, pointing)
 
@@ -178,34 +193,24 @@ def _directions(chords: NDArray[np.float64]) -> NDArray[np.float64]:
     return chords / np.maximum(np.linalg.norm(chords, axis=1), MINIMUM_PART_M)[:, None]
 
 
-def multiply(left: NDArray[np.float64], right: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Product of quaternions (..., 4), scalar last: first ``right``, then ``left``."""
-    vector = (
-        left[..., 3:] * right[..., :3]
-        + right[..., 3:] * left[..., :3]
-        + np.cross(left[..., :3], right[..., :3])
-    )
-    scalar = left[..., 3:] * right[..., 3:] - np.sum(
-        left[..., :3] * right[..., :3], axis=-1, keepdims=True
-    )
-    return np.concatenate([vector, scalar], axis=-1)
-
-
 def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
     """Three bones from root to thorax, whatever the number of joints between.
 
-    Three bones are taken as they are; of fewer the longest is split; of more, the joints nearest to each third stay.
+    Three bones are taken as they are; of fewer the longest is split; of more, the joints nearest to
+    each third stay.
     """
     chain = [thorax]
     while chain[0] != root:
         if motion.parents[chain[0]] < 0:
             raise InputError(
-                f"{motion.name}: {motion.joints[thorax]!r} does not hang on {motion.joints[root]!r}; mend the skeleton"
+                f"{motion.name}: {motion.joints[thorax]!r} does not hang on "
+                f"{motion.joints[root]!r}; mend the skeleton"
             )
         chain.insert(0, motion.parents[chain[0]])
     lengths = np.linalg.norm(motion.offsets[chain[1:]], axis=1)
     heights = np.concatenate([[0.0], np.cumsum(lengths)])
-    # Joints that coincide count once; the last of them bends the next bone. The thorax itself always stays.
+    # Joints that coincide count once; the last of them bends the next bone. The thorax itself
+    # always stays.
     distinct = [
         0,
         *(
@@ -241,7 +246,7 @@ def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
 
 
 def _foot(motion: Motion, ankle: int, foot: _Bone, toe: int) -> _Bone:
-    """The foot with toes: where the skeleton ends at the ball of the foot, longer by `TOES_OF_FOOT`."""
+    """Lengthen the foot by `TOES_OF_FOOT` where the skeleton ends at the ball of the foot."""
     between = motion.parents[toe]
     ends_at_ball = between == ankle or float(np.linalg.norm(motion.offsets[toe])) < MINIMUM_PART_M
     return _Bone(foot.offset * (1 + TOES_OF_FOOT), foot.rotations) if ends_at_ball else foot
@@ -250,9 +255,10 @@ def _foot(motion: Motion, ankle: int, foot: _Bone, toe: int) -> _Bone:
 def _extended(
     motion: Motion, end: _Bone, joints: Mapping[str, int], base: str, length: float
 ) -> _Bone:
-    """An end part as it is, or, where the skeleton gives it no length, straight on from the bone before it.
+    """Extend an end part without length straight on from the bone before it; return others as is.
 
-    Straight on is meant in the axes of the joint at its base: in the rest pose of a BVH these are the same for both.
+    Straight on is meant in the axes of the joint at its base: in the rest pose of a BVH these are
+    the same for both.
     """
     if end.length >= MINIMUM_PART_M:
         return end

@@ -1,8 +1,9 @@
-"""The 22 nodes of the paper's body, and what the joints where they stand are called in each kind of skeleton.
+"""The 22 nodes of the paper's body, and the names of their joints in each kind of skeleton.
 
-HDM05 and CMU have 31 joints. The 24-joint chain (`CHAIN_24`, that of SMPL) leaves out the thumbs, and the joints inside
-what moves as one: upper neck, ball of the foot, radius, hand. Its neck and collars are not separated in HDM05, they all
-stand at the thorax; without the three and with the top of the head added, 22 nodes and 21 bones remain, one a body part.
+HDM05 and CMU have 31 joints. The 24-joint chain (`CHAIN_24`, that of SMPL) leaves out the thumbs,
+and the joints inside what moves as one: upper neck, ball of the foot, radius, hand. Its neck and
+collars are not separated in HDM05, they all stand at the thorax; without the three and with the top
+of the head added, 22 nodes and 21 bones remain, one a body part.
 """
 
 from __future__ import annotations
@@ -95,10 +96,11 @@ ASF_JOINTS: Mapping[str, str] = {
 
 @dataclass(frozen=True)
 class Convention:
-    """Joint names of one kind of skeleton, by node, in plain form (lower case, letters and digits only).
+    """Joint names of one kind of skeleton by node, as `plain` gives them.
 
-    ``lowerback`` and ``upperback`` are not named: they are found along the chain from root to thorax. The first name
-    that is there counts. Where ``open_ended``, hands, head and toes may lack an end and are then extended.
+    ``lowerback`` and ``upperback`` are not named: they are found along the chain from root to
+    thorax. The first name that is there counts. Where ``open_ended``, hands, head and toes may lack
+    an end and are then extended.
     """
 
     name: str

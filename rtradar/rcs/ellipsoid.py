@@ -32,9 +32,10 @@ def ellipsoid(
 
     Notes
     -----
-    pi a^2 b^2 c^2 / (a^2 sin^2(theta) cos^2(phi) + b^2 sin^2(theta) sin^2(phi) + c^2 cos^2(theta))^2, from Mahafza,
-    *Radar Systems Analysis and Design Using MATLAB*, eq. 2.39. Code published with the paper writes c cos^2(theta)
-    in the denominator, whose unit does not fit and which is 14 to 26 dB low end-on.
+    pi a^2 b^2 c^2 / (a^2 sin^2(theta) cos^2(phi) + b^2 sin^2(theta) sin^2(phi) + c^2
+    cos^2(theta))^2, from Mahafza, *Radar Systems Analysis and Design Using MATLAB*, eq. 2.39. Code
+    published with the paper writes c cos^2(theta) in the denominator, whose unit does not fit and
+    which is 14 to 26 dB low end-on.
 
     Equation :eq:`rcs-ellipsoid` of the theory page.
     """
@@ -42,7 +43,8 @@ def ellipsoid(
     if not all((axis > 0).all() for axis in (a, b, c)):
         raise ValueError("rcs.ellipsoid: semi-axes must be positive [m]")
     sine = np.sin(theta)
-    # Scaled by the largest axis: squares of squares of tiny or huge axes would leave the range of float64.
+    # Scaled by the largest axis: squares of squares of tiny or huge axes would leave the range of
+    # float64.
     largest = np.maximum(np.maximum(a, b), c)
     a, b, c = a / largest, b / largest, c / largest
     support_squared = (
@@ -54,7 +56,7 @@ def ellipsoid(
 def ellipsoid_radii(
     a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: ArrayLike
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Principal radii of curvature of an ellipsoid where its outward normal points along (theta, phi).
+    """Compute principal radii of curvature where the outward normal points along (theta, phi).
 
     Parameters
     ----------
@@ -69,7 +71,8 @@ def ellipsoid_radii(
     Notes
     -----
     The inverse of the shape operator on the tangent plane is the Hessian of the support function
-    h(n) = sqrt(n . A^2 n); its trace and determinant there are (tr A^2 - n.A^4 n / h^2) / h and (abc)^2 / h^4.
+    h(n) = sqrt(n . A^2 n); its trace and determinant there are (tr A^2 - n.A^4 n / h^2) / h and
+    (abc)^2 / h^4.
 
     Equation :eq:`radii` of the theory page.
     """

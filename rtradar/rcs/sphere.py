@@ -1,4 +1,4 @@
-"""Scattering length of a perfectly conducting sphere: geometric optics, physical optics, and Mie's exact series."""
+"""Scattering length of a conducting sphere: geometric optics, physical optics, Mie series."""
 
 from __future__ import annotations
 
@@ -14,7 +14,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 def sphere(
     radius: ArrayLike, frequency: ArrayLike, method: Literal["go", "po", "mie"] = "mie"
 ) -> NDArray[np.complex128]:
-    """Monostatic scattering length of a conducting sphere, far away; the phase belongs to the path over its centre.
+    """Compute the monostatic far-field scattering length of a perfectly conducting sphere.
+
+    The phase belongs to the path over the sphere's centre.
 
     Parameters
     ----------
@@ -23,8 +25,8 @@ def sphere(
     frequency : array_like
         [Hz].
     method : {"go", "po", "mie"}
-        Geometric optics: sqrt(pi) a exp(2jka). Physical optics: the closed form of its integral over the lit half.
-        Mie: the exact series.
+        Geometric optics: sqrt(pi) a exp(2jka). Physical optics: the closed form of its integral
+        over the lit half. Mie: the exact series.
 
     Returns
     -------
@@ -38,8 +40,8 @@ def sphere(
 
     Notes
     -----
-    Mie series of a conductor: Harrington, *Time-Harmonic Electromagnetic Fields*, section 6-9. Physical optics:
-    F = jk / sqrt(pi) times the integral of (n.s) exp(2jk s.r) over the lit half.
+    Mie series of a conductor: Harrington, *Time-Harmonic Electromagnetic Fields*, section 6-9.
+    Physical optics: F = jk / sqrt(pi) times the integral of (n.s) exp(2jk s.r) over the lit half.
 
     Equations :eq:`sphere-go`, :eq:`sphere-po` and :eq:`sphere-mie` of the theory page.
     """
@@ -65,10 +67,14 @@ def sphere(
 
 
 def _mie_backscatter(ka: float) -> complex:
-    """Sum over n of -j (-1)^n (2n+1) (a_n - b_n) for exp(+j omega t): it tends to ka exp(2jka) for large ka."""
+    """Sum over n of -j (-1)^n (2n+1) (a_n - b_n) for exp(+j omega t).
+
+    It tends to ka exp(2jka) for large ka.
+    """
     # Wiscombe's count of terms that matter, with a margin.
     orders = np.arange(int(np.ceil(ka + 4.05 * ka ** (1 / 3) + 10)))
-    # Spherical Bessel functions but for a factor that a_n and b_n do not know. SciPy's own walk up to each order anew.
+    # Spherical Bessel functions but for a factor that a_n and b_n do not know. SciPy's own walk up
+    # to each order anew.
     j, y = jv(orders + 0.5, ka), yv(orders + 0.5, ka)
     orders = orders[1:]
     dj, dy = j[:-1] - (orders + 1) / ka * j[1:], y[:-1] - (orders + 1) / ka * y[1:]

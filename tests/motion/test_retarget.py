@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion, synthetic_motion
-from rtradar.motion.retarget import multiply, to_nodes
+from rtradar.motion.quaternions import quaternion_multiply
+from rtradar.motion.retarget import to_nodes
 from rtradar.motion.skeleton_names import ASF_JOINTS, CHAIN_24, NODE_PARENT, NODES, plain
 
 
@@ -186,7 +187,7 @@ def test_names() -> None:
 def test_multiply_is_composition() -> None:
     a, b = Rotation.random(5, random_state=1), Rotation.random(5, random_state=2)
     np.testing.assert_allclose(
-        Rotation.from_quat(multiply(a.as_quat(), b.as_quat())).as_matrix(),
+        Rotation.from_quat(quaternion_multiply(a.as_quat(), b.as_quat())).as_matrix(),
         (a * b).as_matrix(),
         atol=1e-12,
     )

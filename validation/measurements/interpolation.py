@@ -29,7 +29,7 @@ from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.motion.load import load_motion
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import rotate, sign_continuous
+from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.validate.rows import Row, main, reported
 
 Array = NDArray[np.float64]
@@ -91,7 +91,7 @@ def angle_deg(first: Array, second: Array) -> Array:
 
 def place(motion: Motion, quaternions: Array) -> Array:
     """Joints relative to the root (frame, joint, 3) [m]."""
-    places = rotate(quaternions, motion.offsets)
+    places = quaternion_rotate(quaternions, motion.offsets)
     places[:, 0] = 0.0
     for joint, parent in enumerate(motion.parents[1:], start=1):
         places[:, joint] += places[:, parent]
@@ -155,7 +155,10 @@ def smooth_limb(method: Method) -> float:
 
     limb = np.array([0.0, 0.0, -0.8])
     return error_db(
-        (rotate(method(times, swing(times), at), limb) - rotate(swing(at), limb))[..., 0]
+        (
+            quaternion_rotate(method(times, swing(times), at), limb)
+            - quaternion_rotate(swing(at), limb)
+        )[..., 0]
     )
 
 

@@ -1,7 +1,8 @@
 """AMC motions (Acclaim): HDM05, the CMU database.
 
-A bone's rotation in the world is that of its parent times C R C^-1, C the bone's ``axis`` and R its degrees of freedom,
-both applied about fixed axes in the order they are listed (``rx ry rz``: R = Rz Ry Rx).
+A bone's rotation in the world is that of its parent times C R C^-1, C the bone's ``axis`` and R its
+degrees of freedom, both applied about fixed axes in the order they are listed (``rx ry rz``: R = Rz
+Ry Rx).
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
-from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.formats.asf import Skeleton
 from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
 from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import quaternions_to_world, to_world
 from rtradar.system.row_files import FileBackedRows
 
 _FRAME_NUMBER = re.compile("-?[0-9]{1,9}")
@@ -62,7 +63,7 @@ def load_amc(path: Path, skeleton: Skeleton) -> Motion:
 def _posed(
     skeleton: Skeleton, values: dict[str, NDArray[np.float64]], to_radians: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Places of the root (frame, 3) [m] and rotations of all bones (frame, bone, 4), in mocap axes."""
+    """Compute positions of the root (frame, 3) [m] and rotations (frame, bone, 4), mocap axes."""
     frames = len(next(iter(values.values())))
     world: dict[str, Rotation] = {}
     root_positions = np.zeros((frames, 3))
@@ -88,7 +89,7 @@ def _posed(
 def _read_frames(
     path: Path, skeleton: Skeleton
 ) -> Generator[tuple[dict[str, NDArray[np.float64]], bool]]:
-    """Values (frame, degree of freedom) of each bone that has some, a few frames at a time, and whether they are in degrees."""
+    """Yield values (frame, degree of freedom) by bone in blocks, and whether they are degrees."""
     widths = {bone.name: len(bone.dof) for bone in skeleton.bones if bone.dof}
     table: dict[str, list[list[float]]] = {name: [] for name in widths}
     number, n_frames = 0, 0
@@ -135,7 +136,8 @@ def _read_frames(
                         raise fail(
                             path,
                             number,
-                            f"frame {words[0]} follows frame {frame}; frame numbers must be consecutive",
+                            f"frame {words[0]} follows frame {frame}; frame numbers must be "
+                            "consecutive",
                         )
                     if n_frames % FRAMES_AT_ONCE == 0:
                         yield taken(), degrees
@@ -152,7 +154,8 @@ def _read_frames(
                     raise fail(
                         path,
                         number,
-                        f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this subject",
+                        f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF "
+                        "of this subject",
                     )
                 if name in seen:
                     raise fail(path, number, f"bone {name!r} is there twice in frame {frame}")
@@ -160,7 +163,8 @@ def _read_frames(
                     raise fail(
                         path,
                         number,
-                        f"bone {name!r} has {len(words) - 1} values where the skeleton has {widths.get(name, 0)}",
+                        f"bone {name!r} has {len(words) - 1} values where the skeleton has "
+                        f"{widths.get(name, 0)}",
                     )
                 seen.add(name)
                 if name in table:

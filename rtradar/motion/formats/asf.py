@@ -1,6 +1,7 @@
 """ASF skeletons (Acclaim): HDM05, the CMU database.
 
-A bone's vector is length x direction, and lengths are inches divided by the ``length`` unit of the file.
+A bone's vector is length x direction, and lengths are inches divided by the ``length`` unit of the
+file.
 """
 
 from __future__ import annotations
@@ -107,11 +108,13 @@ def load_skeleton(path: Path) -> Skeleton:
                     _hierarchy_line(words, bones, path, number)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
         raise InputError(
-            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut off"
+            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut "
+            "off"
         )
     if not bones["root"].dof:
         raise InputError(
-            f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of the AMC"
+            f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of "
+            "the AMC"
         )
     if inside:
         raise fail(path, number, "the hierarchy does not end; the file may be cut off")
@@ -175,7 +178,8 @@ def _bone_line(
             raise fail(
                 path,
                 line,
-                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported (rigid bones)",
+                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported (rigid "
+                "bones)",
             )
 
 
@@ -186,7 +190,8 @@ def _check_bone(bone: Bone, path: Path, line: int) -> None:
         raise fail(
             path,
             bone.line,
-            f"bone {bone.name!r} has no length; a body part hangs on it, give its length and direction",
+            f"bone {bone.name!r} has no length; a body part hangs on it, give its length and "
+            "direction",
         )
 
 

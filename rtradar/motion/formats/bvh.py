@@ -1,8 +1,8 @@
 """BVH motions: any channel order, positions on any joint, y up.
 
-The global rotation of a joint turns the offsets of its children, so joint j of the `Motion` carries the rotation of its
-parent. End sites become joints named ``<parent>_end``, so that the rotation of a last joint is kept even where its end
-site has no length.
+The global rotation of a joint turns the offsets of its children, so joint j of the `Motion` carries
+the rotation of its parent. End sites become joints named ``<parent>_end``, so that the rotation of
+a last joint is kept even where its end site has no length.
 """
 
 from __future__ import annotations
@@ -18,10 +18,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
-from rtradar.motion.axes import quaternions_to_world, to_world
 from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import rotate
+from rtradar.motion.quaternions import quaternion_rotate, quaternions_to_world, to_world
 from rtradar.system.row_files import FileBackedRows, column, in_blocks
 
 UNITS_M = {
@@ -34,7 +33,9 @@ UNITS_M = {
 """Length units that BVH files use; the format itself has none."""
 
 _REACH_M = (0.7, 1.5)
-"""Length of bones from the root to the farthest end, person: 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
+"""Limits of the length of bones from the root to the farthest end of a person [m].
+
+It is 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
 
 _SHORTEST_S, _LONGEST_S = 1e-6, 10.0
 """What a frame may last."""
@@ -57,8 +58,9 @@ class _Joint:
 def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     """Read a BVH file.
 
-    Position channels of joints below the root replace the joint's offset; they must be constant but for the joint
-    that carries the whole body (Bandai-Namco: ``Hips`` under a still ``joint_Root``), which becomes the root.
+    Position channels of joints below the root replace the joint's offset; they must be constant but
+    for the joint that carries the whole body (Bandai-Namco: ``Hips`` under a still ``joint_Root``),
+    which becomes the root.
 
     Parameters
     ----------
@@ -94,7 +96,8 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
             raise fail(
                 path,
                 joints[j].line,
-                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be rigid",
+                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be "
+                "rigid",
             )
     carriers = [kept[0]] + [joints[j].parent for j in kept[1:]]
     roots, rotations = FileBackedRows(), FileBackedRows()
@@ -105,7 +108,9 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
             joints, top
         ):  # from the file's root down to the joint that carries the body
             parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
-            places = places + (own if parent < 0 else rotate(quaternions[:, parent], own))
+            places = places + (
+                own if parent < 0 else quaternion_rotate(quaternions[:, parent], own)
+            )
         roots.append(to_world(places * scale))
         rotations.append(quaternions_to_world(quaternions[:, carriers]))
     return Motion(
@@ -206,7 +211,8 @@ def _read_header(lines: Iterator[tuple[int, str]], path: Path) -> tuple[int, flo
                 raise fail(
                     path,
                     number,
-                    f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to {_LONGEST_S:g}",
+                    f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to "
+                    f"{_LONGEST_S:g}",
                 )
             interval = time[0]
         else:
@@ -252,7 +258,7 @@ def _read_frames(
 
 
 def _places(joint: _Joint, values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Where a joint is seen from its parent, (frame, 3), or (1, 3) where it has no position channels."""
+    """Position of a joint relative to its parent, (frame, 3); (1, 3) without position channels."""
     moved = [k for k, name in enumerate(joint.channels) if name.endswith("position")]
     if not moved:
         return joint.offset[None]
@@ -287,14 +293,18 @@ def _chain(joints: list[_Joint], joint: int) -> list[int]:
 
 
 def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
-    """The joint that carries the body: the last of an unbranched chain from the root whose own position moves."""
+    """Find the joint that carries the body.
+
+    It is the last joint of an unbranched chain from the root whose own position moves.
+    """
     top, carrier = 0, 0
     while True:
         children = [j for j, joint in enumerate(joints) if joint.parent == top]
         if len(children) != 1:
             return carrier
         top = children[0]
-        # A joint that holds its place in its parent to a millionth of its distance is a bone, not a carrier.
+        # A joint that keeps its place in its parent to a millionth of its distance is a bone, not a
+        # carrier.
         if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (
             1 + np.abs(joints[top].offset).max()
         ):
@@ -309,7 +319,8 @@ def _unit(joints: list[_Joint], kept: list[int], offsets: NDArray[np.float64], p
     fitting = [unit for unit in UNITS_M.values() if _REACH_M[0] <= longest * unit <= _REACH_M[1]]
     if len(fitting) != 1:
         raise InputError(
-            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of {', '.join(UNITS_M)}; "
+            f"{path}: a person {longest:.4g} units from hip to farthest end fits none of "
+            f"{', '.join(UNITS_M)}; "
             f"give unit_m (metres a unit)"
         )
     return fitting[0]

@@ -1,7 +1,7 @@
 """C3D recordings of optical markers, with the marker set of CMU and HDM05.
 
-World axes are those of the file: Vicon's z is up, and C3D (x, y, z) = AMC (z, x, y), which is the world's (x, y, z). A file
-whose POINT:Y_SCREEN says that y is up is turned.
+World axes are those of the file: Vicon's z is up, and C3D (x, y, z) = AMC (z, x, y), which is the
+world's (x, y, z). A file whose POINT:Y_SCREEN says that y is up is turned.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rtradar.errors import InputError
-from rtradar.motion.axes import to_world
 from rtradar.motion.formats.markers import NEEDED, joint_centres
 from rtradar.motion.formats.rigid import rigid_motion
 from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import to_world
 from rtradar.system.checks import shown
 from rtradar.system.files import open_regular
 
@@ -32,7 +32,7 @@ LONGEST_GAP_S = 0.1
 """Gaps of a marker up to this long are bridged."""
 
 _STANDS_M = 0.5
-"""The head is at least this far above the ankles in the median: else z is not up, or the unit is wrong."""
+"""Least median height of the head above the ankles [m]; below, z is not up or the unit is wrong."""
 
 _SHANK_M = (0.2, 0.7)
 """Distance of knee and ankle markers of people, children included."""
@@ -83,8 +83,8 @@ def load_c3d(path: Path, unit_m: float | None = None) -> Motion:
     Raises
     ------
     InputError
-        Where the file is none or damaged, or a marker is missing or unseen for longer than `LONGEST_GAP_S`; naming it and the
-        frames, by the file's numbers.
+        Where the file is none or damaged, or a marker is missing or unseen for longer than
+        `LONGEST_GAP_S`; naming it and the frames, by the file's numbers.
     """
     seen = read_markers(path, NEEDED, unit_m)
     positions = bridged(seen)
@@ -122,23 +122,27 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
         ) from None
     if any("end of file" in str(warning.message) for warning in caught):
         raise InputError(
-            f"{path}: ends after {len(points)} frames where its header promises more; the file is cut off"
+            f"{path}: ends after {len(points)} frames where its header promises more; the file is "
+            "cut off"
         )
     if not len(points):
         raise InputError(f"{path}: no frame of markers in this C3D file; export it again")
     if not 1.0 <= rate_hz <= 100_000.0:
         raise InputError(
-            f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the file"
+            f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the "
+            "file"
         )
     if upward not in ("", "+Z", "+Y"):
         raise InputError(
-            f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the recording"
+            f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the "
+            "recording"
         )
     scale = unit_m if unit_m is not None else UNITS_M.get(unit.lower())
     if scale is None or not 0 < scale < np.inf:
         said = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {unit[:20]!r}"
         raise InputError(
-            f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, positive)"
+            f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, "
+            "positive)"
         )
     chosen = points[:, [_column(path, labels, name) for name in names]]
     # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
@@ -166,21 +170,23 @@ def bridged(seen: Markers) -> NDArray[np.float64]:
             continue
         edges = np.flatnonzero(np.diff(np.concatenate([[False], hidden, [False]]).astype(np.int8)))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
-            where = f"{seen.path}: marker {name} is not seen in frames {seen.first_frame + begin} to {seen.first_frame + end - 1}"
+            first, last = seen.first_frame + begin, seen.first_frame + end - 1
+            where = f"{seen.path}: marker {name} is not seen in frames {first} to {last}"
             if begin == 0 or end == len(positions):
                 raise InputError(
                     f"{where}, at an end of the recording; cut these frames off, or fill the gap"
                 )
             if end - begin > LONGEST_GAP_S * seen.rate_hz:
                 raise InputError(
-                    f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s are bridged, fill this one"
+                    f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s "
+                    "are bridged, fill this one"
                 )
         positions[hidden, k] = CubicSpline(frames[~hidden], positions[~hidden, k])(frames[hidden])
     return positions
 
 
 class _Bounded(io.BufferedReader):
-    """A file that gives no more than it has: for what a damaged one promises, Python would first take the memory."""
+    """A file that never reserves more memory for a read than the file has bytes."""
 
     def read(self, size: int | None = -1, /) -> bytes:
         return super().read(
@@ -189,7 +195,7 @@ class _Bounded(io.BufferedReader):
 
 
 def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, str, str]:
-    """Labels, points (frame, point, 5), rate, first frame, unit, and which axis is up, as the file says."""
+    """Read labels, points (frame, point, 5), rate, first frame, unit, and the axis that is up."""
     import c3d  # not before a file asks for it
 
     reader = c3d.Reader(handle)
@@ -222,7 +228,8 @@ def _column(path: Path, labels: list[str], name: str) -> int:
     if not found:
         some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
         raise InputError(
-            f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers of CMU and HDM05 are "
+            f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers "
+            "of CMU and HDM05 are "
             "understood, rename or add it"
         )
     if len(found) > 1:
@@ -240,7 +247,8 @@ def _check_size(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
     )
     if not _SHANK_M[0] <= shank <= _SHANK_M[1]:
         raise InputError(
-            f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's {_SHANK_M[0]} to {_SHANK_M[1]} m; "
+            f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's "
+            f"{_SHANK_M[0]} to {_SHANK_M[1]} m; "
             "check POINT:UNITS and the markers' names"
         )
     above = float(
@@ -248,6 +256,7 @@ def _check_size(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
     )
     if above < _STANDS_M and not seen.says_up:
         raise InputError(
-            f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to tell what is up, give one who "
+            f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to "
+            "tell what is up, give one who "
             "stands, or POINT:Y_SCREEN (+Z or +Y)"
         )

@@ -1,21 +1,24 @@
 """From markers on the skin to the 22 nodes of the body.
 
-The marker set is the one of 41 markers that CMU and HDM05 recordings carry, in Vicon's names: four on the head (LFHD, RFHD,
-LBHD, RBHD), C7, T10, CLAV and STRN about the chest, four on the waist (LFWT, RFWT, LBWT, RBWT), and on each side shoulder,
-elbow, a wrist bar with two ends (WRA on the side of the thumb, WRB), knuckle (FIN), knee, ankle, toe. Only the 28 markers that
-are named here are asked for.
+The marker set is the one of 41 markers that CMU and HDM05 recordings carry, in Vicon's names: four
+on the head (LFHD, RFHD, LBHD, RBHD), C7, T10, CLAV and STRN about the chest, four on the waist
+(LFWT, RFWT, LBWT, RBWT), and on each side shoulder, elbow, a wrist bar with two ends (WRA on the
+side of the thumb, WRB), knuckle (FIN), knee, ankle, toe. Only the 28 markers that are named here
+are asked for.
 
-A joint's centre is the middle of its markers - pairs before and behind, or on both sides of it - or, where one marker alone
-marks it, that marker; from there an offset in the axes of its segment leads inward. Offsets belong to a person whose knee and
-ankle markers are `SHANK_M` apart, and grow with that distance. They are medians over the first half of the CMU take 135_02,
-which exists as AMC too; ``validation/measurements/c3d_take.py`` judges by its second half. Markers on waist and wrist bars stand centimetres
-off the bone, and a solver's shoulder lies lower than the marker on it: without the offsets hips are 18 cm off.
+A joint's centre is the middle of its markers - pairs before and behind, or on both sides of it -
+or, where one marker alone marks it, that marker; from there an offset in the axes of its segment
+leads inward. Offsets belong to a person whose knee and ankle markers are `SHANK_M` apart, and grow
+with that distance. They are medians over the first half of the CMU take 135_02, which exists as AMC
+too; ``validation/measurements/c3d_take.py`` judges by its second half. Markers on waist and wrist
+bars stand centimetres off the bone, and a solver's shoulder lies lower than the marker on it:
+without the offsets hips are 18 cm off.
 
 References
 ----------
-Carnegie Mellon University Motion Capture Database, marker placement guide (mocap.cs.cmu.edu).
-M. Mueller, T. Roeder, M. Clausen, B. Eberhardt, B. Krueger, A. Weber, Documentation Mocap Database HDM05, technical report
-CG-2007-2, Universitaet Bonn, 2007.
+Carnegie Mellon University Motion Capture Database, marker placement guide (mocap.cs.cmu.edu). M.
+Mueller, T. Roeder, M. Clausen, B. Eberhardt, B. Krueger, A. Weber, Documentation Mocap Database
+HDM05, technical report CG-2007-2, Universitaet Bonn, 2007.
 """
 
 from __future__ import annotations
@@ -88,8 +91,9 @@ NEEDED: tuple[str, ...] = (
 """The markers that must be there."""
 
 _STRAIGHT = 0.15
-"""An arm bent by less than about this angle [rad] takes the plane of its bend more and more from how the shoulder holds it: a
-straight one has none of its own."""
+"""Angle [rad] below which the plane of an arm's bend comes more and more from the shoulder.
+
+A straight arm has no such plane of its own."""
 
 
 def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
@@ -162,14 +166,16 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
 
 
 def _bend(shoulder: Array, elbow: Array, wrist: Array, thorax: Array, sign: float) -> Array:
-    """Where the forearm leaves the line of the upper arm (frame, 3), unit; of a straight arm where it would."""
+    """Direction (frame, 3) in which the forearm leaves the upper arm's line, or would leave it."""
     arm, fore = _unit(elbow - shoulder), _unit(wrist - elbow)
     bent = fore - np.sum(fore * arm, axis=1, keepdims=True) * arm
-    # An arm that hangs down, out and forward bends forward and up; the shortest turn takes it to where this arm points.
+    # An arm that hangs down, out and forward bends forward and up; the shortest turn takes it to
+    # where this arm points.
     rest, ahead = _unit(np.array([0.5, 0.5 * sign, -0.7])), _unit(np.array([0.7, 0.0, 0.5]))
     local = np.einsum("tji,tj->ti", thorax, arm)
     turn = rest + local
-    # Two mirrorings, along rest and along rest + local, are that turn. Opposite to rest there is none, and any will do.
+    # Two mirrorings, along rest and along rest + local, are that turn. Opposite to rest there is
+    # none, and any will do.
     mirrored = ahead - 2 * np.dot(ahead, rest) * rest
     along = np.sum(turn * turn, axis=1, keepdims=True)
     held = mirrored - 2 * turn * (turn @ mirrored)[:, None] / np.maximum(along, 1e-9)

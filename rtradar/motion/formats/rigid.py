@@ -8,8 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import rotate, sign_continuous
-from rtradar.motion.retarget import MINIMUM_PART_M, multiply
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, sign_continuous
+from rtradar.motion.retarget import MINIMUM_PART_M
 from rtradar.motion.skeleton_names import NODE_PARENT, NODES
 
 _ON_THE_PELVIS = (
@@ -36,9 +36,10 @@ def rigid_motion(
 ) -> Motion:
     """Bones of constant length that point as the joints do.
 
-    A bone is as long as its joints are apart in the median, and points from one to the other in every frame. Joints say nothing
-    of how a bone is turned about itself: seen from pelvis or chest it takes from frame to frame the shortest turn to its next
-    direction, so that nothing on it spins.
+    A bone is as long as its joints are apart in the median, and points from one to the other in
+    every frame. Joints say nothing of how a bone is turned about itself: seen from pelvis or chest
+    it takes from frame to frame the shortest turn to its next direction, so that nothing on it
+    spins.
 
     Parameters
     ----------
@@ -62,7 +63,8 @@ def rigid_motion(
     for bone, frame in np.argwhere(~(spans.T > MINIMUM_PART_M / 2)):
         ends = f"{NODE_PARENT[NODES[1 + bone]]!r} and {NODES[1 + bone]!r}"
         raise InputError(
-            f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; every body part needs at least "
+            f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; "
+            "every body part needs at least "
             f"{MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers about it"
         )
     held = {
@@ -72,8 +74,8 @@ def rigid_motion(
     carriers = np.stack(
         [held["pelvis" if node in _ON_THE_PELVIS else "thorax"] for node in NODES[1:]], axis=1
     )
-    directions = rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
-    rotations = multiply(carriers, _followed(directions))
+    directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
+    rotations = quaternion_multiply(carriers, _followed(directions))
     lengths = np.median(spans, axis=0)
     return Motion(
         name=name,
@@ -90,13 +92,14 @@ def rigid_motion(
 
 
 def _followed(directions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Turns (frame, bone, 4) that take unit directions (frame, bone, 3) of the first frame to those of each, step by step."""
+    """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
     before, after = directions[:-1], directions[1:]
     steps = np.concatenate(
         [np.cross(before, after), 1 + np.sum(before * after, axis=2, keepdims=True)], axis=2
     )
     norms = np.linalg.norm(steps, axis=2, keepdims=True)
-    # A bone that points the other way in the next frame has no shortest turn: half a turn about any line across it will do.
+    # A bone that points the other way in the next frame has no shortest turn: half a turn about any
+    # line across it will do.
     across = np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=2)])
     half = np.concatenate(
         [across / np.linalg.norm(across, axis=2, keepdims=True), np.zeros_like(norms)], axis=2
@@ -105,5 +108,5 @@ def _followed(directions: NDArray[np.float64]) -> NDArray[np.float64]:
     turns = np.empty((*directions.shape[:2], 4))
     turns[0] = [0.0, 0.0, 0.0, 1.0]
     for frame, step in enumerate(steps):
-        turns[frame + 1] = multiply(step, turns[frame])
+        turns[frame + 1] = quaternion_multiply(step, turns[frame])
     return turns / np.linalg.norm(turns, axis=2, keepdims=True)

@@ -32,22 +32,26 @@ _CHARACTERS_A_STEP = 1_000_000
 
 
 def read_lines(path: Path, kind: str) -> Generator[str]:
-    """Lines of a text file, one after the other, with a bar where it takes long; to be closed before an error is told.
+    """Yield the lines of a text file, with a progress bar where it takes long.
 
-    Latin-1, for every byte is a character there and only comments use more than ASCII; line ends may be mixed, and a byte
-    order mark is passed over.
+    The generator must be closed before an error message is written.
+
+    Latin-1, for every byte is a character there and only comments use more than ASCII; line ends
+    may be mixed, and a byte order mark is passed over.
 
     Raises
     ------
     InputError
-        Where the file is not there, is no regular file, is empty, is binary, or is larger than 2 GB (some six hours at 120 Hz).
+        Where the file is not there, is no regular file, is empty, is binary, or is larger than 2 GB
+        (some six hours at 120 Hz).
     """
     try:
         with io.TextIOWrapper(open_regular(path), encoding="latin-1") as file:
             size = os.fstat(file.fileno()).st_size
             if size > _MOST_BYTES:
                 raise InputError(
-                    f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
+                    f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} "
+                    "MB: cut it into shorter ones"
                 )
             start = file.buffer.read(_LOOKED_AT_FIRST)
             if b"\0" in start:
@@ -69,7 +73,8 @@ def read_lines(path: Path, kind: str) -> Generator[str]:
                         raise InputError(f"{path}: binary data; expected {kind} text")
                     if len(line) > _MOST_CHARACTERS:
                         raise InputError(
-                            f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected {kind} text"
+                            f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected "
+                            f"{kind} text"
                         )
                     blank = blank and not line.strip()
                     behind += len(line)
@@ -86,14 +91,16 @@ def read_lines(path: Path, kind: str) -> Generator[str]:
 
 
 def check_size(path: Path, joints: int, frames: int = 1) -> None:
-    """Refuse what would take more room than a person's motion does: 1000 joints, or a hundred million poses of one."""
+    """Refuse files larger than a person's motion: 1000 joints, or 100 million poses of a joint."""
     if joints > _MOST_JOINTS:
         raise InputError(
-            f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others out"
+            f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others "
+            "out"
         )
     if joints * frames > _MOST_POSES:
         raise InputError(
-            f"{path}: {frames} frames of {joints} joints; frames times joints may be {_MOST_POSES}: cut it into shorter ones"
+            f"{path}: {frames} frames of {joints} joints; frames times joints may be "
+            f"{_MOST_POSES}: cut it into shorter ones"
         )
 
 

@@ -52,9 +52,9 @@ def synthetic_motion(
 ) -> Motion:
     """A synthetic actor that faces the radar (-x), on the floor z = 0.
 
-    Joints move along minimum-jerk and harmonic curves (C2), feet stand still while they carry and never sink below the
-    floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one turns round within 1.5 m of the middle.
-    The others repeat with short rests.
+    Joints move along minimum-jerk and harmonic curves (C2), feet stand still while they carry and
+    never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
+    turns round within 1.5 m of the middle. The others repeat with short rests.
 
     Parameters
     ----------
@@ -63,7 +63,8 @@ def synthetic_motion(
         The subject: phase, and a few percent of tempo, amplitude and unevenness of the sides.
     duration_s : float
     height_m : float
-        Standing height; segment lengths by Drillis and Contini (see `rtradar.motion.synthetic.figure`).
+        Standing height; segment lengths by Drillis and Contini (see
+        `rtradar.motion.synthetic.figure`).
     build : float
         Thickness relative to a normal person of that height.
     tempo : float
@@ -119,7 +120,8 @@ def synthetic_motion(
         traits = dataclasses.replace(
             traits, phase=float(np.random.default_rng(stream(*own, int(take))).uniform())
         )
-    # Asked for twice: how far down all must come is not known before the last, and too many would have to be kept.
+    # Asked for twice: how far down all must come is not known before the last, and too many would
+    # have to be kept.
     poses_at = ACTIVITIES[activity](duration_s, traits)
     times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
     down = [0.0, 0.0, max(lowering(poses_at(some), height_m) for (some,) in in_blocks(times))]

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def smooth(u: Array) -> Array:
-    """Minimum-jerk step from 0 (u <= 0) to 1 (u >= 1), at rest at both ends (Flash and Hogan 1985)."""
+    """Minimum-jerk step from 0 (u <= 0) to 1 (u >= 1), at rest at both ends (Flash, Hogan 1985)."""
     u = np.clip(u, 0.0, 1.0)
     return u**3 * (10 - 15 * u + 6 * u**2)
 
@@ -23,7 +23,7 @@ def bump(u: Array) -> Array:
 
 
 def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
-    """Minimum-jerk moves from value to value (key, ...), at rest at every key; constant outside. Returns (time, ...)."""
+    """Minimum-jerk moves (time, ...) between values (key, ...), at rest at each key and outside."""
     at, keys = np.asarray(times, dtype=np.float64), np.asarray(values, dtype=np.float64)
     moves = np.diff(keys, axis=0)
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
@@ -37,7 +37,10 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
 def hermite(
     t: Array, interval: tuple[float, float], begin: Sequence[ArrayLike], end: Sequence[ArrayLike]
 ) -> Array:
-    """Quintic that has these positions, velocities and accelerations (each scalar or (3,)) at both ends of an interval."""
+    """Quintic with given positions, velocities and accelerations at both ends of an interval.
+
+    Each of them is a scalar or (3,).
+    """
     span = interval[1] - interval[0]
     (p0, v0, a0), (p1, v1, a1) = (
         [np.asarray(value, dtype=np.float64) for value in state] for state in (begin, end)
@@ -57,6 +60,7 @@ def hermite(
 def state(function: object, t: float) -> tuple[Array, Array, Array]:
     """Value, velocity and acceleration of ``function(times)`` at a time, by differences."""
     assert callable(function)
-    h = 1e-4  # truncation h^2/12 of the fourth derivative and rounding 1e-16/h^2 both stay below 1e-5 m/s^2
+    # Truncation, h^2/12 of the fourth derivative, and rounding, 1e-16/h^2, stay below 1e-5 m/s^2.
+    h = 1e-4
     before, here, after = function(np.array([t - h, t, t + h]))
     return here, (after - before) / (2 * h), (after - 2 * here + before) / h**2

@@ -1,11 +1,13 @@
 """The synthetic actor's skeleton, and how a pose turns its bones.
 
-Segment lengths are fractions of the standing height after R. Drillis and R. Contini, Body Segment Parameters, New York
-University, technical report 1166.03, 1966 (as printed in D. A. Winter, Biomechanics and Motor Control of Human Movement):
-ankle 0.039 high, shank 0.246, thigh 0.245, shoulder 0.818 high and 0.129 to the side, upper arm 0.186, forearm 0.146, hand
-0.108, chin 0.870 high, foot 0.152 long. They give no joint centres inside trunk and foot; ours are: hip joints half way
-from the middle to the side of the hips (0.191 wide), root 0.04 above them, spine in three equal parts to 0.83, base of the
-head at 0.885, ankle a quarter of the foot from the heel, toe node 0.012 above the sole.
+Segment lengths are fractions of the standing height after R. Drillis and R. Contini, Body Segment
+Parameters, New York University, technical report 1166.03, 1966 (as printed in D. A. Winter,
+Biomechanics and Motor Control of Human Movement): ankle 0.039 high, shank 0.246, thigh 0.245,
+shoulder 0.818 high and 0.129 to the side, upper arm 0.186, forearm 0.146, hand 0.108, chin 0.870
+high, foot 0.152 long. They give no joint centres inside trunk and foot; ours are: hip joints half
+way from the middle to the side of the hips (0.191 wide), root 0.04 above them, spine in three equal
+parts to 0.83, base of the head at 0.885, ankle a quarter of the foot from the heel, toe node 0.012
+above the sole.
 """
 
 from __future__ import annotations
@@ -33,7 +35,7 @@ HEEL_X, TOE_X = -FOOT / 4, FOOT * 3 / 4
 """Heel and toe ahead of the ankle."""
 
 MAXIMUM_REACH = 0.9985
-"""A leg never stretches beyond this part of its length: the knee would turn infinitely fast there."""
+"""Largest extension of a leg relative to its length: at 1 the knee would turn infinitely fast."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,9 @@ def offsets(height_m: float) -> dict[str, Array]:
 def bend(
     reach: Array, first: float, second: float, hinge: Array, forward: float
 ) -> tuple[Rotation, Rotation]:
-    """Two-link inverse kinematics: rotations of two bones that hang down at rest and shall reach a point.
+    """Solve two-link inverse kinematics: rotations of two bones that reach a point.
+
+    At rest both bones hang down.
 
     Parameters
     ----------
@@ -154,14 +158,17 @@ def swing_arm(
 
 
 def reach_arm(thorax: Rotation, side: str, reach: Array, height_m: float, elbow_out: float) -> Arm:
-    """An arm whose wrist shall be at ``reach`` (n, 3) from the shoulder, world; its elbow hangs, turned outward [rad]."""
+    """An arm with its wrist at ``reach`` (n, 3) from the shoulder, world; elbow out by [rad]."""
     hinge = thorax.apply([0.0, np.cos(elbow_out), SIDES[side] * np.sin(elbow_out)])
     upper, fore = bend(reach, UPPER_ARM * height_m, FOREARM * height_m, hinge, -1.0)
     return Arm(upper, fore, fore)
 
 
 def roll_about_toe(pitch: Array, height_m: float) -> Array:
-    """How the ankle moves (n, 3) [m] where a foot that heads +x lifts its heel by ``pitch`` (n,) [rad], the toe fixed."""
+    """Displacement of the ankle (n, 3) [m] where a foot along +x lifts its heel by a pitch [rad].
+
+    The toe stays where it is.
+    """
     return height_m * np.stack(
         [
             TOE_X * (1 - np.cos(pitch)) + (ANKLE - TOE_HEIGHT) * np.sin(pitch),
@@ -173,7 +180,7 @@ def roll_about_toe(pitch: Array, height_m: float) -> Array:
 
 
 def lowering(pose: Pose, height_m: float) -> float:
-    """How far the root must come down for both legs to reach their ankles at all these times [m]."""
+    """Distance by which the root must come down for both legs to reach their ankles always [m]."""
     bones = offsets(height_m)
     leg = (THIGH + SHANK) * height_m * MAXIMUM_REACH
     worst = 0.0

@@ -43,7 +43,7 @@ _TURN_STEPS = 4
 
 @dataclass(frozen=True)
 class Step:
-    """One footprint: side, landing time, place of the body's middle over it (2,) [m], heading [rad], advance / step length."""
+    """One footprint: side, landing time, body's position (2,) [m], heading [rad], relative step."""
 
     side: str
     time: float
@@ -53,7 +53,7 @@ class Step:
 
 
 def footprints(traits: Traits, duration_s: float) -> list[Step]:
-    """Steps that cover [0, duration_s] and more than a cycle on both sides; straight, or there and back."""
+    """Make steps from more than a cycle before 0 to more than a cycle after ``duration_s``."""
     half_cycle = traits.cycle_s / 2
     step_m = traits.step_m
     straight = step_m / half_cycle * duration_s <= STRAIGHT_M
@@ -84,7 +84,7 @@ def _other(side: str) -> str:
 
 
 def _rolled(pitch: Array, height_m: float) -> Array:
-    """Ankle over the middle of its footprint (n, 3), heading +x: rolling about the toe, heel up; about the heel, toes up."""
+    """Ankle over its footprint (n, 3), heading +x, as the foot rolls about the toe or the heel."""
     toes_up = np.minimum(pitch, 0.0)
     about_heel = height_m * np.stack(
         [
@@ -102,7 +102,7 @@ def _rolled(pitch: Array, height_m: float) -> Array:
 
 
 def _foot(own: list[Step], traits: Traits) -> Callable[[Array], tuple[Array, Array, Array]]:
-    """Ankle (n, 3), pitch (n,; toes down is positive) and yaw (n,) at times (n,) of one foot that steps on its own footprints."""
+    """Ankle (n, 3), pitch (n,), positive with toes down, and yaw (n,) of one foot at times (n,)."""
     cycle, height = traits.cycle_s, traits.height_m
     sign = SIDES[own[0].side]
     keys: list[tuple[float, float]] = []
@@ -185,7 +185,7 @@ def walk(duration_s: float, traits: Traits) -> PosesAt:
 
 @dataclass(frozen=True)
 class _Course:
-    """Where a walk goes, as functions of time: the root's way over the floor, heading, length of the steps, feet."""
+    """The path of a walk over time: the root on the floor, the heading, step lengths, and feet."""
 
     path: Callable[[Array], Array]
     heading: Callable[[Array], Array]

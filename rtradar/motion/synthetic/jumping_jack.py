@@ -1,4 +1,4 @@
-"""Synthetic jumping jacks: every flight a parabola, every contact a quintic that catches and throws the body."""
+"""Synthetic jumping jacks: each flight is a parabola, each contact a quintic between flights."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from rtradar.motion.synthetic.traits import Traits
 
 GRAVITY_MPS2 = 9.81
 HOP_S = 0.53
-"""From take-off to take-off: a jack, two hops, takes about as long as those of CMU 13 and 14 (1.1 s)."""
+"""Time from take-off to take-off [s]; a jack of two hops lasts 1.1 s in CMU 13 and 14."""
 
 FLIGHT_S = 0.22
 ROLL = 0.29
@@ -52,7 +52,8 @@ class _Flight:
 def _sets(traits: Traits, until_s: float) -> list[list[_Flight]]:
     """Sets of flights; each set begins and ends standing."""
     hop = HOP_S / traits.tempo
-    # A hop of the same height takes as long at any tempo; only where contact would get too short it must be lower.
+    # A hop of the same height takes as long at any tempo; only where contact would get too short it
+    # must be lower.
     flight = min(FLIGHT_S * math.sqrt(traits.amplitude), 0.55 * hop)
     begin = 0.15 + 0.3 * traits.phase
     sets: list[list[_Flight]] = []
@@ -108,14 +109,15 @@ def jumping_jack(duration_s: float, traits: Traits) -> PosesAt:
 def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = traits.height_m, traits.amplitude
     hop_s = HOP_S / traits.tempo
-    # Who jumps has stood still before the first hop of a set, and does after the last: further sets do not matter.
+    # Who jumps has stood still before the first hop of a set, and does after the last: further sets
+    # do not matter.
     sets = [
         hops for hops in all_sets if hops[0].begin - hop_s < t[-1] and hops[-1].end + hop_s > t[0]
     ]
     hops = [hop for hops in sets for hop in hops]
 
     def between(values: tuple[float, float], lead: float, lag: float) -> Array:
-        """From the first value (feet together) to the second (apart) and back, around every flight."""
+        """Move from the first value (feet together) to the second (apart) and back in flights."""
         if not hops:
             return np.full(len(t), values[0])
         times = [time for hop in hops for time in (hop.begin - lead, hop.end + lag)]
@@ -126,7 +128,8 @@ def _jump(traits: Traits, all_sets: list[list[_Flight]], t: Array) -> Pose:
     close, wide = 0.9 * HIP_Y * height, (HIP_Y + 0.10 * amplitude) * height
     # The feet move sideways while they are well off the floor.
     apart = between((0.0, 1.0), -0.12 * FLIGHT_S, -0.12 * FLIGHT_S)
-    # Heels lift before take-off and come down after landing, so that the legs need not be straight there.
+    # Heels lift before take-off and come down after landing, so that the legs need not be straight
+    # there.
     contact = hop_s - (all_sets[0][0].end - all_sets[0][0].begin) if all_sets else hop_s - FLIGHT_S
     roll_s = ROLL * contact
     lift, roll = np.zeros(len(t)), np.zeros(len(t))

@@ -30,7 +30,7 @@ from rtradar.motion.synthetic.traits import Traits
 
 
 def repeated(t: Array, traits: Traits, period_s: float, first_s: float) -> Array:
-    """Time since the begin of the repetition that runs at each time (n,), at the nominal tempo [s]; below 0 before the first."""
+    """Time since the current repetition began (n,), at nominal tempo [s]; negative before it."""
     own = (t - first_s * (0.5 + traits.phase)) * traits.tempo
     return np.where(own < 0, own, np.mod(own, period_s))
 
@@ -50,7 +50,7 @@ def kick(duration_s: float, traits: Traits) -> PosesAt:
 
 
 def _kick(traits: Traits, t: Array) -> Pose:
-    """The leg is led by its joint angles in the air (chamber, snap, chamber) and by its footprint on the floor."""
+    """Kick with a leg led by joint angles in the air and by its footprint on the floor."""
     height, kicker, other = traits.height_m, traits.side, traits.other
     clock = repeated(t, traits, KICK_PERIOD_S, 0.25)
     # A low kick needs nearly as high a knee, or the foot would scrape the floor.

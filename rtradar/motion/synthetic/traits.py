@@ -40,7 +40,7 @@ class Traits:
 
     @property
     def cycle_s(self) -> float:
-        """Two steps of a walk [s]: 1.1 s at 1.75 m height, and pendulums go with the root of their length."""
+        """Duration of two steps [s], 1.1 s at 1.75 m; it grows with the root of the height."""
         return 1.1 * math.sqrt(self.height_m / 1.75) / self.tempo
 
     @property
@@ -67,7 +67,7 @@ class Traits:
 def draw_traits(
     rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float
 ) -> Traits:
-    """A subject: 3 % of spread (normal, cut at two sigma) on tempo, amplitude and each side, any phase."""
+    """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
     spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
     return Traits(
         height_m=height_m,

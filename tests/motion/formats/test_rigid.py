@@ -7,7 +7,7 @@ import pytest
 
 from rtradar.errors import InputError
 from rtradar.motion.formats.rigid import rigid_motion
-from rtradar.motion.quaternions import rotate
+from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton_names import NODE_PARENT, NODES
 
 FRAMES = 200
@@ -70,7 +70,7 @@ def test_lengths_are_the_median() -> None:
         np.linalg.norm(motion.offsets[head]), np.linalg.norm(joints[100, head] - joints[100, neck])
     )
     np.testing.assert_allclose(
-        rotate(motion.rotations[:, head], motion.offsets[head]),
+        quaternion_rotate(motion.rotations[:, head], motion.offsets[head]),
         (motion.positions[:, head] - motion.positions[:, neck]),
     )
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
-from rtradar.motion.quaternions import rotate
+from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton_names import NODES
 from rtradar.motion.synthetic.curves import bump, hermite, keyed, smooth
 from rtradar.motion.synthetic.figure import ANKLE, HEEL_X, TOE_HEIGHT, bend
@@ -63,7 +63,7 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
     toes = motion.positions[:, [NODE("l_toe"), NODE("r_toe")]]
     feet = motion.rotations[:, [NODE("l_toe"), NODE("r_toe")]]
     ankles = motion.positions[:, [NODE("l_ankle"), NODE("r_ankle")]]
-    heels = ankles + rotate(feet, height * np.array([HEEL_X, 0.0, -ANKLE]))
+    heels = ankles + quaternion_rotate(feet, height * np.array([HEEL_X, 0.0, -ANKLE]))
     carried = []
     for points, level in ((toes, TOE_HEIGHT * height), (heels, 0.0)):
         # On the floor (to 0.01 mm, in both frames) it stands still: what still moves there is about to lift or just landed.
