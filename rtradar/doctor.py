@@ -48,7 +48,7 @@ class DoctorReport:
     cores : int
         Cores that this process may use.
     memory_total_mb, memory_available_mb : float or None
-        Of the machine [MiB]; None where the system does not tell.
+        Memory of the machine [MiB]; None where the system does not report it.
     packages : dict
         Version of each of `PACKAGES`; None where it is not installed.
     llvm : list of dict

@@ -55,7 +55,7 @@ class Work:
     chirps, rx, samples : int
         Shape of its IF.
     echoes : int
-        Of one chirp and receiver.
+        Number of echoes of one chirp at one receiver.
     windows, cycles, channels : int
         Processing windows, TDM cycles in each, virtual channels.
     detections : int
@@ -134,7 +134,7 @@ def floors(work: Work, rates: Rates) -> dict[str, Floor]:
     ----------
     work : Work
     rates : Rates
-        Of the radar that did it.
+        Rates of this machine for the transforms of the radar that was run.
 
     Returns
     -------

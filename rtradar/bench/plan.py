@@ -33,13 +33,13 @@ class Plan:
     fidelities : tuple of str
         Models.
     repeats : int
-        Of everything but first use.
+        Number of runs of everything except the first use.
     duration_s : float
-        Of the capture [s].
+        Length of the capture [s].
     quick : bool
         Shorter growth, and a part of a frame of the baseline.
     parts : tuple of str
-        Of `PARTS`.
+        Names from `PARTS` that are measured.
 
     Raises
     ------

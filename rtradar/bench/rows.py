@@ -37,7 +37,7 @@ def model_row(
     cheapest : list of Run, optional
         The runs of `CHEAPEST` with the same radar, in the same order.
     rates : Rates
-        Of this machine, with the lengths of the radar's transforms.
+        Rates of this machine, measured with the lengths of the radar's transforms.
     baseline : Baseline, optional
         The paper's method, of the same radar.
     """

@@ -269,9 +269,9 @@ def clutter_removal(
     radar : Radar
         Gives the schedule and the shape.
     time_constant_s : float, optional
-        Of ``exponential`` [s]; 1 s if left out.
+        Time constant of ``exponential`` [s]; 1 s if left out.
     pulses : {2, 3}, optional
-        Of ``mti``; 2 if left out.
+        Number of pulses of the canceller ``mti``; 2 if left out.
 
     Returns
     -------

@@ -41,7 +41,7 @@ def range_time(
     Returns
     -------
     power : (slow_time, range) float32 or float64
-        In the unit of the squared IF.
+        Power of each range bin, in the unit of the squared IF.
     slow_time : (slow_time,) float64
         Centre of each average since the start of the capture [s].
 

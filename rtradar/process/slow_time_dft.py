@@ -39,8 +39,8 @@ class SlowTimeDft(NamedTuple):
     cycle_at, bin_at : (place,) int64
         Which cycle stands at each place of the grid (first, second) of the factors, and which Doppler bin afterwards.
     cosines, sines : pair of (frequency, term) float32
-        Of each factor: frequencies and terms that have a mirror image, 1 to below half of it; filled up with zeros to multiples
-        of `_TOGETHER`.
+        Tables of each factor: frequencies and terms that have a mirror image, 1 to below half of
+        it; filled up with zeros to multiples of `_TOGETHER`.
     factors : pair of int
     """
 
@@ -120,9 +120,9 @@ def add_doppler_power(
     channels : range
         Which of them, in steps of one.
     weights : (cycle,) float32
-        Of the cycles.
+        Window weights of the cycles.
     dft : SlowTimeDft
-        Of as many cycles.
+        Transform of as many cycles.
     power : (doppler, range) float32
         Added to, in the order of the DFT.
     """

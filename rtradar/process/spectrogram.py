@@ -54,7 +54,7 @@ class Spectrogram:
     Parameters
     ----------
     power : (time, velocity) float32 or float64
-        Of the range bins together, in the unit of the squared IF; coherent gain 1 in a bin.
+        Power of the range bins together, in the unit of the squared IF; coherent gain 1 in a bin.
     time : (time,) float64
         Where each window has its middle and greatest weight [s since the start of the capture].
     velocity : (velocity,) float64

@@ -32,7 +32,7 @@ def receive(
     Parameters
     ----------
     samples : (chirp, rx, sample) complex
-        Of each Tx alone, from `synthesize`: whole cycles.
+        IF samples of each Tx alone, from `synthesize`: whole cycles.
     radar : Radar
     first_chirp : int
         Number of the first in the capture.
@@ -60,7 +60,7 @@ def separate(
         As `receive` gives it, noise added.
     radar : Radar
     first_chirp : int
-        As of `receive`.
+        Index of the first chirp of the block in the capture, see `receive`.
 
     Returns
     -------

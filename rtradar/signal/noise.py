@@ -24,7 +24,7 @@ class Noise:
     Parameters
     ----------
     power : float
-        Of one complex sample [m^2]; 0 is none.
+        Mean noise power of one complex sample [m^2]; 0 is no noise.
     seed : int
         The same seed, the same noise.
 
@@ -47,7 +47,8 @@ class Noise:
         Parameters
         ----------
         signal_power : float
-            Of the person's visible echoes: sum of ``|amplitude|^2``, averaged over the capture [m^2].
+            Power of the person's visible echoes, the capture average of the sum of
+            ``|amplitude|^2`` [m^2].
         snr_db : float
             [dB].
         seed : int

@@ -67,7 +67,7 @@ def spread_sum(
     start_frequency, slope, sample_rate : float
         [Hz], [Hz/s], [Hz].
     out : (chirp, rx, sample) complex64
-        Of `LEAST_SAMPLES` or more.
+        IF samples, overwritten; each chirp has `LEAST_SAMPLES` or more [m].
     """
     chirps, receivers, samples = out.shape
     cells, half = fft.next_fast_len(2 * samples), samples // 2

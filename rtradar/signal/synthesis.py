@@ -67,15 +67,17 @@ def synthesize(
     Parameters
     ----------
     echoes : Echoes
-        Of this block. Those whose beat frequency lies outside [0, sample rate) are left out, see `in_band`.
+        Echoes of this block. Those whose beat frequency lies outside [0, sample rate) are left out,
+        see `in_band`.
     radar : Radar
         Its waveform.
     times : (chirp,) array_like
         Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
-        Of the samples. Phases are float64 in both. For complex64, samples are added up in float32, to 1e-6 of the sum of the
-        magnitudes: by `spread_sum` of many echoes and 16 samples or more, with at most 6 frequencies, else where amplitudes are
-        given at 3 frequencies at most.
+        Type of the samples. Phases are float64 in both. For complex64, samples are added up in
+        float32, to 1e-6 of the sum of the magnitudes: by `spread_sum` of many echoes and 16 samples
+        or more, with at most 6 frequencies, else where amplitudes are given at 3 frequencies at
+        most.
     out : (chirp, rx, sample) complex, optional
         Array of that type to fill, C-contiguous; otherwise a new one is made.
 

@@ -31,7 +31,7 @@ class Outcome:
     rows : list of Row
         Those asked for; empty where it did not finish.
     seconds, cpu_seconds : float
-        By the clock, and of all cores.
+        Elapsed time, and CPU time of all cores [s].
     trouble : str
         Why it did not finish, in one line; empty where it did.
     """

@@ -39,7 +39,7 @@ def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     Parameters
     ----------
     spectra : AngleSpectra
-        Of the detected cells of one window.
+        Angle spectra of the detected cells of one window.
     radar : Radar
 
     Returns
@@ -72,7 +72,7 @@ def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
     Parameters
     ----------
     spectra : AngleSpectra
-        Of the detected cells of one window.
+        Angle spectra of the detected cells of one window.
     radar : Radar
 
     Returns

@@ -191,8 +191,8 @@ def angle(
     Returns
     -------
     azimuth, elevation : float
-        In the radar's frame [rad], within its unambiguous angle; NaN where the radar has no line for it. Without a line along z
-        azimuth is the cone angle asin(y / r).
+        Angles in the radar's frame [rad], within its unambiguous angle; NaN where the radar has no
+        line for it. Without a line along z azimuth is the cone angle asin(y / r).
 
     Raises
     ------

@@ -229,7 +229,7 @@ def steering(
         Ranges of the points, whose echoes are looked for in the bin nearest to half their path over each element; None for
         a plane wave, looked for in the bin of the cell alone (the far-field FFT): one entry, for all bins.
     taper : {"uniform", "taylor"}
-        As in `taper_weights`.
+        Weighting of the antennas along the line, see `taper_weights`.
     """
     line = virtual_lines(radar)[axis - 1]
     if line is None:

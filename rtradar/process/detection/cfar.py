@@ -48,7 +48,7 @@ def os_cfar(
     guard, train : int
         Width of the guard and of the training band [cells].
     quantile : float
-        In (0, 1].
+        Rank of the training cell that estimates the noise, as a fraction in (0, 1].
     pfa : float
         False-alarm rate for independent cells, in (0, 1); `os_scale` turns it into the multiplier.
     looks : int

@@ -52,7 +52,7 @@ def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float
     n_train : int
         Training cells N.
     quantile : float
-        In (0, 1]; the rank is ceil(quantile N).
+        Rank of the order statistic as a fraction in (0, 1]; the rank is ceil(quantile N).
     pfa : float
         Asked false-alarm rate, in (0, 1).
     looks : int

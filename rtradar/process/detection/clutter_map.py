@@ -51,7 +51,7 @@ class ClutterMap:
     radar : Radar
         Gives the windows and what they share.
     time_constant_s : float
-        Of forgetting [s].
+        Time constant of the exponential average [s].
     pfa : float
         False-alarm rate in white noise, in (0, 1). It holds from the first window on that is tested. Where a cell holds a
         steady echo as well, its power scatters less and alarms are fewer.
@@ -175,7 +175,7 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     Parameters
     ----------
     weights : (window,) float
-        Of each cell, at least 0; n times 1/n is cell averaging, `ca_scale`.
+        Weight of each cell, at least 0; n times 1/n is cell averaging, `ca_scale`.
     pfa : float
         Asked false-alarm rate, in (0, 1).
     looks : int

@@ -51,7 +51,7 @@ def rough_returns(
     radar : Radar
     scene : Scene
     tracer : RoomTracer
-        Of its furniture, which hides points.
+        Tracer of the room's furniture, which may occlude points.
     seed : int
         Together with the wall and the face it fixes places and phases.
 

@@ -66,7 +66,7 @@ class PathGroups:
     Parameters
     ----------
     places : (facet, 4, 3) float64
-        Of the piece [m].
+        Positions of the corners of the object's facets [m].
     radar : Radar
     order : int
         Bounces.

@@ -33,13 +33,14 @@ class RoomEchoes:
     Parameters
     ----------
     name : str
-        Of the wall, the walls in the order of their reflections, or the piece of furniture.
+        Name of the wall, of the walls in the order of their reflections, or of the piece of
+        furniture.
     kind : {"mirror", "furniture", "reflector", "rough"}
         Reflection by walls; facets of furniture; sheets of metal with several bounces; diffuse return of a rough wall.
     length : (tx, rx, echo) float64
         Tx..Rx [m], rx as kept with that Tx.
     amplitude : (node, tx, rx, echo) complex128
-        As of `Echoes` [m].
+        Scattering lengths, defined as in `Echoes` [m].
     frequency : (node,) float64
         [Hz].
     bounces : (echo,) int64

@@ -59,7 +59,7 @@ def mirror_returns(
     radar : Radar
     scene : Scene
     tracer : RoomTracer
-        Of its furniture, which hides legs.
+        Tracer of the room's furniture, which may occlude legs.
     order : int
         The most walls of a path.
 
@@ -102,7 +102,7 @@ def specular_points(
     Returns
     -------
     points : (..., hop, 3) float64
-        Of reflection [m]; NaN where there is no path.
+        Points of reflection [m]; NaN where there is no path.
     ways : (..., hop + 1, 3) float64
         Unit vectors of the legs.
     length : (...) float64

@@ -39,7 +39,7 @@ class ClutterItem:
     Parameters
     ----------
     name : str
-        Of the wall, the walls in the order of reflection, or the piece of furniture.
+        Name of the wall, of the walls in the order of reflection, or of the piece of furniture.
     kind : {"mirror", "furniture", "reflector", "rough"}
     bounces : int
         The most.
@@ -74,7 +74,7 @@ class Clutter:
     spreading : bool
         Must be True where there is anything to reflect: a mirror without spreading has no meaning.
     seed : int
-        Of places and phases of diffuse returns.
+        Seed of the positions and phases of diffuse returns.
     order : int
         The most walls of a mirrored path, 0 to 3.
 

@@ -101,7 +101,7 @@ def material_factor(
     to_tx, to_rx : (..., 3) float64
         Ways from the specular point to the antennas, of any length.
     eta : (node,) complex128
-        Of the body.
+        Relative complex permittivity of the body at each frequency node.
     polarization : {"v", "h"}
 
     Returns

@@ -39,7 +39,7 @@ def interpolation_weights(nodes: Array, places: Array) -> Array:
     nodes : (node,) float64
         All different, in any unit.
     places : (place,) float64
-        In the same unit.
+        Positions at which to interpolate, in the unit of the nodes.
 
     Returns
     -------

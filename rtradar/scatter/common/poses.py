@@ -103,9 +103,9 @@ def one_echo_a_part(
     tx : (chirp,) int64
         Which Tx each chirp is from.
     length : (chirp, rx, part) float64
-        Of the path from Tx to Rx [m].
+        Length of the path from Tx to Rx [m].
     amplitude : (chirp, rx, part) float64 or complex128
-        As of `Echoes` [m].
+        Scattering length, defined as in `Echoes` [m].
     frequency_hz : float
         That the amplitudes are for.
 

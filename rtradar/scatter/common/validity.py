@@ -35,9 +35,9 @@ def warn_of_small_radii(
     wavenumber : (n,) float64
         [1/m].
     amplitude : (n, part) float64
-        Of each part's echo; only its size against that of the others counts.
+        Amplitude of each part's echo; only its ratio to the others counts.
     stacklevel : int
-        As of `warnings.warn`, counted from the caller.
+        Stack level of the warning, counted from the caller; see `warnings.warn`.
 
     Warns
     -----

@@ -224,11 +224,11 @@ def facet_integral(
     Parameters
     ----------
     facets : Facets
-        In the axes of their parts.
+        Facets of the parts, in the axes of their parts.
     part : (task,) int
         One task is one part in one pose.
     antennas : (task, antenna, 3) float64
-        In the axes of that part [m].
+        Antenna positions in the axes of that part [m].
     row : (task, antenna) int
         Where in ``seen`` that antenna's view of that part stands.
     seen : (row, facet) float32

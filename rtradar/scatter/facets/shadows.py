@@ -145,9 +145,9 @@ class FacetShadows:
     Parameters
     ----------
     tracer : FacetTracer
-        Of the same body.
+        Tracer of the same body.
     facets : Facets
-        Of ellipsoids with these semi-axes.
+        Facets of ellipsoids with these semi-axes.
     semi_axes : (part, 3) float64
         [m].
     """

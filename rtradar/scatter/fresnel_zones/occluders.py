@@ -67,7 +67,7 @@ class TracedHiders:
     radar : Radar
     body : Body
     tracer : BodyTracer
-        Of the same body.
+        Tracer of the same body.
     shadow_rays : int
         Points on each part that are traced.
     """

@@ -170,7 +170,7 @@ class Analytic:
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     material : {"perfect-conductor", "skin"}
-        Of the body.
+        Material of the body's surface.
 
     Raises
     ------

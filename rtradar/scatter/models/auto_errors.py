@@ -71,7 +71,7 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     ----------
     radar : Radar
     poses : Poses
-        Of the body at the instants looked at.
+        Poses of the body at the instants to evaluate.
     spreading : bool
         Whether powers hold 1 / (R1 R2)^2.
 

@@ -122,7 +122,7 @@ def fresnel_scattering(
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     shadow_rays : int
-        As of `Fresnel`.
+        Number of points on each part that are traced, see `Fresnel`.
 
     Returns
     -------

@@ -28,7 +28,7 @@ class Specular:
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     material : {"perfect-conductor", "skin"}
-        Of the body.
+        Material of the body's surface.
 
     Raises
     ------

@@ -87,7 +87,8 @@ def path_anchors(
     ends : ArrayEnds
     paths : sequence of WallPath
     path, part : (echo,) int64
-        Of each echo. Whether other parts hide a direct one is left to `MirrorVisibility`.
+        Path and part of each echo. `MirrorVisibility` decides whether other parts occlude a direct
+        one.
     terms : PathTerms
         Gets the columns that are met for the first time.
     poses : Poses

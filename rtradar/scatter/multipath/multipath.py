@@ -66,7 +66,7 @@ class Multipath:
     fidelity : {"specular", "analytic"}
         Model of the body.
     material : {"perfect-conductor", "skin"}
-        Of the body.
+        Material of the body's surface.
 
     Attributes
     ----------
@@ -294,7 +294,7 @@ class Multipath:
         Parameters
         ----------
         n_chirps : int
-            Of the capture; one every 20 ms is looked at.
+            Number of chirps of the capture; one every 20 ms is evaluated.
         noise_power_m2 : float
             Per IF sample; 0 leaves out only what is never seen. Left out is an echo whose mean power over the capture, after
             the gain of adding up the samples, cycles and channels of a frame, is more than `MARGIN_DB` below the noise. Windows,

@@ -26,7 +26,7 @@ class PathAccount:
     order : int
         Reflections at walls.
     power_m2 : float
-        Of all parts, averaged over rx and one chirp every 20 ms.
+        Echo power of all parts, averaged over rx and one chirp every 20 ms [m^2].
     over_noise_db : float or None
         The same over noise, after the gain of samples, cycles and channels; None without noise or without an echo.
     kept, dropped : tuple of str

@@ -33,7 +33,7 @@ class PathTerms:
     radar : Radar
     scene : Scene
     series : sequence of WallSeries
-        Of its walls.
+        Slab series of the room's walls.
     paths : sequence of WallPath
     path : (echo,) int64
         Path of each echo.

@@ -45,7 +45,7 @@ class Term:
     rest : bool
         Whether all later terms are in it.
     index_squared : float
-        Of refraction, for the delay that is taken out of it; 0 where none is.
+        Squared index of refraction for the delay that is taken out; 0 where none is.
     """
 
     passes: int
@@ -116,7 +116,7 @@ def room_series(
     walls : sequence of Wall
     radar : Radar
     most_nodes : int
-        Of the polynomial over the sweep.
+        Largest number of nodes of the polynomial over the sweep.
     enough : float
         What the polynomial may be off by, of the rms of the coefficient over the sweep: of the stronger of both polarisations.
     bounces : int

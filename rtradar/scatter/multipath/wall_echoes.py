@@ -26,7 +26,7 @@ class WallEchoes:
     ----------
     radar : Radar
     paths : sequence of WallPath
-        Of which the echoes may be.
+        Paths that the echoes may follow.
     far_field : bool
         Whether the formula of the model `analytic` is taken.
     """

@@ -184,11 +184,11 @@ def reflected(
     ----------
     scene : Scene
     series : sequence of WallSeries
-        Of all its walls.
+        Slab series of all walls of the room.
     number : int
-        Of the wall that reflects.
+        Index of the wall that reflects.
     piece : int
-        Of the way that comes after.
+        Index of the leg that follows the reflection.
     waves : list of Wave
     directions : (..., 3) float64
         Unit vectors along which they arrive.
@@ -226,9 +226,9 @@ def through_walls(
     ----------
     scene : Scene
     series : sequence of WallSeries
-        Of all its walls.
+        Slab series of all walls of the room.
     piece : int
-        Of the way, for the passages.
+        Index of the leg, which selects the walls that it passes.
     waves : list of Wave
     origins, targets : (..., 3) float64
         Ends of the legs, world [m]; they broadcast to the shape of the waves. A leg that ends on a face of a wall does not

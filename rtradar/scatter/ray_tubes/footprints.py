@@ -107,7 +107,7 @@ def radiate(
     length : (rx, group) float64
         Path whose phase is taken out [m].
     polarization : {"v", "h"}
-        Of the Rx.
+        Polarization of the receiving antennas.
     spreading : bool
         Whether the last leg's 1 / R2 is in.
     tapered : bool

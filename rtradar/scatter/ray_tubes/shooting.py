@@ -63,7 +63,7 @@ class Shooter:
     wavenumber : float
         The largest that the footprints have to serve [1/m].
     polarization : {"v", "h"}
-        Of the Tx.
+        Polarization of the transmitting antenna.
     spreading : bool
         Whether the first leg's 1 / R1 is in the field.
     two_sided : bool

@@ -110,7 +110,7 @@ class MirrorVisibility:
     radar : Radar
     body : Body
     tracer : BodyTracer
-        Of the same body.
+        Tracer of the same body.
     """
 
     def __init__(self, radar: Radar, body: Body, tracer: BodyTracer) -> None:
