@@ -58,7 +58,7 @@ class Poses(NamedTuple):
     Attributes
     ----------
     centres : (time, part, 3) float64
-        World [m].
+        Centres of the ellipsoids, world [m].
     frames : (time, part, 3, 3) float64
         Proper rotations; the columns are the directions of the semi-axes, the third along the bone.
     semi_axes : (part, 3) float64
@@ -115,7 +115,7 @@ class Body:
         Parameters
         ----------
         motion : Motion
-            Of any skeleton that `rtradar.motion.retarget.to_nodes` understands; its ``girth``
+            Motion of any known kind of skeleton (`rtradar.motion.retarget.to_nodes`); its ``girth``
             multiplies the radii.
 
         Returns

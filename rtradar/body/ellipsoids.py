@@ -20,12 +20,12 @@ class Ellipsoids:
     Parameters
     ----------
     centres : (part, 3) float64
-        World [m].
+        Centres, world [m].
     frames : (part, 3, 3) float64
         Proper rotations: world = centre + frame @ local, so the COLUMNS are the directions of the
         semi-axes.
     semi_axes : (part, 3) float64
-        a, b, c [m].
+        Lengths a, b, c of the semi-axes [m].
 
     Raises
     ------

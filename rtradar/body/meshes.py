@@ -70,12 +70,12 @@ def ellipsoid_meshes(
     ellipsoids : Ellipsoids
         One pose.
     subdivisions : int
-        Of the icosphere they are made of.
+        Subdivisions of the icosphere that each part is made from.
 
     Returns
     -------
     vertices : (part, vertex, 3) float64
-        World [m].
+        Positions of the vertices, world [m].
     faces : (face, 3) int64
         Anticlockwise seen from outside, the same for every part.
     """

@@ -61,7 +61,7 @@ def ellipsoid_radii(
     Parameters
     ----------
     a, b, c, theta, phi : array_like
-        As in `ellipsoid`.
+        Arguments of `ellipsoid`.
 
     Returns
     -------

@@ -21,9 +21,9 @@ def sphere(
     Parameters
     ----------
     radius : array_like
-        [m]; broadcasts with ``frequency``.
+        Radius [m]; broadcasts with ``frequency``.
     frequency : array_like
-        [Hz].
+        Frequency [Hz].
     method : {"go", "po", "mie"}
         Geometric optics: sqrt(pi) a exp(2jka). Physical optics: the closed form of its integral
         over the lit half. Mie: the exact series.

@@ -41,10 +41,10 @@ class Skeleton:
     Parameters
     ----------
     path : Path
-        Where it came from, for messages.
+        File that error messages name.
     bones : tuple of Bone
     unit_m : float
-        Metres in one length unit.
+        Length unit of the file [m].
     degrees : bool
         Whether angles, here and in the AMC unless that says otherwise, are degrees.
     """

@@ -40,18 +40,18 @@ _SHANK_M = (0.2, 0.7)
 
 @dataclass(frozen=True)
 class Markers:
-    """What a C3D file holds of the markers that are asked for.
+    """Recorded positions of some markers of a C3D file.
 
     Parameters
     ----------
     path : Path
-        Where it came from, for messages.
+        File that error messages name.
     names : tuple of str
-        In upper case, without the subject's prefix.
+        Names of the markers in upper case, without the subject's prefix.
     positions : (frame, marker, 3) float64
-        World [m]; NaN where the marker was not seen.
+        Positions, world [m]; NaN where the marker was not seen.
     rate_hz : float
-        Frames per second.
+        Number of frames per second [Hz].
     first_frame : int
         Number that the file gives its first frame.
     says_up : bool

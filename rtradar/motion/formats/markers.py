@@ -36,16 +36,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Centre:
-    """Where a joint's centre is, of its markers.
+    """Position of a joint's centre relative to its markers.
 
     Parameters
     ----------
     markers : tuple of str
         Their mean is where the offset begins; ``@`` stands for the side, L or R.
     segment : str
-        Whose axes the offset has.
+        Name of the segment in whose axes the offset is given.
     offset_m : tuple of float
-        Forward, left (on the right side: right), up.
+        Offset forward, to the left (on the right side: to the right), and up [m].
     """
 
     markers: tuple[str, ...]
@@ -97,17 +97,17 @@ A straight arm has no such plane of its own."""
 
 
 def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
-    """The 22 nodes, and how pelvis and chest stand.
+    """Find the 22 nodes, and the orientations of pelvis and chest.
 
     Parameters
     ----------
     markers : mapping of str to (frame, 3) float64
-        World [m]; all of `NEEDED`.
+        Positions of all markers of `NEEDED`, world [m].
 
     Returns
     -------
     centres : (frame, node, 3) float64
-        World [m].
+        Positions of the nodes, world [m].
     pelvis, thorax : (frame, 3, 3) float64
         Rotations; the columns point forward, left and up.
     """

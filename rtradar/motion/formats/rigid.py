@@ -1,4 +1,4 @@
-"""From joints that were measured one by one to the rigid skeleton that comes nearest to them."""
+"""From joints that were measured one by one to the nearest rigid skeleton."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def rigid_motion(
     thorax: NDArray[np.float64],
     rate_hz: float,
 ) -> Motion:
-    """Bones of constant length that point as the joints do.
+    """Make the motion of a rigid skeleton whose bones point as the joints do.
 
     A bone is as long as its joints are apart in the median, and points from one to the other in
     every frame. Joints say nothing of how a bone is turned about itself: seen from pelvis or chest
@@ -44,13 +44,13 @@ def rigid_motion(
     Parameters
     ----------
     name : str
-        Of the motion.
+        Name of the motion.
     centres : (frame, node, 3) float64
-        The 22 nodes, world [m].
+        Positions of the 22 nodes, world [m].
     pelvis, thorax : (frame, 3, 3) float64
-        How pelvis and chest stand: rotations.
+        Orientations of pelvis and chest, as rotation matrices.
     rate_hz : float
-        Frames per second.
+        Number of frames per second [Hz].
 
     Raises
     ------

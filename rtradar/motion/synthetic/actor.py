@@ -25,7 +25,7 @@ ACTIVITIES: Mapping[str, Callable[[float, Traits], PosesAt]] = {
     "punch": punch,
     "jumping_jack": jumping_jack,
 }
-"""What the actors can do."""
+"""Activities of the actors, by name."""
 
 _RANGES = {
     "duration_s": (0.0, 3600.0),
@@ -50,7 +50,7 @@ def synthetic_motion(
     rate_hz: float = 120.0,
     take: int = 0,
 ) -> Motion:
-    """A synthetic actor that faces the radar (-x), on the floor z = 0.
+    """Make a synthetic actor that faces the radar (-x), on the floor z = 0.
 
     Joints move along minimum-jerk and harmonic curves (C2), feet stand still while they carry and
     never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
@@ -59,29 +59,32 @@ def synthetic_motion(
     Parameters
     ----------
     activity : {"walk", "kick", "punch", "jumping_jack"}
+        Activity of the person.
     seed : int
-        The subject: phase, and a few percent of tempo, amplitude and unevenness of the sides.
+        Number of the subject, which has its own phase, and a few percent of tempo, amplitude and
+        unevenness of the sides.
     duration_s : float
+        Duration [s].
     height_m : float
-        Standing height; segment lengths by Drillis and Contini (see
+        Standing height [m]; segment lengths by Drillis and Contini (see
         `rtradar.motion.synthetic.figure`).
     build : float
         Thickness relative to a normal person of that height.
     tempo : float
         Speed of the movement; 1 is a walk of about 1.2 m/s.
     side : {"left", "right"}
-        The leg or hand that strikes; the foot that steps first.
+        Side of the leg or hand that strikes, or of the foot that steps first.
     amplitude : float
-        Step length, kick height, reach, width of the jumps.
+        Factor of step length, kick height, reach and width of the jumps.
     rate_hz : float
-        Frames per second of the result.
+        Number of frames per second of the result [Hz].
     take : int
-        Another one of the same subject begins elsewhere in the movement.
+        Number of the take; another take of the same subject begins elsewhere in the movement.
 
     Returns
     -------
     Motion
-        Of ``duration_s`` at ``rate_hz``, world axes, not yet placed before a radar.
+        Motion of ``duration_s`` at ``rate_hz`` in world axes, not yet placed before a radar.
 
     Raises
     ------

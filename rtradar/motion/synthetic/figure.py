@@ -49,23 +49,24 @@ class Arm:
 
 @dataclass(frozen=True, kw_only=True)
 class Pose:
-    """All that moves, at n times, facing +x.
+    """Pose of the figure at n times, facing +x.
 
     Parameters
     ----------
     root : (n, 3) float64
-        [m].
+        Position of the root [m].
     pelvis, thorax, head : Rotation
-        World, n each.
+        Orientations in world axes, n each.
     ankles : mapping of side to (n, 3) float64
-        Where the ankles shall be [m]; knees follow.
+        Target positions of the ankles [m]; the knees follow.
     feet : mapping of side to Rotation
-        World.
+        Orientations of the feet in world axes.
     left : (n, 3) float64
         Axis about which the knees bend, roughly; to the left.
     arms : mapping of side to Arm
+        Rotations of the bones of the arms.
     shrug : (n,) float64
-        Both shoulders up [rad].
+        Angle by which both shoulders are raised [rad].
     """
 
     root: Array
@@ -123,9 +124,10 @@ def bend(
     Parameters
     ----------
     reach : (n, 3) float64
-        From the upper joint to where the lower end shall be; shortened where it is out of reach.
+        Vector from the upper joint to the target of the lower end; shortened where it is too long
+        [m].
     first, second : float
-        Lengths [m].
+        Lengths of the two bones [m].
     hinge : (n, 3) float64
         Axis of the middle joint, to the left; made perpendicular to ``reach``.
     forward : float

@@ -1,4 +1,4 @@
-"""What tells one synthetic subject from another."""
+"""Traits by which synthetic subjects differ."""
 
 from __future__ import annotations
 
@@ -16,12 +16,13 @@ class Traits:
     Parameters
     ----------
     height_m : float
+        Standing height [m].
     side : {"l", "r"}
-        The leg or hand that acts, or the foot that steps first.
+        Side of the leg or hand that acts, or of the foot that steps first.
     tempo, amplitude : float
         Relative to the nominal actor, the subject's own few percent included.
     phase : float
-        Where in a step the walk begins, 0 to 1; how far into the first rest the others do.
+        Fraction of a step, or of the first rest, at which the movement begins, 0 to 1.
     uneven : mapping of side to float
         Strength of each side, near 1.
     """
