@@ -184,7 +184,7 @@ class Motion:
         InputError
             Where a time lies outside [0, duration_s].
         """
-        from rtradar.motion.posing import pose  # Numba is not needed to read a file
+        from rtradar.kernels.motion import pose  # Numba is not needed to read a file
 
         instants = np.atleast_1d(np.asarray(times, dtype=np.float64))
         if instants.ndim != 1:

@@ -1,8 +1,10 @@
-"""A skeleton's pose from splines of its root and its bones, time by time."""
+"""Pose of a skeleton from splines of its root and its bones, time by time."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from rtradar.kernels.jit import compiled
 
@@ -12,15 +14,16 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
     """Fill positions (time, joint, 3) and quaternions (time, joint * 4) at ``times[which]``.
 
     ``knots (knot,)`` are equally far apart; ``root (power, interval, 3)`` and ``rotation (power,
-    interval, joint * 4)`` are the cubics from each to the next, the highest power first, as of
-    `scipy.interpolate.PPoly`. Quaternions are normalised here.
+    interval, joint * 4)`` are the cubics from each to the next, the highest power first, as
+    `scipy.interpolate.PPoly` has them. Quaternions are normalised here.
     """
     rate, last = (len(knots) - 1) / (knots[-1] - knots[0]), len(knots) - 2
     for k in range(len(which)):
-        # At a knot both cubics have the same value, so that rounding may take either.
+        # Find the interval; at a knot both cubics have the same value, so rounding may take either.
         interval = min(max(int((times[which[k]] - knots[0]) * rate), 0), last)
         t = times[which[k]] - knots[interval]
         own, place = quaternions[which[k]], positions[which[k]]
+        # Evaluate the cubics of all quaternions, and of the root's position.
         c3, c2, c1, c0 = (
             rotation[0, interval],
             rotation[1, interval],
@@ -33,6 +36,7 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
         for axis in range(3):
             place[0, axis] = r0[axis] + t * (r1[axis] + t * (r2[axis] + t * r3[axis]))
         for joint in range(len(parents)):
+            # Normalise the quaternion.
             four = own[4 * joint : 4 * joint + 4]
             scale = 1 / math.sqrt(
                 four[0] * four[0] + four[1] * four[1] + four[2] * four[2] + four[3] * four[3]
@@ -40,7 +44,7 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
             for i in range(4):
                 four[i] *= scale
             if joint > 0:
-                # As `rtradar.motion.quaternions.quaternion_rotate` does it.
+                # Rotate the bone by Rodrigues' form, and add it to the parent's position.
                 x, y, z, w = four[0], four[1], four[2], four[3]
                 a, b, c = offsets[joint, 0], offsets[joint, 1], offsets[joint, 2]
                 u, v, s = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)
@@ -48,3 +52,19 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
                 place[joint, 0] = parent[0] + a + w * u + y * s - z * v
                 place[joint, 1] = parent[1] + b + w * v + z * u - x * s
                 place[joint, 2] = parent[2] + c + w * s + x * v - y * u
+
+
+def pose_reference(times, knots, root, rotation, offsets, parents):
+    """Positions (time, joint, 3) and quaternions (time, joint, 4) of `pose`, in plain NumPy."""
+    interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
+    powers = (times - knots[interval]) ** np.arange(3, -1, -1)[:, None]
+    quaternions = np.einsum("pt,pti->ti", powers, rotation[:, interval])
+    quaternions = quaternions.reshape(len(times), -1, 4)
+    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
+    axis, scalar = quaternions[..., :3], quaternions[..., 3:]
+    across = 2 * np.cross(axis, offsets)
+    positions = offsets + scalar * across + np.cross(axis, across)
+    positions[:, 0] = np.einsum("pt,pti->ti", powers, root[:, interval])
+    for joint in range(1, len(parents)):
+        positions[:, joint] += positions[:, parents[joint]]
+    return positions, quaternions
