@@ -20,6 +20,7 @@ from rtradar.scatter.clutter.returns import (
     RoomEchoes,
 )
 from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_interaction import (
     Series,
@@ -28,7 +29,6 @@ from rtradar.scatter.multipath.wall_interaction import (
     setting_out,
     through_walls,
 )
-from rtradar.scatter.ray_tubes.footprints import across
 from rtradar.scene import Scene, Wall
 
 Array = NDArray[np.float64]
@@ -102,7 +102,8 @@ def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[
 
     def legs(antennas: Array) -> list[tuple[Wave, Field]]:
         ways = points - antennas[:, None]
-        sent = across(-ways / np.linalg.norm(ways, axis=-1, keepdims=True), radar.polarization)
+        directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
+        sent = antenna_field(directions, radar.polarization, x_for_steep=True)
         waves = through_walls(
             scene, series, 0, setting_out(sent, len(nodes)), antennas[:, None], points, nodes
         )

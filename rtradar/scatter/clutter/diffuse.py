@@ -28,8 +28,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.behind_walls import behind_walls
 from rtradar.scatter.clutter.returns import RoomEchoes
+from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scatter.multipath.wall_interaction import height, reflect
-from rtradar.scatter.ray_tubes.footprints import across
 from rtradar.scene import Scene, Wall
 from rtradar.system.seeds import stream
 from rtradar.trace.room_tracer import RoomTracer
@@ -108,7 +108,7 @@ def _echoes(
         ways = points - antennas[:, None]
         distance = np.linalg.norm(ways, axis=-1)
         ways /= distance[..., None]
-        sent = across(-ways, radar.polarization).astype(np.complex128)
+        sent = antenna_field(ways, radar.polarization, x_for_steep=True).astype(np.complex128)
         field = reflect(smooth, sent, ways, frequency)[0]
         strength = np.sqrt((np.abs(field) ** 2).sum(axis=-1)) * ~tracer.blocked(
             antennas[:, None], points

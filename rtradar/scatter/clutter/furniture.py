@@ -27,6 +27,7 @@ from rtradar.scatter.clutter.behind_walls import behind_walls
 from rtradar.scatter.clutter.facet_groups import FacetGroups, PathGroups
 from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes
 from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.polarization import apply_te_tm
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import MeshGrid
@@ -252,15 +253,11 @@ def _reflected(
         return 1.0, footprints
     ways, normals = footprints.directions[:, 3], footprints.normals[:, 3]
     cosine = np.clip(-np.einsum("ti,ti->t", ways, normals), 0.0, 1.0)
-    side = np.cross(ways, normals)
-    sine = np.linalg.norm(side, axis=1, keepdims=True)
-    # Straight on, TE and TM are alike.
-    te = np.where(sine > 1e-9, side / np.where(sine > 0, sine, 1.0), 0.0)
-    in_te = np.einsum("ti,ti->t", te, footprints.field)[:, None] * te
     eta = material.eta(frequency_hz)
     straight = reflection(eta, 1.0, "tm")
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j
-    factors = [(reflection(eta, cosine, kind) / turn).real[:, None] for kind in _POLARIZATIONS]
+    te, tm = ((reflection(eta, cosine, kind) / turn).real for kind in _POLARIZATIONS)
+    # A conductor, whose coefficients are -1 and +1, leaves these fields as they are.
     return turn, replace(
-        footprints, field=factors[1] * (footprints.field - in_te) - factors[0] * in_te
+        footprints, field=apply_te_tm(footprints.field, ways, ways, normals, -te, tm)
     )

@@ -28,6 +28,7 @@ from rtradar.scatter.clutter.returns import (
     best_followed,
 )
 from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scatter.multipath.slab_series import whole_walls
 from rtradar.scatter.multipath.wall_interaction import (
     Series,
@@ -38,7 +39,6 @@ from rtradar.scatter.multipath.wall_interaction import (
     setting_out,
     through_walls,
 )
-from rtradar.scatter.ray_tubes.footprints import across
 from rtradar.scene import Scene, Wall
 from rtradar.trace.room_tracer import RoomTracer
 
@@ -153,8 +153,8 @@ def _follow(
         return None
     legs = ways.reshape(-1, len(ends) - 1, 3)[which]
     numbers = [scene.walls.index(wall) for wall, _ in sequence]
-    sent = across(-legs[:, 0], radar.polarization)
-    heard = across(legs[:, -1], radar.polarization)
+    sent = antenna_field(legs[:, 0], radar.polarization, x_for_steep=True)
+    heard = antenna_field(-legs[:, -1], radar.polarization, x_for_steep=True)
 
     def in_terms(series: Series) -> RoomEchoes | None:
         frequency = sweep_nodes(radar, DENSE_NODES)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.polarization import antenna_field, apply_te_tm, bisector, copolar
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scene import Material, material, reflection
 
@@ -17,8 +17,6 @@ Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
 
 BODY_MATERIALS = ("perfect-conductor", "skin")
-
-_NO_PLANE = 1e-12  # sine of incidence below which the plane of incidence has no direction
 
 
 def body_material(name: str, frequency_hz: Array) -> Material:
@@ -55,40 +53,15 @@ def body_reflection(field: Field, directions: Array, normals: Array, eta: Field)
     (node, ..., 3) complex128
         Without the divergence of curved surfaces.
     """
-    turned = 2 * np.sum(field * normals, axis=-1, keepdims=True) * normals - field
     eta = np.asarray(eta, dtype=np.complex128)
     if np.isinf(eta).all():
+        turned = 2 * np.sum(field * normals, axis=-1, keepdims=True) * normals - field
         return np.asarray(turned, dtype=np.complex128)
     cosine = np.clip(-np.sum(directions * normals, axis=-1), 0.0, 1.0)
-    across = np.cross(directions, normals)
-    sine = np.linalg.norm(across, axis=-1, keepdims=True)
-    across = across / np.where(sine > _NO_PLANE, sine, 1.0)
     eta = eta.reshape(-1, *(1,) * cosine.ndim)
-    te, tm = (reflection(eta, cosine, kind)[..., None] for kind in ("te", "tm"))
-    # A conductor has -1 and +1; straight on their sum vanishes, and with it the need for a plane of incidence.
-    return np.asarray(
-        tm * turned - (te + tm) * np.sum(turned * across, axis=-1, keepdims=True) * across
-    )
-
-
-def antenna_field(directions: Array, polarization: Literal["v", "h"]) -> Array:
-    """Unit vectors (..., 3) of the field that an antenna sends along unit vectors (..., 3); 0 where it has no direction.
-
-    v is world z projected across the direction, h is across both.
-    """
-    up = np.array([0.0, 0.0, 1.0])
-    field = (
-        up - directions[..., 2:] * directions if polarization == "v" else np.cross(directions, up)
-    )
-    size = np.linalg.norm(field, axis=-1, keepdims=True)
-    return np.asarray(np.where(size > 1e-12, field / np.where(size > 1e-12, size, 1.0), 0.0))
-
-
-def bisector(to_tx: Array, to_rx: Array) -> Array:
-    """Unit normals (..., 3) of a mirror that sends what comes from Tx to Rx, both given by unit vectors (..., 3)."""
-    middle = to_tx + to_rx
-    size = np.linalg.norm(middle, axis=-1, keepdims=True)
-    return np.asarray(middle / np.where(size > 1e-12, size, 1.0))
+    te, tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+    onward = directions - 2 * np.sum(directions * normals, axis=-1, keepdims=True) * normals
+    return apply_te_tm(field, directions, onward, normals, te, tm)
 
 
 def material_factor(

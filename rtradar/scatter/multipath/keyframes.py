@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.scatter.common.array_ends import ArrayEnds
-from rtradar.scatter.common.body_material import antenna_field, bisector, body_reflection
-from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.common.body_material import body_reflection
+from rtradar.scatter.common.polarization import antenna_field, bisector, copolar
 from rtradar.scatter.multipath.image_paths import Leg, WallPath, corners, images
 from rtradar.scatter.multipath.slab_delays import AT_ONCE, Met, PathTerms
 from rtradar.scatter.multipath.slab_series import WallSeries

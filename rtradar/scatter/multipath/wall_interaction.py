@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.scatter.common.polarization import apply_te_tm
 from rtradar.scatter.multipath.slab_series import WHOLE, Term, WallSeries
 from rtradar.scene import Scene, Wall
 from rtradar.scene.slab import Polarization
@@ -25,10 +26,6 @@ Field = NDArray[np.complex128]
 Series = Sequence[WallSeries]
 Waves = list["Wave"]
 _POLARIZATIONS: tuple[Polarization, ...] = ("te", "tm")
-
-_NORMAL_INCIDENCE = (
-    1e-9  # sine of incidence below which the plane of incidence has no direction of its own
-)
 
 
 def height(wall: Wall, points: Array, *, back: bool = False) -> Array:
@@ -133,7 +130,7 @@ def reflect(
     lost = np.exp(
         -2 * (2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * wall.roughness_m * cosine) ** 2
     )
-    return _dyad(field, directions, onward, normal, te * lost, tm * lost)
+    return apply_te_tm(field, directions, onward, normal, te * lost, tm * lost)
 
 
 def transmit(
@@ -146,7 +143,7 @@ def transmit(
     cosine = np.minimum(np.abs(directions @ wall.normal), 1.0)
     frequency = _nodes(frequency_hz, cosine)
     te, tm = (term.coefficient(wall, cosine, frequency, kind) for kind in _POLARIZATIONS)
-    return _dyad(field, directions, directions, wall.normal, te, tm)
+    return apply_te_tm(field, directions, directions, wall.normal, te, tm)
 
 
 class Passage(NamedTuple):
@@ -283,22 +280,3 @@ def _nodes(frequency_hz: ArrayLike, like: Array) -> Array:
     """Frequencies (node, 1, ..., 1) for as many axes as ``like`` has."""
     frequency = np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64))
     return frequency.reshape(-1, *(1,) * like.ndim)
-
-
-def _dyad(
-    field: Field, arriving: Array, leaving: Array, normal: Array, te: Field, tm: Field
-) -> Field:
-    across = np.cross(arriving, normal)
-    sine = np.linalg.norm(across, axis=-1, keepdims=True)
-    # Straight on, both coefficients do the same: any direction across serves.
-    spare = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    across = np.where(
-        sine > _NORMAL_INCIDENCE,
-        across / np.where(sine > 0, sine, 1.0),
-        spare / np.linalg.norm(spare),
-    )
-    share_te = (field * across).sum(axis=-1) * te
-    share_tm = (field * np.cross(across, arriving)).sum(axis=-1) * tm
-    return np.asarray(
-        share_te[..., None] * across + share_tm[..., None] * np.cross(across, leaving)
-    )

@@ -29,13 +29,13 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled
 from rtradar.kernels.phasor import phasor
+from rtradar.scatter.common.polarization import STEEP
 from rtradar.scatter.facets.triangle_mean import mean_of_phasor
 
 Array = NDArray[np.float64]
 _TASKS = (
     32  # that threads share: some receivers, and a share of the tubes that is summed on its own
 )
-_STEEP = 1e-9  # sine of the angle from the vertical below which v has no direction of its own
 
 
 @dataclass(frozen=True)
@@ -142,19 +142,6 @@ def radiate(
     return 1j * np.asarray(wavenumber)[:, None, None] / np.sqrt(np.pi) * parts.sum(axis=0)
 
 
-def across(direction: Array, polarization: Literal["v", "h"]) -> Array:
-    """Unit vector of the polarisation of an antenna that looks along ``direction (..., 3)``.
-
-    v is world z projected across the line of sight, h is across both; straight above or below, x stands in for z.
-    """
-    up = np.broadcast_to(np.array([0.0, 0.0, 1.0]), direction.shape)
-    steep = np.hypot(direction[..., 0], direction[..., 1]) < _STEEP
-    up = np.where(steep[..., None], [1.0, 0.0, 0.0], up)
-    side = np.cross(up, direction)
-    side = side / np.linalg.norm(side, axis=-1, keepdims=True)
-    return side if polarization == "h" else np.cross(direction, side)
-
-
 @compiled(parallel=True)
 def _radiate(
     places,
@@ -195,7 +182,7 @@ def _radiate(
             leg = math.sqrt(sx * sx + sy * sy + sz * sz)
             sx, sy, sz = sx / leg, sy / leg, sz / leg
             # Polarisation: h = up x s, v = s x h; straight above, x stands in for up.
-            if sx * sx + sy * sy < _STEEP * _STEEP:
+            if sx * sx + sy * sy < STEEP * STEEP:
                 hx, hy, hz = 0.0, -sz, sy
             else:
                 hx, hy, hz = -sy, sx, 0.0

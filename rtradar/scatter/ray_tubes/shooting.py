@@ -19,7 +19,8 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.scatter.ray_tubes.footprints import Footprints, across
+from rtradar.scatter.common.polarization import antenna_field
+from rtradar.scatter.ray_tubes.footprints import Footprints
 from rtradar.scatter.ray_tubes.tubes import Tubes
 from rtradar.trace.bounces import Surfaces
 
@@ -110,7 +111,7 @@ class Shooter:
         directions = places - tx
         path = np.linalg.norm(directions, axis=-1)
         directions /= path[..., None]
-        field = across(-directions[:, 3], self.polarization)
+        field = antenna_field(directions[:, 3], self.polarization, x_for_steep=True)
         if self.spreading:
             field = field / path[:, 3:]
         return Footprints(places, path, directions, normals, field, tubes.surface[lit]), lit
