@@ -31,7 +31,7 @@ FIRST_PAGE = {
     "Motion": ("load_motion", "synthetic_motion", "Motion"),
     "Radar": ("Radar", "Antenna"),
     "Scene": ("Scene",),
-    "Run": ("run", "compare"),
+    "Run": ("run", "compare", "RunSettings"),
     "Results": ("Result", "Comparison"),
     "Pieces of a run": ("Body", "Ellipsoids", "Echoes", "scattering_length"),
     "Extensions": ("register_reader", "register_radar", "register_model", "register_detector"),
