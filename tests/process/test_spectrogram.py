@@ -18,7 +18,7 @@ from rtradar.errors import InputError
 from rtradar.process import clutter_removal, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, spectrogram
 from rtradar.radar import Radar
-from rtradar.report.figures.spectrogram import draw_spectrogram
+from rtradar.report.figures.maps import draw_spectrogram
 
 LOW, HIGH = Radar.preset("paper-12ghz"), Radar.preset("paper-77ghz")
 TINY = Radar(tx_y=3, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=4)

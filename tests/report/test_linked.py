@@ -12,10 +12,8 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.figures.decibels import Levels
-from rtradar.report.figures.part_groups import GROUPS, group_of_parts
-from rtradar.report.view.page import linked_data
-from rtradar.report.view.run_view import Linked
+from rtradar.report.view.page import view_data
+from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import semi_axis_poses
 
@@ -25,7 +23,7 @@ LOW_DB = -60.0
 
 def linked(
     points: list[tuple[float, float, float]], power_db: tuple[float, float] = (-40.0, -50.0)
-) -> Linked:
+) -> RunView:
     """Two moments; a head at 4 m, -1 m/s, and a left foot at 5 m, +8 m/s, beyond what is unambiguous."""
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.3))
     times = np.array([0.1, 0.2])
@@ -50,7 +48,7 @@ def linked(
         furniture_piece=np.zeros(0, dtype=np.int64),
     )
     level = np.arange(2 * 4 * 5, dtype=np.uint8).reshape(2, 4, 5)
-    return Linked(
+    return RunView(
         heading="walk",
         subtitle="",
         moments=moments,
@@ -148,7 +146,7 @@ def test_echoes_read_their_cross_section() -> None:
     # 40 log10 of 4 m and of 5 m: 24.08 and 27.96 dB above -40 and -50 dB.
     found = linked([])
     np.testing.assert_allclose(found.power_db, [[-15.918, -22.041]] * 2, atol=1e-3)
-    assert linked_data(found)["power_label"] == "RCS, of an echo [dBsm]"
+    assert view_data(found)["power_label"] == "RCS, of an echo [dBsm]"
 
 
 def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
@@ -156,7 +154,7 @@ def test_a_body_that_nobody_sees_is_drawn_all_the_same() -> None:
     assert not view.seen.any()
     assert np.isnan(view.power_db).all()
     assert view.power_range_db == (LOW_DB, LOW_DB + 1.0)
-    data = linked_data(view)
+    data = view_data(view)
     assert (data["rdt"]["count"], data["rdt"]["group"]) == (0, [])
     # Walls lie in the box too: up to 2.2 m, in half metres.
     assert data["figure"]["ranges"][0][1] == 2.5

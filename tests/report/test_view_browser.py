@@ -12,7 +12,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.pipeline.pictures.run_view import load_linked, view
-from rtradar.report.view.run_view import Linked
+from rtradar.report.view.run_view import RunView
 from rtradar.scene import Furniture, material
 
 pytestmark = pytest.mark.slow
@@ -23,7 +23,7 @@ FIGURE = "document.getElementById('scene-figure')"
 @pytest.fixture(scope="module")
 def seen(
     browser: Any, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory
-) -> tuple[str, Linked]:
+) -> tuple[str, RunView]:
     """Address of the page, and what it was made of."""
     folder, (radar, room) = tmp_path_factory.mktemp("seen"), beside_a_wall
     chair = Furniture(
@@ -54,7 +54,7 @@ def centres(browser: Any) -> Any:
     return places.reshape(21, -1, 3).mean(axis=1)
 
 
-def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, Linked]) -> None:
+def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, RunView]) -> None:
     address, _ = seen
     browser.open(f"{address}#t=0.1")
     assert not browser.faults()
@@ -69,7 +69,7 @@ def test_opens_without_an_error_or_a_request(browser: Any, seen: tuple[str, Link
 
 
 def test_the_slider_moves_every_view(
-    browser: Any, seen: tuple[str, Linked], beside_a_wall: tuple[rt.Radar, rt.Scene]
+    browser: Any, seen: tuple[str, RunView], beside_a_wall: tuple[rt.Radar, rt.Scene]
 ) -> None:
     (address, linked), (radar, _) = seen, beside_a_wall
     moments = linked.moments
@@ -130,7 +130,7 @@ def test_the_slider_moves_every_view(
     assert not browser.faults()
 
 
-def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Linked]) -> None:
+def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, RunView]) -> None:
     address, linked = seen
     moments, step = linked.moments, 3
     browser.open(f"{address}#t=0.1")
@@ -160,7 +160,7 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Li
 
 
 def test_saves_a_picture_of_what_is_seen(
-    browser: Any, seen: tuple[str, Linked], tmp_path: Path
+    browser: Any, seen: tuple[str, RunView], tmp_path: Path
 ) -> None:
     address, _ = seen
     browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))

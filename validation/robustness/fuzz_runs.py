@@ -12,7 +12,7 @@ from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
 from rtradar.pipeline.pictures.run_view import load_linked
-from rtradar.report.view.page import linked_data
+from rtradar.report.view.page import view_data
 
 MAPS = {
     "time": np.array([0.002, 0.004]),
@@ -57,7 +57,7 @@ def _look(change: Callable[[Path, bytes], object]) -> Callable[[Path, bytes], No
             shutil.copyfile(folder / "good" / file, folder / file)
         change(folder, data)
         linked = load_linked(folder)
-        json.dumps(linked_data(linked), allow_nan=False)  # as its page does
+        json.dumps(view_data(linked), allow_nan=False)  # as its page does
 
     return read
 

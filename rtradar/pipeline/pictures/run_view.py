@@ -15,10 +15,9 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.pipeline.pictures.run_pictures import thinned
 from rtradar.radar import Radar
-from rtradar.report.figures.decibels import MOST_LEVEL, Levels
 from rtradar.report.figures.field_units import HANN_BINS, FieldUnit, field_unit
 from rtradar.report.view.page import COLOURS, write_view
-from rtradar.report.view.run_view import Linked
+from rtradar.report.view.run_view import MOST_LEVEL, Levels, RunView
 from rtradar.report.view.snapshots import Moments, load_moments
 from rtradar.report.view.still import draw_still
 from rtradar.system.checks import printable
@@ -118,7 +117,7 @@ def view(
     return told
 
 
-def load_linked(folder: Path) -> Linked:
+def load_linked(folder: Path) -> RunView:
     """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
 
     Raises
@@ -167,7 +166,7 @@ def load_linked(folder: Path) -> Linked:
     )
     removal = _line(parameters.get("clutter_removal", "none"))
     cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
-    return Linked(
+    return RunView(
         heading=_line(parameters.get("motion", "Recording")),
         subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]) + cleaned,
         moments=moments,

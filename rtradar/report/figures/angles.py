@@ -63,7 +63,7 @@ def draw_range_angle(
 
 
 def angle_label(name: str, radar: Radar) -> str:
-    """Label of an axis of ``azimuth`` or ``elevation``: without a line along z, azimuth is the angle of a cone."""
+    """Label of the axis; without an array along z, azimuth is the angle of a cone."""
     cone = name == "azimuth" and measured_angles(radar) == ("azimuth",)
     return (
         "Azimuth [°] (cone angle; elevation is not measured)"
@@ -75,7 +75,9 @@ def angle_label(name: str, radar: Radar) -> str:
 def draw_spatial_cloud(
     path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str
 ) -> None:
-    """Points in the room from the side and from above, coloured by velocity; of an array on one line the view that it measures.
+    """Draw points from the side and from above, coloured by velocity.
+
+    For a linear array only the view that it measures is drawn.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]], tit
 def draw_confusion(
     path: Path, counts: NDArray[np.int64], classes: Sequence[str], title: str
 ) -> None:
-    """Confusion matrix: numbers of clouds, colours by the share of what they show; ``counts (truth, answer)``."""
+    """Draw a confusion matrix ``counts (truth, answer)``, coloured by the fraction of the class."""
     shares = 100 * counts / np.maximum(1, counts.sum(axis=1, keepdims=True))
     cells = [
         [f"{count}\n{share:.0f} %" for count, share in zip(*row, strict=True)]
@@ -70,7 +70,7 @@ def draw_transfer(
     spread: NDArray[np.float64],
     title: str,
 ) -> None:
-    """Accuracy for all pairs of a column's values, ``(trained_on, tested_on)``, NaN where there is none."""
+    """Draw accuracies ``(trained_on, tested_on)`` of a column's values, NaN where there is none."""
     cells = [
         [
             ""

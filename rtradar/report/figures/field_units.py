@@ -1,19 +1,22 @@
-"""Units of the field for pictures, which nobody reads in the square metres of the maps.
+"""Units of power in pictures, in place of the square metres of the maps.
 
-Maps hold abs(amplitude)^2 [m^2] with the loss over distance, 1 / (R1^2 R2^2), left in it (`rtradar.conventions`). Read as a
-cross-section, a person of 1 m^2 four metres away has 24 dB too little. Pictures therefore show one of three units:
+Maps hold abs(amplitude)^2 [m^2] including the spreading loss 1 / (R1^2 R2^2)
+(`rtradar.conventions`). Read as a cross-section, a person of 1 m^2 at 4 m would be 24 dB too low.
+Pictures therefore use one of three units:
 
 ``dBm``
-    Received power, where the radar states its transmit power.
+    Received power, if the radar states its transmit power.
 ``dBsm``
-    Radar cross-section over 1 m^2, elsewhere: the loss is taken out at the range R of the cell, R^4 times the map. An echo on
-    the boresight reads its own cross-section, less what windows lose between two bins (1.4 dB at most in range and as much in
-    velocity for Hann windows). Noise reads as the cross-section that would return as much, and so rises with range. Where
-    amplitudes hold no loss, nothing is taken out.
+    Radar cross-section relative to 1 m^2, otherwise. The loss is removed with the range R of the
+    cell: R^4 times the map. An echo on boresight shows its own cross-section, less the scalloping
+    loss between two bins (at most 1.4 dB in range and as much in velocity for Hann windows). Noise
+    shows as the cross-section of equal power, and so rises with range. Nothing is removed if
+    amplitudes do not include the loss.
 ``dB re maximum``
-    Decibels below the strongest value that is shown, where a value sums over ranges, of a spectrogram or of all parts of a
-    body: there is no one loss to take out. Taking it out range by range before the sum would let the farthest bins, whose noise
-    then counts most, hide the person in the middle; a level over the noise means nothing in runs without noise.
+    Decibels below the strongest value shown, for sums over ranges, as in a spectrogram or over all
+    body parts, which have no single loss to remove. If the loss were removed before the sum, the
+    noise of the farthest bins would dominate and hide the person. A level above the noise would
+    have no meaning in runs without noise.
 """
 
 from __future__ import annotations
@@ -26,56 +29,57 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.radar import Radar
 
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
-"""Of every velocity axis."""
+"""Label of every velocity axis."""
 
 HANN_BINS = 1.5
-"""Bins of a Hann-windowed spectrum that the power of one echo fills: sums over bins are divided by it to read the echo's."""
+"""Noise bandwidth of a Hann window [bins]; a sum over bins divided by it is the echo's power."""
 
 _QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power"}
 
 
 @dataclass(frozen=True, eq=False)
 class FieldUnit:
-    """A unit of pictures, from `field_unit`.
+    """Unit of power in pictures, made by `field_unit`.
 
     Parameters
     ----------
     name : {"dBm", "dBsm", "dB re maximum"}
+        Name of the unit.
     scale : float or array of float
-        Factor from power in m^2 to the linear unit, of a shape that powers can be multiplied by.
+        Factor from power [m^2] to the linear unit, of a shape that broadcasts with the powers.
     """
 
     name: str
     scale: float | NDArray[np.float64]
 
     def level(self, power_m2: ArrayLike) -> NDArray[np.float64]:
-        """Powers in this unit.
+        """Convert powers to this unit.
 
         Parameters
         ----------
         power_m2 : array of float
-            As maps hold them [m^2].
+            Powers as in the maps [m^2].
 
         Returns
         -------
         array of float64
-            Decibels; some -380 dB for 0.
+            Levels [dB], about -380 dB for a power of 0.
         """
         linear = np.asarray(power_m2, dtype=np.float64) * self.scale
         return np.asarray(10 * np.log10(np.maximum(linear, np.finfo(np.float32).tiny)))
 
     def label(self, of: str = "") -> str:
-        """Label of an axis or a colour bar.
+        """Return the label of an axis or a colour bar.
 
         Parameters
         ----------
         of : str
-            What the power is of, such as ``mean of channels``.
+            Qualifier of the power, such as ``mean of channels``.
 
         Returns
         -------
         str
-            Such as ``RCS, mean of channels [dBsm]``.
+            Label such as ``RCS, mean of channels [dBsm]``.
         """
         return f"{_QUANTITIES[self.name]}{', ' if of else ''}{of} [{self.name}]"
 
@@ -87,18 +91,19 @@ def field_unit(
     range_m: ArrayLike | None = None,
     strongest_m2: float = 1.0,
 ) -> FieldUnit:
-    """The unit in which pictures of a run show powers, as told at the head of this module.
+    """Choose the unit of power in the pictures of a run, as this module's docstring explains.
 
     Parameters
     ----------
     radar : Radar
-        Of the run.
+        Radar of the run.
     spreading : bool
-        Whether amplitudes of the run hold the loss over distance.
+        Whether amplitudes of the run include the spreading loss.
     range_m : array of float, optional
-        Range of each power [m], of a shape that powers can be multiplied by; left out where a power is a sum over ranges.
+        Range of each power [m], of a shape that broadcasts with the powers; None for sums over
+        ranges.
     strongest_m2 : float
-        The power [m^2] that ``dB re maximum`` refers to.
+        Reference power of ``dB re maximum`` [m^2].
 
     Returns
     -------

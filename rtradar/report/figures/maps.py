@@ -10,19 +10,19 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import VELOCITY_LABEL, field_unit
+from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, field_unit
 
 
 def new_figure(width: float, height: float) -> Figure:
-    """An empty figure of that size [inch], without a window."""
+    """Make an empty figure of this size [inch] without a window."""
     return Figure(figsize=(width, height), dpi=130, layout="constrained")
 
 
 def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
-    """Save as what the path ends with, else as PNG, and empty the figure.
+    """Save in the format of the path's suffix, or as PNG to an open file, and clear the figure.
 
-    Figure and axes refer to each other. Were that left to Python's collector of cycles, what one picture takes would by chance
-    still be there with the next.
+    Figure and axes refer to each other. Without clearing, the memory of one picture could
+    still be in use with the next, until Python's garbage collector runs.
     """
     for axes in figure.axes:
         axes.title.set_wrap(True)
@@ -33,7 +33,10 @@ def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
 def colour_limits(
     level_db: NDArray[np.float64], below_peak_db: float = 60.0
 ) -> tuple[float, float]:
-    """Least and greatest level that colours show: 3 dB below the median, or ``below_peak_db`` below the peak; and the peak."""
+    """Return the limits of the colour scale [dB].
+
+    They are the peak and 3 dB below the median, or ``below_peak_db`` below the peak if higher.
+    """
     top = float(level_db.max())
     return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
 
@@ -163,4 +166,47 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
     )
     axes.set_box_aspect((1.6, 1, 1))
     figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
+    save_figure(figure, path)
+
+
+def draw_spectrogram(
+    path: Path,
+    power: NDArray[np.floating],
+    time: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    radar: Radar,
+    title: str,
+    *,
+    spreading: bool = True,
+) -> None:
+    """Draw a spectrogram, time across and velocity up.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    power : (time, velocity)
+        Power of one channel, summed over range [m^2]; at least one row.
+    time : (time,)
+        Evenly spaced times [s].
+    velocity : (velocity,)
+        Ascending velocities [m/s].
+    radar : Radar
+        Radar of the run.
+    title : str
+        Title of the picture.
+    spreading : bool
+        Whether amplitudes include the spreading loss.
+    """
+    figure = new_figure(8, 4.5)
+    axes = figure.subplots()
+    unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()) / HANN_BINS)
+    values = unit.level(power / HANN_BINS)  # one echo is spread over as many range bins
+    low, high = colour_limits(values)
+    extent = (*bin_edges(time), *bin_edges(velocity))
+    image = axes.imshow(
+        values.T, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
+    )
+    axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title=title)
+    figure.colorbar(image, label=unit.label("one channel"))
     save_figure(figure, path)

@@ -1,4 +1,4 @@
-"""Pictures of a room: its plan with the paths of echoes, and maps before and after static clutter is removed."""
+"""Pictures of a room: its plan with echo paths, and maps before and after clutter removal."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from rtradar.report.figures.maps import bin_edges, colour_limits, new_figure, sa
 from rtradar.scene import Scene
 
 _UPRIGHT = 0.5
-"""Walls whose normals rise by less than this are drawn in a plan; the others are floors and ceilings."""
+"""Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
 
 
 def draw_plan(
@@ -157,7 +157,7 @@ def draw_before_after(
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
-    """Circles at (name, range [m], place along the horizontal axis), those within the radar's range; one for a legend.
+    """Draw circles at (name, range [m], horizontal coordinate) within the radar's range.
 
     Names stand beside them toward the middle of the axes, far enough apart to be read.
     """

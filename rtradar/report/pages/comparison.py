@@ -1,4 +1,4 @@
-"""`compare.html`: several models on one page, in one file that opens without a network."""
+"""Comparison page, ``compare.html``: several models in one file that opens without a network."""
 
 from __future__ import annotations
 
@@ -16,7 +16,8 @@ _PAGE = Template("""<!doctype html>
 <html lang="en">
 <head>
 <meta charset="utf-8">
-<meta http-equiv="Content-Security-Policy" content="default-src 'none'; style-src 'unsafe-inline'; img-src data:">
+<meta http-equiv="Content-Security-Policy"
+content="default-src 'none'; style-src 'unsafe-inline'; img-src data:">
 <meta name="viewport" content="width=device-width, initial-scale=1">
 <meta name="color-scheme" content="light dark">
 <title>$title - rtradar compare</title>
@@ -31,9 +32,10 @@ $style</style>
 </header>
 <main>
 <section><h2>What differs</h2>$measures
-<p class="note">Differences are to the reference, $reference. Maps are compared in decibels: range-Doppler in the cells that
-either model detects, spectrograms in the cells 10 dB above the median of either. All models have the same noise, sample by
-sample. Echo power is of one chirp every 10 ms, each from another Tx, which makes it saw.</p></section>
+<p class="note">Differences are to the reference, $reference. Maps are compared in decibels:
+range-Doppler in the cells that either model detects, spectrograms in the cells 10 dB above the
+median of either. All models have the same noise, sample by sample. Echo power is of one chirp every
+10 ms, each from another Tx, which makes it saw.</p></section>
 <section id="maps"><h2>Side by side</h2><div class="pictures">$pictures</div></section>
 <div class="tables"><section><h2>Seconds a stage</h2>$stages</section>
 <section><h2>Mean echo power by part: $unit</h2>$parts</section>
@@ -58,13 +60,13 @@ def write_comparison(
     path : path
         HTML file.
     summary : mapping
-        As in ``compare.json``.
+        Content of ``compare.json``.
     rows : sequence of sequence of str
-        The table: a heading row, then a row a measure.
+        Rows of the table: a heading row, then one row for each measure.
     pictures : mapping of title to path
-        PNG files, in the order in which they shall stand.
+        PNG files in the order of the page.
     unit : FieldUnit
-        In which the echo power of parts is given.
+        Unit of the echo power of parts.
     """
     fidelities = summary["fidelities"]
     names = list(fidelities)

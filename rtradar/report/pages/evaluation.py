@@ -54,8 +54,9 @@ def write_evaluation(
     baselines : dict
         As of `rtradar.classify.baselines.judge_baselines`; may be empty.
     out : path
-        Made if it is not there. Gets ``evaluation.json``, ``trainings.csv``, ``history.csv``, ``table.txt``, ``accuracy.png``,
-        and for each study ``confusion-N.png``, ``learning-N.png`` and, of ``across``, ``transfer-N.png``.
+        Output folder, which is created if necessary, for ``evaluation.json``, ``trainings.csv``,
+        ``history.csv``, ``table.txt`` and ``accuracy.png``, and for each study
+        ``confusion-N.png``, ``learning-N.png`` and, for ``across``, ``transfer-N.png``.
 
     Returns
     -------
@@ -73,7 +74,8 @@ def write_evaluation(
     for study in studies:
         if study.plan["classes"] != classes:
             raise InputError(
-                f"'{study.folder}' knows other activities than '{studies[0].folder}'; evaluate them one by one"
+                f"'{study.folder}' knows other activities than '{studies[0].folder}'; "
+                "evaluate them one by one"
             )
     try:
         out.mkdir(parents=True, exist_ok=True)
@@ -90,7 +92,8 @@ def write_evaluation(
     for number, (title, study) in enumerate(zip(titles, studies, strict=True), start=1):
         counts = confusion(study.outcomes, len(classes))
         blocks.append(
-            f"{title}: {_about(study)}\n{confusion_table(counts, classes, recordings_of(study.outcomes, len(classes)))}"
+            f"{title}: {_about(study)}\n"
+            f"{confusion_table(counts, classes, recordings_of(study.outcomes, len(classes)))}"
         )
         draw_confusion(out / f"confusion-{number}.png", counts, classes, title)
         draw_learning(
@@ -119,7 +122,7 @@ def write_evaluation(
 
 
 def _titles(studies: Sequence[Study]) -> list[str]:
-    """A name for each, unlike the others: the folder is added where recipe and points are not enough."""
+    """Return a unique name for each; the folder is added if recipe and points are ambiguous."""
     plain = [study.title for study in studies]
     return [
         title
@@ -156,7 +159,8 @@ def _rows(
 def _about(study: Study) -> str:
     said = summary(study.outcomes)
     return (
-        f"split {study.plan['split']}, {said['test_clouds']} answers about {said['test_recordings']} recordings, "
+        f"split {study.plan['split']}, "
+        f"{said['test_clouds']} answers about {said['test_recordings']} recordings, "
         f"{len(study.outcomes[0].history)} epochs, {said['seconds'] / 60:.1f} min"
     )
 

@@ -1,4 +1,4 @@
-"""A page in one file: its frame, its style, its data and its scripts, closed to every network."""
+"""Page frame: a page with style, data and scripts in one file that makes no requests."""
 
 from __future__ import annotations
 
@@ -34,7 +34,8 @@ $style</style>
 </header>
 <main>
 $top
-<noscript><p class="box warn">The views that move need JavaScript; all else on this page does without.</p></noscript>
+<noscript><p class="box warn">The views that move need JavaScript; all else on this page does
+without.</p></noscript>
 $body</main>
 <script type="application/json" id="report-data">$data</script>
 <script>$library</script>
@@ -43,17 +44,18 @@ $body</main>
 </html>
 """)
 
-# Place of a large piece; no text on a page holds this.
+# Placeholder of a large part; no text on a page contains it.
 _LATER = "\0later\0"
 
 
 def player(more: str = "") -> str:
-    """HTML of the buttons that move a figure through time, and ``more`` beside them."""
+    """Make the HTML of the time controls of a figure, with ``more`` beside them."""
     return f"""<div class="player" id="player"><button type="button" id="play">Play</button>
 <input type="range" id="moment" min="0" value="0" step="1" aria-label="Moment of the recording">
 <output id="clock" for="moment"></output>
-<label>Speed <select id="speed"><option value="0.1">× 0.1</option><option value="0.25">× 0.25</option>
-<option value="0.5">× 0.5</option><option value="1" selected>× 1</option></select></label>{more}</div>"""
+<label>Speed <select id="speed"><option value="0.1">× 0.1</option>
+<option value="0.25">× 0.25</option><option value="0.5">× 0.5</option>
+<option value="1" selected>× 1</option></select></label>{more}</div>"""
 
 
 def write_page(
@@ -67,29 +69,29 @@ def write_page(
     data: object,
     scripts: Sequence[str],
 ) -> None:
-    """Write a page that holds all it needs, plotly.js included (about 5 MB), and whose policy forbids every request.
+    """Write a page that includes plotly.js (about 5 MB) and whose policy forbids any request.
 
     Parameters
     ----------
     path : path
         HTML file.
     kind, heading, subtitle : str
-        Plain text; escaped here.
+        Plain texts, which are escaped here.
     top : str
-        HTML.
+        HTML of the top of the page.
     body : iterable of str
-        HTML in pieces, which are written one by one: a page of many pictures takes the memory of one.
+        HTML in parts that are written one by one, so that memory does not grow with the pictures.
     data : object
-        For JSON; scripts find it in the element ``report-data``.
+        Data for JSON, which scripts find in the element ``report-data``.
     scripts : sequence of str
-        Files of this package, run as one, in this order.
+        Script files of this package, which are run as one, in this order.
 
     Raises
     ------
     InputError
-        Where the file cannot be written; one that was there is left as it was.
+        If the file cannot be written. An existing file is then unchanged.
     """
-    # As bytes: the text that plotly's own function gives takes twice as many, for it has letters beyond Latin.
+    # As bytes, because text with letters beyond Latin takes twice the memory.
     library = files("plotly").joinpath("package_data/plotly.min.js").read_bytes()
     script = (
         "(() => {\n" + '"use strict";\n' + "".join(_asset(name) for name in scripts) + "})();\n"
@@ -117,7 +119,7 @@ def write_page(
 
 
 def is_page(path: Path) -> bool:
-    """Whether a file is a page that `write_page` wrote; False, too, where there is none or it is no regular file."""
+    """Return whether a regular file exists at this path and was written by `write_page`."""
     with suppress(OSError), open_regular(path) as file:
         return b'<meta name="generator" content="rtradar">' in file.read(4096)
     return False
@@ -128,15 +130,15 @@ def _asset(name: str) -> str:
 
 
 def _policy(scripts: Iterable[bytes]) -> str:
-    """Content security policy: these scripts and no other, embedded pictures, and nothing from anywhere else."""
+    """Content security policy that allows these scripts and embedded pictures only."""
     hashes = " ".join(
         f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts
     )
-    # Plotly writes style rules of its own, and makes pictures for download as blobs.
+    # Plotly writes style rules of its own, and pictures for download are blobs.
     sources = f"script-src {hashes}; style-src 'unsafe-inline'; img-src data: blob:"
     return f"default-src 'none'; {sources}; base-uri 'none'; form-action 'none'"
 
 
 def _json(data: object) -> str:
-    """JSON that no text in it can end: the parser of HTML sees no < at all."""
+    """Encode as JSON without any <, so that no text can end the element."""
     return json.dumps(data, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")

@@ -1,4 +1,4 @@
-"""`report.html`: one run on one page, in one file that opens without a network."""
+"""Run page, ``report.html``: one run in one file that opens without a network."""
 
 from __future__ import annotations
 
@@ -27,8 +27,9 @@ from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
 _FIGURE = f"""<section id="figure"><h2>The recording before the radar</h2>
 <div class="scene tall" id="scene-figure"></div>
 {player()}
-<p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone. Drag to turn, scroll to come nearer.
-World axes: x from the radar to the person, y to the left seen from the radar, z up.</p></section>
+<p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone.
+Drag to turn, scroll to come nearer. World axes: x from the radar to the person, y to the left seen
+from the radar, z up.</p></section>
 """
 
 
@@ -42,31 +43,34 @@ def write_report(
     rdt_points: ArrayLike,
     spatial: SpatialCloud | None = None,
 ) -> None:
-    """Write one run as a page with a moving figure, clouds that can be turned, pictures and tables.
+    """Write a run as a page with a moving figure, rotatable clouds, pictures and tables.
 
-    The file holds all it needs, plotly.js included (about 5 MB), and its content security policy forbids every request.
+    The file includes plotly.js (about 5 MB), and its content security policy forbids any request.
 
     Parameters
     ----------
     path : path
         HTML file.
     body : Body
-        Placed before the radar.
+        Body at its position before the radar.
     radar : Radar
+        Radar of the run.
     summary : mapping
-        As in ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``, ``versions`` and ``part_power_m2`` have
-        places of their own; other numbers and texts are listed under their names.
+        Content of ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``,
+        ``versions`` and ``part_power_m2`` have sections of their own; other numbers and texts are
+        listed under their names.
     pictures : mapping of title to path
-        PNG files, in the order in which they shall stand.
+        PNG files in the order of the page.
     rdt_points : (point, 3)
-        Time [s], range [m], velocity [m/s].
+        Time [s], range [m] and velocity [m/s] of each point.
     spatial : SpatialCloud, optional
-        Shown whole, and about the moving figure frame by frame.
+        Spatial cloud, shown as a whole and frame by frame around the moving figure.
 
     Raises
     ------
     InputError
-        Where a picture is missing or no PNG, or ``rdt_points`` has a wrong shape or values that are not finite.
+        If a picture is missing or is not a PNG file, or ``rdt_points`` has a wrong shape or values
+        that are not finite.
     """
     spreading = bool(summary.get("parameters", {}).get("spreading", True))
     figure = figure_data(body, radar, summary.get("part_power_m2"), spreading=spreading)
@@ -116,7 +120,10 @@ def _clouds(data: Mapping[str, Any]) -> str:
         measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
         if not all(measured.values()):
             angle = "azimuth" if measured["z"] else "elevation"
-            note += f" An array on one line does not measure {angle}: x is the distance from that line, added to the radar's x."
+            note += (
+                f" An array on one line does not measure {angle}: "
+                "x is the distance from that line, added to the radar's x."
+            )
         views.append(("spatial", "Spatial cloud", note))
     parts = []
     for name, title, note in views:
@@ -132,7 +139,8 @@ def _clouds(data: Mapping[str, Any]) -> str:
             else '<p class="empty">Nothing was detected.</p>'
         )
         parts.append(
-            f'<section id="{name}"><h2>{title}</h2>{scene}<p class="note">{note}{thinned}</p></section>\n'
+            f'<section id="{name}"><h2>{title}</h2>{scene}'
+            f'<p class="note">{note}{thinned}</p></section>\n'
         )
     return f'<div class="clouds">{"".join(parts)}</div>\n'
 

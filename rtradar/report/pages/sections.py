@@ -1,4 +1,4 @@
-"""Fragments of the report page: tables, bars, boxes and pictures. All text that comes from outside is escaped."""
+"""HTML fragments of pages: tables, bars, boxes and pictures. All given texts are escaped."""
 
 from __future__ import annotations
 
@@ -31,19 +31,19 @@ _PNG = b"\x89PNG\r\n\x1a\n"
 
 
 def quantity(name: str, value: object) -> tuple[str, str]:
-    """A name with its unit's suffix, and its value, as people read them: ("chirp duration", "62.5 µs").
+    """Format a name with a unit suffix and its value, such as ("chirp duration", "62.5 µs").
 
     Parameters
     ----------
     name : str
-        Its last word may be a unit, as in ``chirp_duration_s``.
+        Name whose last word may be a unit, as in ``chirp_duration_s``.
     value : object
-        Number, text, truth value, sequence of them, or None.
+        Number, text, Boolean, sequence of them, or None.
 
     Returns
     -------
     label, text : str
-        Not yet escaped.
+        Texts that are not escaped yet.
     """
     words = name.split("_")
     unit = _UNITS.get(words[-1], "") if len(words) > 1 else ""
@@ -73,7 +73,7 @@ def _text(value: object, unit: str) -> str:
 
 
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
-    """HTML table of plain texts; the first column names the row, the others are right-aligned."""
+    """Make an HTML table of plain texts; the first column names the row."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
     body = "".join(
         f'<tr><th scope="row">{escape(row[0])}</th>'
@@ -89,7 +89,7 @@ def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
 
 
 def mapping_table(values: Mapping[str, Any]) -> str:
-    """Table of all that is not itself a mapping or a list of mappings."""
+    """Make a table of all values except mappings and lists of mappings."""
     return table(
         quantity(name, value)
         for name, value in values.items()
@@ -99,7 +99,7 @@ def mapping_table(values: Mapping[str, Any]) -> str:
 
 
 def limits_table(radar: Radar) -> str:
-    """What the radar can measure: the paper's Table 2 for this radar, by the centre of its sweep."""
+    """Make the paper's Table 2, the measurement limits, for this radar at its centre frequency."""
     rows = (
         ("r_max", "Maximum detectable range", f"{radar.max_range_m:.3f} m"),
         (
@@ -132,7 +132,7 @@ def limits_table(radar: Radar) -> str:
 
 
 def stages_table(seconds: Mapping[str, float]) -> str:
-    """Time of each stage, with a bar as long as its share of the slowest one."""
+    """Make a table of the time of each stage, with bars relative to the slowest one."""
     longest = max(seconds.values(), default=0.0) or 1.0
     total = sum(seconds.values()) or 1.0
     rows = "".join(
@@ -144,9 +144,10 @@ def stages_table(seconds: Mapping[str, float]) -> str:
 
 
 def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
-    """What came near or past the end of a model's validity; said also where nothing did."""
+    """Make a box that lists where a model came near the end of its validity, or that none did."""
     if not limits:
-        return '<aside class="box fine"><p>Nothing came near the end of a model\'s validity.</p></aside>'
+        text = "Nothing came near the end of a model's validity."
+        return f'<aside class="box fine"><p>{text}</p></aside>'
     items = []
     for limit in limits:
         share = float(limit.get("share", 0.0))
@@ -158,7 +159,7 @@ def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
 
 
 def tiles(values: Iterable[tuple[str, str]]) -> str:
-    """Row of large figures, each (value, what it is)."""
+    """Make a row of large figures from pairs (value, caption)."""
     return (
         '<div class="tiles">'
         + "".join(f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in values)
@@ -167,12 +168,12 @@ def tiles(values: Iterable[tuple[str, str]]) -> str:
 
 
 def picture(title: str, path: Path) -> str:
-    """One PNG file, embedded, with its caption.
+    """Embed a PNG file with its caption.
 
     Raises
     ------
     InputError
-        Where there is no such file, or it is no PNG.
+        If the file is missing or is not a PNG file.
     """
     try:
         data = path.read_bytes()
@@ -186,5 +187,6 @@ def picture(title: str, path: Path) -> str:
     text = escape(title)
     return (
         f'<figure><img alt="{text}" width="{width}" height="{height}" '
-        f'src="data:image/png;base64,{base64.b64encode(data).decode()}"><figcaption>{text}</figcaption></figure>'
+        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
+        f"<figcaption>{text}</figcaption></figure>"
     )

@@ -1,4 +1,4 @@
-"""``rtradar view``: body, room, paths and echoes, linked to the maps and the cloud of the same moment, on one page."""
+"""View page: body, room, paths and echoes beside the maps and the cloud of the same time."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.report.figures.part_groups import GROUPS, group_of_parts
 from rtradar.report.pages.frame import player, write_page
-from rtradar.report.view.run_view import Linked
+from rtradar.report.view.run_view import GROUPS, RunView, group_of_parts
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import packed_floats, posed_figure, rdt_data, spatial_data
 
 COLOURS = ("part", "power", "velocity")
-"""What colours may mean."""
+"""Quantities that colours may show."""
 
 VELOCITY_COLOURS = (
     (0.0, "#0b2e6b"),
@@ -25,17 +24,19 @@ VELOCITY_COLOURS = (
     (0.75, "#d9371f"),
     (1.0, "#6b0f0f"),
 )
-"""From approaching to receding; slow rates, which most of a body has, differ from rest at sight."""
+"""Colour scale from approaching to receding, in which slow motion differs clearly from rest."""
 
 _BODY = """<div class="linked">
 <section><h2>Body and paths</h2><div class="scene" id="scene-figure"></div></section>
-<section><h2>Range-Doppler map of this window, and where echoes are</h2><div class="scene" id="scene-map"></div></section>
+<section><h2>Range-Doppler map of this window, and where echoes are</h2>
+<div class="scene" id="scene-map"></div></section>
 <section><h2>Range-Doppler-time cloud</h2>$cloud</section>
 <section><h2>Spectrogram</h2>$spectrogram</section>
 </div>
-<p class="note">Each ellipsoid is a body part of the echo model. Lines are paths from the middle of the array to where the part
-mirrors it, and back; dots on the map are the same echoes, diamonds those over walls. Shown is what stands above the floor of the
-map. Grey parts are hidden from the radar; grey points of the cloud are far from any echo. A click on the spectrogram goes to its
+<p class="note">Each ellipsoid is a body part of the echo model. Lines are paths from the middle of
+the array to the specular point of the part, and back; dots on the map are the same echoes,
+diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are hidden from
+the radar; grey points of the cloud are far from any echo. A click on the spectrogram goes to its
 time.</p>
 """
 
@@ -50,40 +51,41 @@ def _controls(colour: str) -> str:
     )
     return player(
         f'<label>Colour by <select id="colour">{options}</select></label>'
-        '<label>Paths <select id="paths"><option value="all">all</option><option value="direct">direct</option>'
-        '<option value="none">none</option></select></label>'
+        '<label>Paths <select id="paths"><option value="all">all</option>'
+        '<option value="direct">direct</option><option value="none">none</option></select></label>'
         '<button type="button" id="save">Save as PNG</button>'
         f'<div class="groups" id="groups">{legend}</div>'
     )
 
 
 def write_view(
-    path: str | Path, linked: Linked, *, name: str = "view", colour: str = "part"
+    path: str | Path, run_view: RunView, *, name: str = "view", colour: str = "part"
 ) -> None:
-    """Write the page, in one file that opens without a network.
+    """Write the view page as one file that opens without a network.
 
     Parameters
     ----------
     path : path
-        HTML file; replaced whole or not at all.
-    linked : Linked
+        HTML file, which is replaced if it exists.
+    run_view : RunView
+        Data of the run.
     name : str
-        Of pictures that the page saves, without ``.png``.
+        File name of pictures that the page saves, without ``.png``.
     colour : {"part", "power", "velocity"}
-        What colours mean when it opens.
+        Quantity that colours show when the page opens.
 
     Raises
     ------
     InputError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     scene = '<div class="scene" id="scene-{}"></div>'
     cloud = (
         scene.format("rdt")
-        if len(linked.rdt_points)
+        if len(run_view.rdt_points)
         else '<p class="empty">Nothing was detected.</p>'
     )
-    long_enough = linked.spectrogram.level.size > 0
+    long_enough = run_view.spectrogram.level.size > 0
     spectrogram = (
         scene.format("spectrogram")
         if long_enough
@@ -92,22 +94,22 @@ def write_view(
     write_page(
         path,
         kind="rtradar view",
-        heading=linked.heading,
-        subtitle=linked.subtitle,
+        heading=run_view.heading,
+        subtitle=run_view.subtitle,
         top=_controls(colour),
         body=(_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),),
-        data=linked_data(linked) | {"name": name},
+        data=view_data(run_view) | {"name": name},
         scripts=("plots.js", "figure.js", "linked.js"),
     )
 
 
-def linked_data(linked: Linked) -> dict[str, Any]:
-    """All that the page's script draws, ready for JSON."""
-    moments, radar = linked.moments, linked.radar
+def view_data(run_view: RunView) -> dict[str, Any]:
+    """Return the data of the page's script as plain values for JSON."""
+    moments, radar = run_view.moments, run_view.radar
     figure = posed_figure(moments.part_names.tolist(), moments.times, moments.poses, radar)
     figure["ranges"] = _with_room(figure["ranges"], moments)
-    group = linked.rdt_group()
-    shown = rdt_data(linked.rdt_points)
+    group = run_view.rdt_group()
+    shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
     return {
         "figure": figure,
@@ -118,7 +120,7 @@ def linked_data(linked: Linked) -> dict[str, Any]:
             "bounces": moments.echo_bounces.tolist(),
             "range_m": packed_floats(moments.range_m),
             "velocity_mps": packed_floats(moments.velocity_mps),
-            "power_db": packed_floats(linked.power_db),
+            "power_db": packed_floats(run_view.power_db),
             "corners": packed_floats(moments.corners),
             "radar_m": list(radar.position_m),
         },
@@ -135,24 +137,24 @@ def linked_data(linked: Linked) -> dict[str, Any]:
             "of_part": group_of_parts(moments.part_names.tolist()),
         },
         "velocity_colours": VELOCITY_COLOURS,
-        "power_label": linked.power_unit.label("of an echo"),
-        "power_unit": linked.power_unit.name,
-        "power_range_db": list(linked.power_range_db),
-        "fastest_mps": linked.fastest_mps,
+        "power_label": run_view.power_unit.label("of an echo"),
+        "power_unit": run_view.power_unit.name,
+        "power_range_db": list(run_view.power_range_db),
+        "fastest_mps": run_view.fastest_mps,
         "max_velocity_mps": radar.max_velocity_mps,
-        "map": linked.range_doppler.packed() | {"box": linked.shown_box()},
-        "spectrogram": linked.spectrogram.packed(),
+        "map": run_view.range_doppler.packed() | {"box": run_view.shown_box()},
+        "spectrogram": run_view.spectrogram.packed(),
         "rdt": shown
         | {
-            "power_db": packed_floats(linked.rdt_power_db[::every]),
+            "power_db": packed_floats(run_view.rdt_power_db[::every]),
             "group": group[::every].tolist(),
         },
-        "spatial": spatial_data(linked.spatial),
+        "spatial": spatial_data(run_view.spatial),
     }
 
 
 def _with_room(ranges: list[list[float]], moments: Moments) -> list[list[float]]:
-    """A box that holds walls and furniture, too, in half metres."""
+    """Extend the limits of the axes to walls and furniture, rounded to half metres."""
     places = np.concatenate(
         [moments.walls.reshape(-1, 3), moments.furniture_vertices, np.array(ranges).T]
     )

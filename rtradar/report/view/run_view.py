@@ -1,44 +1,125 @@
-"""What a run left, as the page of ``rtradar view`` and its stills show it: echoes, maps and clouds of the same moments."""
+"""Run view: data of a run for the page of ``rtradar view`` and its still pictures."""
 
 from __future__ import annotations
 
+import base64
+import zlib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
-from rtradar.report.figures.decibels import Levels
 from rtradar.report.figures.field_units import FieldUnit, field_unit
-from rtradar.report.figures.part_groups import GROUPS, group_of_parts
 from rtradar.report.view.snapshots import Moments
 
-_NEAREST_BINS = 4.0
-"""A point of the cloud farther than this from any echo is of none."""
+GROUPS = {
+    "head, neck": "#cc79a7",
+    "torso": "#3f7fd1",
+    "left arm": "#56b4e9",
+    "right arm": "#009e73",
+    "left leg": "#e69f00",
+    "right leg": "#d55e00",
+    "no part near": "#8c8c94",
+}
+"""Names and colours of the groups of body parts; the last is for what belongs to none."""
+
+_LIMBS = {"clavicle": "arm", "upper arm": "arm", "forearm": "arm", "hand": "arm"}
+
+
+def group_of_parts(parts: Sequence[str]) -> list[int]:
+    """Return the index in `GROUPS` of each part's group."""
+    names = list(GROUPS)
+    found = []
+    for part in parts:
+        side, _, limb = part.partition(" ")
+        group = (
+            f"{side} {_LIMBS.get(limb, 'leg')}"
+            if side in ("left", "right")
+            else "torso"
+            if "torso" in part
+            else "head, neck"
+        )
+        found.append(names.index(group))
+    return found
+
+
+MOST_LEVEL = 250
+"""Highest quantised level."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Linked:
-    """What a run left, as the page and its stills show it.
+class Levels:
+    """Maps in decibels, quantised coarsely so that a page stays small.
+
+    Parameters
+    ----------
+    level : (map, row, column) uint8
+        Quantised power; a level stands for ``low_db + step_db level``.
+    low_db, step_db : float
+        Lowest level and step from one level to the next [dB].
+    label : str
+        Quantity with its unit, as the label of a colour bar.
+    across, up : (float, float)
+        Value of the first column or row, and the step to the next one.
+    """
+
+    level: NDArray[np.uint8]
+    low_db: float
+    step_db: float
+    label: str
+    across: tuple[float, float]
+    up: tuple[float, float]
+
+    @property
+    def high_db(self) -> float:
+        """Power of the highest level of the colour scale [dB]."""
+        return self.low_db + self.step_db * MOST_LEVEL
+
+    def packed(self) -> dict[str, Any]:
+        """Return plain values for JSON; ``levels`` are compressed by zlib and encoded in base64."""
+        return {
+            "levels": base64.b64encode(zlib.compress(self.level.tobytes(), 9)).decode(),
+            "shape": list(self.level.shape[1:]),
+            "x": list(self.across),
+            "y": list(self.up),
+            "low_db": self.low_db,
+            "high_db": self.high_db,
+            "step_db": self.step_db,
+            "label": self.label,
+        }
+
+
+_NEAREST_BINS = 4.0  # a point of the cloud farther from any echo belongs to none
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class RunView:
+    """Data of a run that the view page and its still pictures show.
 
     Parameters
     ----------
     heading, subtitle : str
+        Titles of the page.
     moments : Moments
+        Snapshots of body and echoes.
     radar : Radar
-        Where it stands in the scene.
+        Radar at its position in the scene.
     range_doppler : Levels
-        One map a step, mean of the channels.
+        One map for each snapshot, mean of the channels.
     spectrogram : Levels
-        One map, time across and velocity up; without columns where the capture is too short for it.
+        One map, time across and velocity up; it has no columns if the capture is too short.
     rdt_points : (point, 3) float64
-        Time [s], range [m], velocity [m/s].
+        Time [s], range [m] and velocity [m/s] of each point.
     rdt_power_db : (point,) float64
-        Power of the range-Doppler map there, in the unit of that map [dB].
+        Power of the range-Doppler map at each point, in the unit of that map [dB].
     spatial : SpatialCloud
+        Spatial cloud of the run.
     spreading : bool
-        Whether amplitudes hold the loss over distance.
+        Whether amplitudes include the spreading loss.
     """
 
     heading: str
@@ -54,34 +135,34 @@ class Linked:
 
     @property
     def power_unit(self) -> FieldUnit:
-        """The unit of the power of each echo (step, echo), by its range; that of the range-Doppler map."""
+        """Unit of the power of each echo (step, echo), the same as of the range-Doppler map."""
         return field_unit(self.radar, spreading=self.spreading, range_m=self.moments.range_m)
 
     @property
     def power_db(self) -> NDArray[np.float64]:
-        """Power of each echo (step, echo) in `power_unit` [dB]; NaN where hidden."""
+        """Power of each echo (step, echo) in `power_unit` [dB]; NaN if it is occluded."""
         power = self.moments.power_m2
         return np.where(power > 0, self.power_unit.level(power), np.nan)
 
     @property
     def seen(self) -> NDArray[np.bool_]:
-        """Which echoes (step, echo) would stand above the floor of the maps."""
+        """Whether each echo (step, echo) is above the floor of the maps."""
         return np.asarray(np.nan_to_num(self.power_db, nan=-np.inf) >= self.range_doppler.low_db)
 
     @property
     def power_range_db(self) -> tuple[float, float]:
-        """Of colours, from the floor of the maps to the strongest echo [dB]."""
+        """Limits of the colour scale [dB], from the floor of the maps to the strongest echo."""
         low_db = self.range_doppler.low_db
         return low_db, float(np.nanmax(self.power_db, initial=low_db + 1.0))
 
     @property
     def fastest_mps(self) -> float:
-        """Largest rate of range that colours reach [m/s]."""
+        """Largest range rate of the colour scale [m/s]."""
         rates = [*np.abs(self.moments.velocity_mps[self.seen]), *np.abs(self.rdt_points[:, 2]), 0.1]
         return float(max(rates))
 
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Velocities [m/s] and ranges [m] where echoes and detections are at any time, with a margin, inside the map."""
+        """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
         moments, levels = self.moments, self.range_doppler
         found = []
         for values, points, margin, (first, step), count in (
@@ -106,12 +187,12 @@ class Linked:
         return found[0], found[1]
 
     def shown_velocity(self) -> NDArray[np.float64]:
-        """Where echoes (step, echo) show on the velocity axis [m/s]: beyond the unambiguous velocity at another."""
+        """Return the aliased velocity of each echo (step, echo) [m/s], as on the velocity axis."""
         most = self.radar.max_velocity_mps
         return np.asarray((self.moments.velocity_mps + most) % (2 * most) - most)
 
     def rdt_group(self) -> NDArray[np.int64]:
-        """Group of parts of each point of the cloud (point,): that of the nearest echo of its moment, by bins."""
+        """Return the group of body parts of each point (point,), that of the nearest echo."""
         moments, radar = self.moments, self.radar
         steps = (
             np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1)

@@ -1,4 +1,4 @@
-"""``view.npz``: body, room, and echoes with their ways, moment by moment; what `rtradar view` needs beside maps and clouds."""
+"""Snapshots of body, room and echoes, the file ``view.npz`` that ``rtradar view`` needs."""
 
 from __future__ import annotations
 
@@ -14,8 +14,7 @@ from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_arrays
 
 _FORMAT = 1
-_MOST_BYTES = 200_000_000
-"""Far above what a run writes, some 2 MB; a file that claims more is none of ours."""
+_MAX_BYTES = 200_000_000  # far more than the 2 MB that a run writes
 
 _LARGEST = 1e9
 
@@ -50,43 +49,49 @@ _POINTS_INTO = {
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Moments:
-    """A capture at the middles of some of its windows; each field is an array of the same name in ``view.npz``.
+    """Snapshots of a capture at the centres of some frames, stored by field in ``view.npz``.
 
     Parameters
     ----------
     times : (step,) float64
-        Middles of the windows since the start of the capture [s], ascending.
+        Centres of the frames since the start of the capture [s], ascending.
     window : (step,) int64
-        Which windows: indices along ``time`` of ``maps.h5``.
+        Indices of the frames along ``time`` of ``maps.h5``.
     part_names : (part,) str
+        Names of the body parts.
     poses : (step, part, 4, 3) float32
-        Of each part its centre, then its three semi-axes as vectors, world [m].
+        Centre of each part, then its three semi-axes as vectors, in world coordinates [m].
     path_names : (path,) str
-        Walls in the order in which the wave meets them, the body between them: ``floor > body``; the direct one is ``body``.
+        Walls and body in the order in which the wave meets them, such as ``floor > body``; the
+        direct path is ``body``.
     echo_path, echo_part, echo_bounces : (echo,) int64
-        Path and body part of each echo, and the reflections on its way.
+        Path index, part index and number of reflections of each echo.
     range_m, velocity_mps : (step, echo) float64
-        Half the path from Tx to Rx [m] and its rate [m/s], positive receding; means over receivers weighted by power.
+        Half the path length from Tx to Rx [m] and its rate [m/s], positive receding; means over
+        receivers weighted by power.
     power_m2 : (step, echo) float64
-        |amplitude|^2, mean over receivers [m^2]; 0 where hidden, be it just before or after the moment.
+        |amplitude|^2, mean over receivers [m^2]; 0 if occluded, even just before or after.
     corners : (step, echo, corner, 3) float32
-        Where the echo is reflected on its way from the middle of the array and back, world [m]: places in walls and the mirror
-        point on the part; NaN after the last, and where the way is not known.
+        Reflection points of the echo on its path from the centre of the array and back, in world
+        coordinates [m]: points in walls and the specular point on the part. NaN after the last one
+        and if the path is unknown.
     wall_names : (wall,) str
+        Names of the walls.
     walls : (wall, 4, 3) float64
-        Corners of their front faces, world [m].
+        Corners of their front faces, in world coordinates [m].
     furniture_names : (piece,) str
+        Names of the pieces of furniture.
     furniture_vertices : (vertex, 3) float32
-        World [m].
+        Vertices of all pieces, in world coordinates [m].
     furniture_faces : (face, 3) int64
-        Into the vertices.
+        Indices into the vertices.
     furniture_piece : (vertex,) int64
-        Which piece a vertex belongs to.
+        Index of the piece that each vertex belongs to.
 
     Raises
     ------
     InputError
-        Where the shapes do not fit each other, a value is not finite, or an index points nowhere.
+        If the shapes do not fit each other, a value is not finite, or an index is out of range.
     """
 
     times: NDArray[np.float64]
@@ -113,7 +118,7 @@ class Moments:
         for name, (kind, axes) in _FIELDS.items():
             array = np.asarray(getattr(self, name))
             if kind == "U" and array.size == 0:
-                array = array.astype("U")  # an empty list has no kind
+                array = array.astype("U")  # an empty list has no string type
             if array.dtype.kind != np.dtype(kind).kind or array.dtype in (
                 np.float16,
                 np.longdouble,
@@ -123,13 +128,15 @@ class Moments:
                 )
             if array.ndim != len(axes):
                 raise InputError(
-                    f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})"
+                    f"view: {name} has shape {array.shape}; "
+                    f"its axes must be ({', '.join(map(str, axes))})"
                 )
             for axis, length in zip(axes, array.shape, strict=True):
                 wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
                 if length != wanted:
                     raise InputError(
-                        f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}"
+                        f"view: {name} has shape {array.shape}; "
+                        f"its axis {axis} must have length {wanted}"
                     )
             if kind != "U" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
                 raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
@@ -146,28 +153,29 @@ class Moments:
             index = getattr(self, name)
             if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
                 raise InputError(
-                    f"view: {name} points at a {axis} that is not there; it must be from 0 to {sizes[axis] - 1}"
+                    f"view: {name} points at a {axis} that is not there; "
+                    f"it must be from 0 to {sizes[axis] - 1}"
                 )
         if (np.diff(self.times) <= 0).any() or (self.power_m2 < 0).any():
             raise InputError("view: times must ascend, and power_m2 must not be negative")
 
     @property
     def direct(self) -> NDArray[np.bool_]:
-        """Which echoes come by no wall and no other part, (echo,)."""
+        """Whether each echo has a single reflection, that on the body, (echo,)."""
         return self.echo_bounces == 1
 
     def nearest(self, time_s: float) -> int:
-        """The step whose time is nearest to this one [s]."""
+        """Return the index of the snapshot nearest to this time [s]."""
         return int(np.abs(self.times - time_s).argmin())
 
 
 def save_moments(path: str | Path, moments: Moments) -> None:
-    """Write them as a NumPy archive, whole or not at all.
+    """Write snapshots as a NumPy archive.
 
     Raises
     ------
     InputError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     arrays = {name: getattr(moments, name) for name in _FIELDS}
     with atomic_file(path) as file:
@@ -175,16 +183,16 @@ def save_moments(path: str | Path, moments: Moments) -> None:
 
 
 def load_moments(path: str | Path) -> Moments:
-    """Read them.
+    """Read snapshots.
 
     Raises
     ------
     InputError
-        Where there is no such file, or it is damaged or of another kind.
+        If the file is missing, damaged or of another kind.
     """
     mend = "make it anew with: rtradar run"
     try:
-        arrays = read_arrays(Path(path), _MOST_BYTES)
+        arrays = read_arrays(Path(path), _MAX_BYTES)
         found: dict[str, Any] = {name: arrays[name] for name in ("format", *_FIELDS)}
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; {mend}") from None

@@ -1,4 +1,4 @@
-"""A still of `rtradar view`: the same four views at one moment, as a PNG file."""
+"""Still picture of ``rtradar view``: the same four views of one snapshot, as a PNG file."""
 
 from __future__ import annotations
 
@@ -9,54 +9,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
-from rtradar.report.figures.decibels import Levels
 from rtradar.report.figures.field_units import VELOCITY_LABEL
 from rtradar.report.figures.maps import new_figure, save_figure
-from rtradar.report.figures.part_groups import GROUPS, group_of_parts
 from rtradar.report.view.page import VELOCITY_COLOURS
-from rtradar.report.view.run_view import Linked
+from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
 from rtradar.system.files import atomic_file
 
 _HIDDEN = "#8c8c94"
 _NOW = "#e0389a"
 
 
-def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "part") -> None:
-    """Draw body, room and paths, the range-Doppler map, the cloud and the spectrogram at one moment.
+def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = "part") -> None:
+    """Draw body and paths, range-Doppler map, cloud and spectrogram of one snapshot.
 
     Parameters
     ----------
     path : path
-        PNG file; replaced whole or not at all.
-    linked : Linked
+        PNG file, which is replaced if it exists.
+    run_view : RunView
+        Data of the run.
     step : int
-        Along the times of its moments.
+        Index of the snapshot.
     colour : {"part", "power", "velocity"}
+        Quantity that colours show.
 
     Raises
     ------
     InputError
-        Where the file cannot be written.
+        If the file cannot be written.
     """
     figure = new_figure(15, 9.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
     figure.suptitle(
-        f"{linked.heading}, {linked.subtitle}: {linked.moments.times[step]:.2f} s", wrap=True
+        f"{run_view.heading}, {run_view.subtitle}: {run_view.moments.times[step]:.2f} s", wrap=True
     )
-    paint = _Paint(linked, colour)
+    paint = _Paint(run_view, colour)
     views = [
         figure.add_subplot(grid[row, column], projection=None if column else "3d")
         for row, column in np.ndindex(2, 2)
     ]
-    _draw_body(views[0], linked, step, paint)
-    _draw_map(figure, views[1], linked, step, paint)
-    _draw_cloud(views[2], linked, step, paint)
-    _draw_spectrogram(figure, views[3], linked, step)
+    _draw_body(views[0], run_view, step, paint)
+    _draw_map(figure, views[1], run_view, step, paint)
+    _draw_cloud(views[2], run_view, step, paint)
+    _draw_spectrogram(figure, views[3], run_view, step)
     paint.legend(figure, views)
     for artist in (
         one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)
     ):
-        # A long box in 3D is wider than its axes, at whose edge the body would be cut; the layout knows the box already.
+        # A long 3D box is wider than its axes, whose edge would cut the body. The layout already
+        # accounts for the box.
         artist.set_clip_on(False)
         artist.set_in_layout(False)
     with atomic_file(path) as file:
@@ -64,37 +65,39 @@ def draw_still(path: str | Path, linked: Linked, step: int, *, colour: str = "pa
 
 
 class _Paint:
-    """Colours by part, power or velocity, of echoes, parts and points of the cloud."""
+    """Colours of echoes, parts and cloud points by part, power or velocity."""
 
-    def __init__(self, linked: Linked, colour: str) -> None:
+    def __init__(self, run_view: RunView, colour: str) -> None:
         from matplotlib import colormaps
         from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 
-        self.colour, self._linked = colour, linked
+        self.colour, self._run_view = colour, run_view
         tints = ListedColormap(list(GROUPS.values()))
-        low, high = linked.power_range_db
+        low, high = run_view.power_range_db
         rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
         self.map = {"part": tints, "power": colormaps["viridis"], "velocity": rates}[colour]
         self.norm = {
             "part": Normalize(-0.5, len(GROUPS) - 0.5),
             "power": Normalize(low, high),
-            "velocity": Normalize(-linked.fastest_mps, linked.fastest_mps),
+            "velocity": Normalize(-run_view.fastest_mps, run_view.fastest_mps),
         }[colour]
-        groups = np.array(group_of_parts(linked.moments.part_names.tolist()))
+        groups = np.array(group_of_parts(run_view.moments.part_names.tolist()))
         self._echo = {
-            "part": np.broadcast_to(groups[linked.moments.echo_part], linked.moments.range_m.shape),
-            "power": linked.power_db,
-            "velocity": linked.moments.velocity_mps,
+            "part": np.broadcast_to(
+                groups[run_view.moments.echo_part], run_view.moments.range_m.shape
+            ),
+            "power": run_view.power_db,
+            "velocity": run_view.moments.velocity_mps,
         }[colour]
         self._groups = groups
 
     def echoes(self, step: int) -> NDArray[np.float64]:
-        """Of each echo (echo, rgba); grey where hidden."""
+        """Colour of each echo (echo, rgba); grey if it is occluded."""
         return self._rgba(self._echo[step].astype(np.float64))
 
     def parts(self, step: int) -> NDArray[np.float64]:
-        """Of each part (part, rgba), by its strongest direct echo."""
-        moments = self._linked.moments
+        """Colour of each part (part, rgba), by its strongest direct echo."""
+        moments = self._run_view.moments
         if self.colour == "part":
             return self._rgba(self._groups.astype(np.float64))
         out = np.full(len(moments.part_names), np.nan)
@@ -105,12 +108,12 @@ class _Paint:
         return self._rgba(out)
 
     def cloud(self) -> NDArray[np.float64]:
-        """Of each point of the cloud (point, rgba)."""
-        linked = self._linked
+        """Colour of each point of the cloud (point, rgba)."""
+        run_view = self._run_view
         if self.colour == "part":
-            return self._rgba(linked.rdt_group().astype(np.float64))
+            return self._rgba(run_view.rdt_group().astype(np.float64))
         return self._rgba(
-            linked.rdt_power_db if self.colour == "power" else linked.rdt_points[:, 2]
+            run_view.rdt_power_db if self.colour == "power" else run_view.rdt_points[:, 2]
         )
 
     def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -121,7 +124,7 @@ class _Paint:
         return rgba
 
     def legend(self, figure: Any, views: list[Any]) -> None:
-        """Say below the views what colours mean."""
+        """Add a legend of the colours below the views."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.patches import Patch
 
@@ -129,9 +132,10 @@ class _Paint:
             patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
             figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
             return
-        label = {"power": self._linked.power_unit.label("of an echo"), "velocity": VELOCITY_LABEL}[
-            self.colour
-        ]
+        label = {
+            "power": self._run_view.power_unit.label("of an echo"),
+            "velocity": VELOCITY_LABEL,
+        }[self.colour]
         bar = figure.colorbar(
             ScalarMappable(self.norm, self.map),
             ax=views,
@@ -144,11 +148,11 @@ class _Paint:
         bar.ax.tick_params(labelsize=8)
 
 
-def _draw_body(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
+def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     from matplotlib.ticker import MultipleLocator
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    moments, radar = linked.moments, linked.radar
+    moments, radar = run_view.moments, run_view.radar
     vertices, faces = unit_sphere(2)
     poses = moments.poses[step].astype(np.float64)
     for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
@@ -166,7 +170,7 @@ def _draw_body(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
         )
     place = np.array(radar.position_m)
     rgba = paint.echoes(step)
-    for echo in np.flatnonzero(linked.seen[step]):
+    for echo in np.flatnonzero(run_view.seen[step]):
         corners = moments.corners[step, echo].astype(np.float64)
         corners = corners[np.isfinite(corners).all(axis=1)]
         if len(corners):
@@ -209,33 +213,33 @@ def _extent(levels: Levels) -> tuple[float, float, float, float]:
 def _image(axes: Any, levels: Levels, number: int, colours: str) -> Any:
     decibels = levels.low_db + levels.step_db * levels.level[number]
     return axes.imshow(
-        decibels, origin="lower", aspect="auto", interpolation="nearest", cmap=colours, vmin=levels.low_db, vmax=levels.high_db,
-        extent=_extent(levels),
+        decibels, origin="lower", aspect="auto", interpolation="nearest", cmap=colours,
+        vmin=levels.low_db, vmax=levels.high_db, extent=_extent(levels),
     )  # fmt: skip
 
 
-def _draw_map(figure: Any, axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
-    moments = linked.moments
-    image = _image(axes, linked.range_doppler, step, "Greys")
-    rgba, velocity = paint.echoes(step), linked.shown_velocity()[step]
+def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+    moments = run_view.moments
+    image = _image(axes, run_view.range_doppler, step, "Greys")
+    rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
     for direct, style in (
         (False, {"marker": "D", "s": 14, "facecolors": "none"}),
         (True, {"marker": "o", "s": 40}),
     ):
-        own = np.flatnonzero(linked.seen[step] & (moments.direct == direct))
+        own = np.flatnonzero(run_view.seen[step] & (moments.direct == direct))
         edges = "white" if direct else rgba[own]
         given = style | ({"color": rgba[own]} if direct else {})
         axes.scatter(
             velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given
         )
-    across, up = linked.shown_box()
+    across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
     axes.set_title("Range-Doppler map of this window, and where echoes are")
-    figure.colorbar(image, ax=axes, label=linked.range_doppler.label)
+    figure.colorbar(image, ax=axes, label=run_view.range_doppler.label)
 
 
-def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
-    points, time = linked.rdt_points, linked.moments.times[step]
+def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
+    points, time = run_view.rdt_points, run_view.moments.times[step]
     axes.set(
         xlabel="Time [s]",
         ylabel="Range [m]",
@@ -246,16 +250,16 @@ def _draw_cloud(axes: Any, linked: Linked, step: int, paint: _Paint) -> None:
     if not len(points):
         return
     rgba = paint.cloud()
-    own = np.abs(points[:, 0] - time) <= linked.radar.frame_duration_s / 2
+    own = np.abs(points[:, 0] - time) <= run_view.radar.frame_duration_s / 2
     axes.scatter(*points[~own].T, c=rgba[~own], s=1.5, alpha=0.35, depthshade=False)
     axes.scatter(*points[own].T, c=rgba[own], s=12, depthshade=False)
     (_, r0, v0), (_, r1, v1) = points.min(axis=0), points.max(axis=0)
     axes.plot([time] * 5, [r0, r1, r1, r0, r0], [v0, v0, v1, v1, v0], color=_NOW, linewidth=1.2)
 
 
-def _draw_spectrogram(figure: Any, axes: Any, linked: Linked, step: int) -> None:
+def _draw_spectrogram(figure: Any, axes: Any, run_view: RunView, step: int) -> None:
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
-    if not linked.spectrogram.level.size:
+    if not run_view.spectrogram.level.size:
         axes.text(
             0.5,
             0.5,
@@ -265,6 +269,6 @@ def _draw_spectrogram(figure: Any, axes: Any, linked: Linked, step: int) -> None
             transform=axes.transAxes,
         )
         return
-    image = _image(axes, linked.spectrogram, 0, "viridis")
-    axes.axvline(linked.moments.times[step], color=_NOW, linewidth=1.5)
-    figure.colorbar(image, ax=axes, label=linked.spectrogram.label)
+    image = _image(axes, run_view.spectrogram, 0, "viridis")
+    axes.axvline(run_view.moments.times[step], color=_NOW, linewidth=1.5)
+    figure.colorbar(image, ax=axes, label=run_view.spectrogram.label)

@@ -1,4 +1,4 @@
-"""What the page's 3D views draw: a moving body, and clouds, packed small."""
+"""Data of the 3D views of pages: a moving body and clouds, packed compactly."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from rtradar.radar import Radar
 from rtradar.report.figures.field_units import field_unit
 
 FRAME_RATE_HZ = 20.0
-"""Poses a second of the moving figure."""
+"""Rate of the poses of the moving figure [Hz]."""
 
 MOST_FRAMES = 400
-"""20 s at the full rate, 0.5 MB; longer recordings have fewer poses a second."""
+"""Largest number of poses, 20 s at the full rate; longer recordings have a lower rate."""
 
 MOST_POINTS = 20_000
-"""Points of one cloud that a browser still turns smoothly."""
+"""Largest number of points of a cloud that a browser still rotates smoothly."""
 
 _SUBDIVISIONS = 2
 _DYNAMIC_RANGE_DB = 30.0
@@ -37,24 +37,26 @@ def figure_data(
     *,
     spreading: bool = True,
 ) -> dict[str, Any]:
-    """The recording as poses of ellipsoids, with the radar and the floor.
+    """Return the recording as poses of ellipsoids, with the radar and the floor.
 
     Parameters
     ----------
     body : Body
-        Placed before the radar.
+        Body at its position before the radar.
     radar : Radar
+        Radar of the run.
     part_power_m2 : mapping of part name to float, optional
         Mean echo power of each part [m^2], for its colour.
     spreading : bool
-        Whether amplitudes hold the loss over distance.
+        Whether amplitudes include the spreading loss.
 
     Returns
     -------
     dict
-        Ready for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three semi-axes of each part [m], world;
-        ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m];
-        ``power_db`` of each part, at most 30 dB below the strongest, or None; its ``power_label`` and ``power_unit``.
+        Plain values for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three
+        semi-axes of each part in world coordinates [m]; ``times`` [s]; ``vertices`` and ``faces``
+        of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m]; ``power_db`` of
+        each part, at most 30 dB below the strongest, or None; its ``power_label``, ``power_unit``.
     """
     intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
     times = np.linspace(0.0, body.duration_s, intervals + 1)
@@ -74,7 +76,7 @@ def figure_data(
 
 
 def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Centre and the three semi-axes of each part as vectors, (time, part, 4, 3) world [m], at times (time,) [s]."""
+    """Return centre and semi-axes of each part at ``times`` [s], (time, part, 4, 3) [m]."""
     centres, frames, semi_axes = body.at(times)
     # Columns of a frame are directions: after the swap, row k is semi-axis k.
     axes = np.swapaxes(frames * semi_axes[:, None, :], 2, 3)
@@ -87,26 +89,29 @@ def posed_figure(
     poses: NDArray[np.floating],
     radar: Radar,
 ) -> dict[str, Any]:
-    """What both pages draw of a moving body before a radar.
+    """Return what the run page and the view page draw of a moving body before a radar.
 
     Parameters
     ----------
     part_names : sequence of str
+        Names of the body parts.
     times : (frame,) float64
-        [s].
+        Times of the poses [s].
     poses : (frame, part, 4, 3)
-        As `semi_axis_poses` gives them.
+        Poses from `semi_axis_poses`.
     radar : Radar
+        Radar of the run.
 
     Returns
     -------
     dict
-        Ready for JSON: all of `figure_data` but ``power_db``.
+        Plain values for JSON: all of `figure_data` except ``power_db``.
     """
     centres, axes = poses[:, :, 0], poses[:, :, 1:]
     vertices, faces = unit_sphere(_SUBDIVISIONS)
-    # An ellipsoid reaches sqrt(sum of squares of its semi-axes' components) along each world axis.
-    reach = np.sqrt((axes**2).sum(axis=2))
+    # Half the extent of an ellipsoid along a world axis is the root of the sum of squares of its
+    # semi-axes' components.
+    extent = np.sqrt((axes**2).sum(axis=2))
     return {
         "parts": list(part_names),
         "times": np.round(times, 4).tolist(),
@@ -116,8 +121,8 @@ def posed_figure(
         "tx": np.round(radar.tx, 4).tolist(),
         "rx": np.round(radar.rx, 4).tolist(),
         "ranges": _ranges(
-            (centres - reach).reshape(-1, 3),
-            (centres + reach).reshape(-1, 3),
+            (centres - extent).reshape(-1, 3),
+            (centres + extent).reshape(-1, 3),
             np.concatenate([radar.tx, radar.rx]),
         ),
         "window_s": radar.frame_duration_s,
@@ -125,27 +130,28 @@ def posed_figure(
 
 
 def rdt_data(points: ArrayLike) -> dict[str, Any]:
-    """The range-Doppler-time cloud, thinned evenly to `MOST_POINTS`.
+    """Return the range-Doppler-time cloud, thinned evenly to `MOST_POINTS`.
 
     Parameters
     ----------
     points : (point, 3)
-        Time [s], range [m], velocity [m/s].
+        Time [s], range [m] and velocity [m/s] of each point.
 
     Returns
     -------
     dict
-        Ready for JSON: ``count``, ``shown``, and ``points`` as float32 (point, 3).
+        Plain values for JSON: ``count``, ``shown``, and ``points`` as float32 (point, 3).
 
     Raises
     ------
     InputError
-        Where the shape does not fit, or a value is not finite.
+        If the shape is wrong or a value is not finite.
     """
     places = np.asarray(points, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
         raise InputError(
-            f"report: rdt_points has shape {places.shape}; it must be (point, 3): time, range, velocity"
+            f"report: rdt_points has shape {places.shape}; "
+            "it must be (point, 3): time, range, velocity"
         )
     if not np.isfinite(places).all():
         raise InputError("report: rdt_points holds NaN or infinity; every value must be finite")
@@ -153,17 +159,18 @@ def rdt_data(points: ArrayLike) -> dict[str, Any]:
 
 
 def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
-    """The strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`.
+    """Return the strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`.
 
     Parameters
     ----------
     cloud : SpatialCloud
+        Spatial cloud of the run.
 
     Returns
     -------
     dict
-        Ready for JSON: ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points`` (point, 3), ``velocity``
-        and ``time`` (point,).
+        Plain values for JSON: ``count``, ``shown``, ``measured`` of x, y and z, and as float32
+        ``points`` (point, 3), ``velocity`` and ``time`` (point,).
     """
     cloud = cloud.strongest()
     return {"measured": cloud.measured.tolist()} | _thinned(
