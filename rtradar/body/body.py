@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.body.ellipsoids import Ellipsoids
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.motion import pose_ellipsoids
 from rtradar.motion.motion import Motion
 from rtradar.motion.retarget import to_nodes
 from rtradar.motion.skeleton_names import NODES
@@ -103,8 +103,8 @@ class Body:
             part = int(np.argmin(good))
             raise InputError(
                 f"Body: the {PART_NAMES[part]}, which ends in {NODES[1 + part]!r}, has semi-axes "
-                f"of {axes[part].tolist()} m; "
-                "semi_axes must be positive and finite: give the bone a length"
+                f"of {axes[part].tolist()} m; semi_axes must be positive and finite: give the bone "
+                "a length"
             )
         object.__setattr__(self, "semi_axes", axes)
 
@@ -143,14 +143,14 @@ class Body:
         return self.motion.duration_s
 
     def at(self, times: ArrayLike) -> Poses:
-        """Ellipsoids at any times (time,) [s] inside [0, duration_s].
+        """Pose the ellipsoids at any times from 0 to `duration_s`.
 
-        The frames are fixed in the material of the bones: they turn with them and never flip.
+        The frames are fixed in the bones: they rotate with them and never flip.
 
         Parameters
         ----------
         times : (time,) array_like
-            Since the start of the motion [s].
+            Times since the start of the motion [s].
 
         Returns
         -------
@@ -159,28 +159,22 @@ class Body:
         Raises
         ------
         InputError
-            Where a time lies outside.
+            Where a time lies outside the motion.
         """
         positions, quaternions = self.motion.at(times)
         shape = len(positions), len(self.semi_axes), 3
         centres, frames = np.empty(shape), np.empty((*shape, 3))
-        _stand(
-            positions,
-            quaternions,
-            np.array(self.motion.parents),
-            self._rest_frames,
-            centres,
-            frames,
-        )
+        parents = np.array(self.motion.parents)
+        pose_ellipsoids(positions, quaternions, parents, self._rest_frames, centres, frames)
         return Poses(centres, frames, self.semi_axes)
 
     def ellipsoids(self, time: float) -> Ellipsoids:
-        """The pose at one time [s].
+        """Pose the ellipsoids at one time.
 
         Parameters
         ----------
         time : float
-            Since the start of the motion [s].
+            Time since the start of the motion [s].
 
         Returns
         -------
@@ -199,28 +193,3 @@ class Body:
         across = np.cross(np.eye(3)[np.argmin(np.abs(along), axis=1)], along)
         across /= np.linalg.norm(across, axis=1, keepdims=True)
         return np.stack([across, np.cross(along, across), along], axis=2)
-
-
-@compiled(fastmath={"contract"})
-def _stand(positions, quaternions, parents, rest, centres, frames):
-    """Fill centres (time, part, 3) and frames (time, part, 3, 3) from joints (time, joint, 3).
-
-    Frames are rest (part, 3, 3) turned by unit quaternions (time, joint, 4), scalar last. The first
-    joint is the root, which has no bone.
-    """
-    for time in range(frames.shape[0]):
-        for part in range(frames.shape[1]):
-            for axis in range(3):
-                ends = positions[time, part + 1, axis] + positions[time, parents[part + 1], axis]
-                centres[time, part, axis] = 0.5 * ends
-            q = quaternions[time, part + 1]
-            x, y, z, w = q[0], q[1], q[2], q[3]
-            a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
-            d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
-            g, h, k = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
-            own, turned = rest[part], frames[time, part]
-            for column in range(3):
-                u, v, s = own[0, column], own[1, column], own[2, column]
-                turned[0, column] = a * u + b * v + c * s
-                turned[1, column] = d * u + e * v + f * s
-                turned[2, column] = g * u + h * v + k * s

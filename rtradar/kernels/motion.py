@@ -1,10 +1,11 @@
-"""Pose of a skeleton from splines of its root and its bones, time by time."""
+"""Poses of a skeleton, from splines of its root and its bones, and of the ellipsoids on it."""
 
 from __future__ import annotations
 
 import math
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from rtradar.kernels.jit import compiled
 
@@ -68,3 +69,35 @@ def pose_reference(times, knots, root, rotation, offsets, parents):
     for joint in range(1, len(parents)):
         positions[:, joint] += positions[:, parents[joint]]
     return positions, quaternions
+
+
+@compiled(fastmath={"contract"})
+def pose_ellipsoids(positions, quaternions, parents, rest, centres, frames):
+    """Fill centres (time, part, 3) and frames (time, part, 3, 3) from joints (time, joint, 3).
+
+    The frames are ``rest (part, 3, 3)`` rotated by unit quaternions (time, joint, 4), scalar last.
+    The first joint is the root, which has no bone.
+    """
+    for time in range(frames.shape[0]):
+        for part in range(frames.shape[1]):
+            for axis in range(3):
+                ends = positions[time, part + 1, axis] + positions[time, parents[part + 1], axis]
+                centres[time, part, axis] = 0.5 * ends
+            q = quaternions[time, part + 1]
+            x, y, z, w = q[0], q[1], q[2], q[3]
+            a, b, c = 1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)
+            d, e, f = 2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)
+            g, h, k = 2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)
+            own, rotated = rest[part], frames[time, part]
+            for column in range(3):
+                u, v, s = own[0, column], own[1, column], own[2, column]
+                rotated[0, column] = a * u + b * v + c * s
+                rotated[1, column] = d * u + e * v + f * s
+                rotated[2, column] = g * u + h * v + k * s
+
+
+def pose_ellipsoids_reference(positions, quaternions, parents, rest):
+    """Centres (time, part, 3) and frames (time, part, 3, 3) of `pose_ellipsoids`, by SciPy."""
+    centres = (positions[:, 1:] + positions[:, parents[1:]]) / 2
+    rotations = Rotation.from_quat(quaternions[:, 1:].reshape(-1, 4)).as_matrix()
+    return centres, rotations.reshape(len(positions), -1, 3, 3) @ rest

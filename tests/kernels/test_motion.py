@@ -1,8 +1,13 @@
-"""The compiled pose of a skeleton against its plain NumPy reference."""
+"""Compiled poses of skeletons and ellipsoids against their plain references."""
 
 import numpy as np
 
-from rtradar.kernels.motion import pose, pose_reference
+from rtradar.kernels.motion import (
+    pose,
+    pose_ellipsoids,
+    pose_ellipsoids_reference,
+    pose_reference,
+)
 
 
 def test_pose_is_that_of_the_reference() -> None:
@@ -23,3 +28,16 @@ def test_pose_is_that_of_the_reference() -> None:
     )
     rest = np.setdiff1d(np.arange(20), which)
     assert not positions[rest].any()
+
+
+def test_ellipsoids_are_those_of_the_reference() -> None:
+    rng = np.random.default_rng(2)
+    parents = np.array([-1, 0, 1, 0, 3])
+    positions, quaternions = rng.normal(size=(7, 5, 3)), rng.normal(size=(7, 5, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
+    rest = rng.normal(size=(4, 3, 3))
+    centres, frames = np.empty((7, 4, 3)), np.empty((7, 4, 3, 3))
+    pose_ellipsoids(positions, quaternions, parents, rest, centres, frames)
+    expected = pose_ellipsoids_reference(positions, quaternions, parents, rest)
+    np.testing.assert_allclose(centres, expected[0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(frames, expected[1], rtol=0, atol=1e-12)
