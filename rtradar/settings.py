@@ -34,6 +34,8 @@ class RunOptions(TypedDict, total=False):
     keep_all: bool
     save_if: bool
     detector: str
+    range_window: str | tuple[str, float]
+    doppler_window: str | tuple[str, float]
     noise_power_m2: float | None
 
 
@@ -41,7 +43,7 @@ class RunOptions(TypedDict, total=False):
 class RunSettings:
     """The settings of a run, from motion to point cloud.
 
-    Names that belong to a model, a scene or a detector, and options of a model, are validated where
+    Names of models, detectors and window functions, and options of a model, are validated where
     these are built.
 
     Parameters
@@ -83,6 +85,8 @@ class RunSettings:
         Whether the IF samples are kept, in ``if.zarr``.
     detector : str
         Name of the detector that marks the cells of a map, one of `rtradar.process.DETECTORS`.
+    range_window, doppler_window : str or (str, float)
+        Window functions in fast and in slow time; see `rtradar.process.WindowFunctions`.
     noise_power_m2 : float, optional
         Noise power per sample [m^2], in place of ``snr_db``: for runs with the same noise.
 
@@ -108,6 +112,8 @@ class RunSettings:
     keep_all: bool = False
     save_if: bool = False
     detector: str = "os-cfar"
+    range_window: str | tuple[str, float] = "hann"
+    doppler_window: str | tuple[str, float] = "hann"
     noise_power_m2: float | None = None
 
     def __post_init__(self) -> None:

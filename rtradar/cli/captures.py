@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import decibels, number, path, seconds, setting, whole
+from rtradar.cli.values import decibels, number, path, seconds, setting, whole, window
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS
 from rtradar.system.files import check_place, write_json
@@ -144,6 +144,14 @@ def _add_capture(run: argparse.ArgumentParser) -> None:
     run.add_argument(
         "--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)"
     )
+    for axis, time in ("range", "fast time"), ("doppler", "slow time"):
+        run.add_argument(
+            f"--{axis}-window",
+            type=window,
+            default="hann",
+            metavar="NAME[:X]",
+            help=f"window function in {time}, such as blackman or chebwin:80 (default: hann)",
+        )
     run.add_argument(
         "--seed",
         type=whole,
@@ -244,6 +252,8 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
         "heading_deg": options.heading,
         "snr_db": options.snr_db,
         "pfa": options.pfa,
+        "range_window": options.range_window,
+        "doppler_window": options.doppler_window,
         "seed": options.seed,
         "variant": options.variant,
         "spreading": not options.no_spreading,

@@ -50,6 +50,12 @@ def setting(text: str) -> tuple[str, bool | int | float | str]:
     return name, value
 
 
+def window(text: str) -> str | tuple[str, float]:
+    """A window function: a name, or a name and its parameter."""
+    name, colon, value = text.partition(":")
+    return (name, number(value)) if colon else name
+
+
 def seconds(text: str) -> float:
     """At least 0 [s]."""
     value = number(text)

@@ -16,7 +16,7 @@ from rtradar.echoes import Echoes
 from rtradar.pipeline.rooms.indoors import Indoors
 from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages
-from rtradar.process import ClutterRemoval, Detector, range_spectrum
+from rtradar.process import ClutterRemoval, Detector, WindowFunctions, range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.signal import Noise, receive, separate, synthesize
@@ -57,6 +57,8 @@ class Capture:
         Filter that removes static clutter before Doppler.
     detect : Detector
         Detector that marks the cells of a map.
+    window_functions : WindowFunctions
+        Window functions in fast and in slow time.
     title : str
         For pictures and progress.
     stages : Stages
@@ -76,6 +78,7 @@ class Capture:
     windows: NDArray[np.int64]
     removal: ClutterRemoval
     detect: Detector
+    window_functions: WindowFunctions
     title: str
     stages: Stages
     warmup_s: float
@@ -122,7 +125,9 @@ class Capture:
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
                 apart = separate(received, radar, first)
-                return range_spectrum(apart, radar, out=transformed[:n])
+                return range_spectrum(
+                    apart, radar, window_functions=self.window_functions, out=transformed[:n]
+                )
 
         def take(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):

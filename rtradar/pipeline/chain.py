@@ -193,6 +193,7 @@ def _stream(capture: Capture, settings: RunSettings, folder: Path) -> Clouds:
         stages=capture.stages,
         title=capture.title,
         removal=capture.removal,
+        window_functions=capture.window_functions,
         received=received,
     )
     try:

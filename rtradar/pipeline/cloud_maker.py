@@ -15,11 +15,13 @@ from rtradar.process import (
     ClutterRemoval,
     Detector,
     SlidingWindows,
+    WindowFunctions,
     angle_spectra,
     cell_spectra,
     measures_angle,
     power_map,
 )
+from rtradar.process.window_functions import HANN
 from rtradar.radar import Radar
 
 CLOUD_POINTS = 3000
@@ -68,6 +70,8 @@ class CloudMaker:
         Where the time goes.
     removal : ClutterRemoval
         Applied before Doppler.
+    window_functions : WindowFunctions
+        Window functions of the range spectra and in slow time.
 
     Attributes
     ----------
@@ -83,7 +87,9 @@ class CloudMaker:
         seed: int,
         stages: Stages,
         removal: ClutterRemoval,
+        window_functions: WindowFunctions = HANN,
     ) -> None:
+        self._window_functions = window_functions
         self._radar, self._detect, self._stages, self._removal = radar, detect, stages, removal
         self._sliding = SlidingWindows(radar)
         self._rdt, self._spatial = (
@@ -111,7 +117,7 @@ class CloudMaker:
             with stages.time("clutter removal"):
                 cube = self._removal.window(window)
             with stages.time("doppler"):
-                power = power_map(cube, radar)
+                power = power_map(cube, radar, window_functions=self._window_functions)
             with stages.time("cfar"):
                 mask = self._detect(power)
             middle = float(radar.window_times(np.array([start]))[0])
@@ -120,7 +126,7 @@ class CloudMaker:
             angles = None
             if measures_angle(radar):
                 with stages.time("angle"):
-                    angles = window_angles(cube, mask, radar)
+                    angles = window_angles(cube, mask, radar, self._window_functions)
                     found = spatial_points(angles, radar, middle)
                     self._spatial.add(
                         np.column_stack([found.points, found.velocity, found.power, found.time])
@@ -139,7 +145,10 @@ class CloudMaker:
 
 
 def window_angles(
-    cube: NDArray[np.complexfloating], mask: NDArray[np.bool_], radar: Radar
+    cube: NDArray[np.complexfloating],
+    mask: NDArray[np.bool_],
+    radar: Radar,
+    window_functions: WindowFunctions = HANN,
 ) -> AngleSpectra:
     """Angle spectra of the detected cells of one window."""
     rows, columns = np.nonzero(mask)
@@ -147,7 +156,7 @@ def window_angles(
     pieces = []
     for first in range(0, max(len(rows), 1), _CELLS_AT_ONCE):
         row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
-        values = cell_spectra(cube, radar, row, column)
+        values = cell_spectra(cube, radar, row, column, window_functions=window_functions)
         pieces.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
     return pieces[0] if len(pieces) == 1 else _joined(pieces)
 

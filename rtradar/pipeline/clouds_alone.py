@@ -48,6 +48,7 @@ def clouds_of(
         seed=settings.seed,
         stages=capture.stages,
         removal=capture.removal,
+        window_functions=capture.window_functions,
     )
     capture.stream(maker, progress=False)
     return maker.finish(), capture.warmup_s

@@ -17,7 +17,7 @@ from rtradar.pipeline.rooms.indoors import indoors
 from rtradar.pipeline.survey import Survey, survey
 from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
-from rtradar.process import build_detector, clutter_removal
+from rtradar.process import WindowFunctions, build_detector, clutter_removal
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
 from rtradar.scatter.antenna_gain import is_shaped
@@ -37,6 +37,7 @@ def prepare(
     """
     removal = clutter_removal(settings.clutter_removal, radar)
     detect = build_detector(settings.detector, pfa=settings.pfa, looks=radar.n_channels)
+    window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
     if settings.snr_db == "physical":
         # These say what is missing before the work.
         radar.noise_power_w, radar.watts_per_m2  # noqa: B018
@@ -77,6 +78,7 @@ def prepare(
         windows=windows,
         removal=removal,
         detect=detect,
+        window_functions=window_functions,
         title=", ".join(names),
         stages=stages,
         warmup_s=warmup_s,

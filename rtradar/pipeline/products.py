@@ -16,6 +16,7 @@ from rtradar.process import (
     Detector,
     SlidingRangeTime,
     SlidingSpectrogram,
+    WindowFunctions,
     angle_grid,
     measured_angles,
     power_map,
@@ -23,6 +24,7 @@ from rtradar.process import (
     range_elevation,
     window_cycles,
 )
+from rtradar.process.window_functions import HANN
 from rtradar.radar import Radar
 
 
@@ -45,6 +47,8 @@ class Products:
         Applied to everything that is made of the spectra.
     received : ReceivedWindow, optional
         A window whose map is kept as it was before the removal.
+    window_functions : WindowFunctions
+        Window functions of the range spectra and in slow time.
 
     Attributes
     ----------
@@ -63,7 +67,9 @@ class Products:
         title: str,
         removal: ClutterRemoval,
         received: ReceivedWindow | None = None,
+        window_functions: WindowFunctions = HANN,
     ) -> None:
+        self._window_functions = window_functions
         self._radar, self._detect, self._stages, self._received = radar, detect, stages, received
         self._clouds = CloudMaker(
             radar,
@@ -71,8 +77,11 @@ class Products:
             seed=seed,
             stages=stages,
             removal=removal,
+            window_functions=window_functions,
         )
-        self._spectrogram = SlidingSpectrogram(radar, removal=removal)
+        self._spectrogram = SlidingSpectrogram(
+            radar, removal=removal, window_functions=window_functions
+        )
         self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
         self.piece = self._clouds.piece
         axes = {
@@ -125,12 +134,12 @@ class Products:
     def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
         radar = self._radar
         with self._stages.time("received"):
-            power = power_map(cube, radar)
+            power = power_map(cube, radar, window_functions=self._window_functions)
             mask = self._detect(power)
             kept = {"range_doppler_received": power, "detections_received": mask}
             if "azimuth" in self._angle_names:
                 kept["range_azimuth_received"] = range_azimuth(
-                    window_angles(cube, mask, radar), radar
+                    window_angles(cube, mask, radar, self._window_functions), radar
                 )
             self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
 
