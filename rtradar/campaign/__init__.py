@@ -1,6 +1,8 @@
-"""Data sets: many recordings x radars x scenes x fidelities, made on Dask, resumed at any time (extra: campaign)."""
+"""Data sets of many recordings, radars, scenes and echo models, built on Dask and resumable.
 
-from rtradar.campaign.build import build_dataset
-from rtradar.campaign.words import in_words
+The package needs the extra ``campaign``.
+"""
+
+from rtradar.campaign.build import build_dataset, in_words
 
 __all__ = ["build_dataset", "in_words"]

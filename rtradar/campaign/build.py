@@ -1,11 +1,11 @@
-"""Build a data set: make what is missing or damaged, on Dask, and nothing else."""
+"""Building of a data set: only missing and damaged samples are made, on Dask."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections import Counter, defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,18 +23,21 @@ from rtradar.errors import InputError
 from rtradar.system.files import unfinished
 from rtradar.system.output_folder import alone_in
 
+_MAX_SHOWN = 8  # values of each property in a report
+
 
 @dataclass(frozen=True)
 class Store:
-    """What of a data set is there.
+    """Samples of a data set that exist and that are missing.
 
     Parameters
     ----------
     folder : path
+        Folder of the data set.
     missing : tuple of Recipe
-        The damaged ones among them.
+        Recipes of the samples that are missing or damaged.
     whole, damaged : int
-        Samples.
+        Number of complete and of damaged samples.
     """
 
     folder: Path
@@ -44,7 +47,7 @@ class Store:
 
     @classmethod
     def look(cls, found: Sequence[Recipe], folder: Path) -> Store:
-        """Read every sample that is there."""
+        """Check every sample that exists."""
         missing, damaged = [], 0
         for recipe in tqdm(
             found, desc="looking for samples", unit="sample", disable=None, leave=False
@@ -69,29 +72,31 @@ def build_dataset(
     Parameters
     ----------
     spec : path
-        TOML file; `rtradar.campaign.spec` says what stands in it.
+        TOML file, whose keys are listed in `rtradar.campaign.spec`.
     out : path
-        Folder of the collection; workers on other machines must see it under the same name.
+        Folder of the data set, which workers on other machines must see under the same name.
     plan_only : bool
-        Whether to make only a few samples of each kind (radar, scene, fidelity), and to estimate the others by them.
+        Whether to make only a few samples of each kind (radar, scene, fidelity), from which the
+        cost of the others is estimated.
     workers : int, optional
-        Processes on this machine; as many as there are cores if left out.
+        Number of processes on this machine, by default as many as there are cores.
     scheduler : str, optional
         Address of a Dask scheduler to use instead.
 
     Returns
     -------
     dict
-        Plain JSON values: ``samples``, ``by`` (counts), ``whole`` before, ``damaged``, ``made``, ``missing`` after, ``bytes``,
-        ``work_s`` a sample, ``wall_s``, ``workers``; for a plan ``estimated_s`` and ``estimated_bytes`` of what is missing.
+        Plain JSON values: ``samples``, ``by`` (counts), ``whole`` before, ``damaged``, ``made``,
+        ``missing`` after, ``bytes``, ``work_s`` for each sample, ``wall_s``, ``workers``; for a
+        plan ``estimated_s`` and ``estimated_bytes`` of the missing samples.
 
     Raises
     ------
     InputError
-        Where the specification has no meaning, the folder cannot be written, another build writes into it, or a sample cannot
-        be made.
+        If the specification is invalid, the folder cannot be written, another build writes into it,
+        or a sample cannot be made.
     CampaignError
-        Where workers or their scheduler were lost.
+        If workers or their scheduler were lost.
     """
     found = recipes(read_spec(spec))
     folder = out.resolve()
@@ -115,7 +120,8 @@ def build_dataset(
         done: list[Outcome] = []
         count = 0
         if store.missing:
-            # What own workers leave goes with them, also where this process is told to end; those of others may still write.
+            # Partial files of local workers are removed, even if this process is terminated. The
+            # workers of another scheduler may still be writing.
             leftovers = unfinished(lambda: sweep(folder)) if scheduler is None else nullcontext()
             try:
                 with leftovers, dask_client(workers, scheduler) as client:
@@ -133,7 +139,8 @@ def build_dataset(
     good = [outcome for outcome in done if not outcome.trouble]
     if troubles:
         raise InputError(
-            f"{len(troubles)} of {len(found)} samples cannot be made, the other {store.whole + len(good)} are there; "
+            f"{len(troubles)} of {len(found)} samples cannot be made, "
+            f"the other {store.whole + len(good)} are there; "
             f"the first of them, {_told(found, troubles[0])}"
         )
     left = len(store.missing) - len(good)
@@ -157,7 +164,7 @@ def _told(found: Sequence[Recipe], outcome: Outcome) -> str:
 
 
 def _first_of_each_kind(missing: Sequence[Recipe], workers: int) -> list[Recipe]:
-    """As many as keep all workers busy, so that they are measured as they will run, and their second ones: the first are slow."""
+    """Choose enough samples of each kind to keep all workers busy, twice: the first are slow."""
     most = 2 * math.ceil(workers / len({recipe.kind for recipe in missing}))
     seen: Counter[tuple[str, str, str]] = Counter()
     chosen = []
@@ -169,7 +176,7 @@ def _first_of_each_kind(missing: Sequence[Recipe], workers: int) -> list[Recipe]
 
 
 def _estimate(missing: Sequence[Recipe], good: Sequence[Outcome], workers: int) -> dict[str, float]:
-    """Time and bytes of what is still missing: of each kind the quickest that was measured, times the interval."""
+    """Estimate time and bytes of the missing samples from the fastest sample of each kind."""
     measured = {outcome.identity: outcome for outcome in good}
     rates: defaultdict[tuple[str, str, str], list[float]] = defaultdict(list)
     for recipe in missing:
@@ -179,3 +186,51 @@ def _estimate(missing: Sequence[Recipe], good: Sequence[Outcome], workers: int) 
     seconds = sum(recipe.interval_s * min(rates[recipe.kind]) for recipe in left)
     size = sum(outcome.size for outcome in good) / max(len(good), 1)
     return {"estimated_s": seconds / max(workers, 1), "estimated_bytes": size * len(left)}
+
+
+def in_words(report: Mapping[str, Any]) -> str:
+    """Describe the report of `rtradar.campaign.build_dataset` in a few lines of text.
+
+    Parameters
+    ----------
+    report : mapping
+        Result of `rtradar.campaign.build_dataset`.
+
+    Returns
+    -------
+    str
+    """
+    lines = [f"{report['samples']} samples"]
+    for key, counted in report["by"].items():
+        shown = [f"{name} {count}" for name, count in list(counted.items())[:_MAX_SHOWN]]
+        more = [f"and {len(counted) - _MAX_SHOWN} more"] if len(counted) > _MAX_SHOWN else []
+        lines.append(f"  by {key}: {', '.join(shown + more)}")
+    workers = f"{report['workers']} worker{'' if report['workers'] == 1 else 's'}"
+    damaged = f", {report['damaged']} were damaged" if report["damaged"] else ""
+    there = f"{report['whole']} were there{damaged}"
+    if report["made"]:
+        there += (
+            f", {report['made']} made in {_time(report['wall_s'])} by {workers} "
+            f"({report['work_s']:.1f} s and {_size(report['bytes'] / report['made'])} each)"
+        )
+    lines.append(there)
+    if "estimated_s" in report:
+        lines.append(
+            f"{report['missing']} are missing: about {_time(report['estimated_s'])} on {workers}, "
+            f"and {_size(report['estimated_bytes'])}"
+            if report["missing"]
+            else "none is missing"
+        )
+    return "\n".join(lines)
+
+
+def _time(seconds: float) -> str:
+    if seconds < 120:
+        return f"{seconds:.0f} s"
+    if seconds < 7200:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h"
+
+
+def _size(size: float) -> str:
+    return f"{size / 1e9:.1f} GB" if size >= 1e9 else f"{size / 1e6:.1f} MB"

@@ -1,4 +1,4 @@
-"""From a TOML file to a specification: one line of complaint about anything that has no meaning."""
+"""Reader of specification files (TOML); every error is reported in one line."""
 
 from __future__ import annotations
 
@@ -11,8 +11,16 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rtradar.campaign.spec import DRAWN, Actor, Recorded, Setting, Spec, check_samples
-from rtradar.campaign.windows import WINDOW_KEYS, Windows
+from rtradar.campaign.spec import (
+    DRAWN,
+    WINDOW_KEYS,
+    Actor,
+    Recorded,
+    Setting,
+    Spec,
+    Windows,
+    check_samples,
+)
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS
@@ -43,7 +51,7 @@ _EACH: Mapping[str, list[Any]] = {
     "person_position_m": [None],
     "radar_position_m": [None],
 }
-"""What may stand under ``[each]``, and what holds where it does not; None: drawn, or as the scene says."""
+"""Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
 
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *WINDOW_KEYS)
@@ -52,17 +60,17 @@ _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 
 
 def read_spec(path: Path) -> Spec:
-    """The data set that a TOML file describes.
+    """Read the specification of a data set from a TOML file.
 
     Raises
     ------
     InputError
-        One line that names the file and the key: where it cannot be read, or a key is unknown, or a value has no meaning, or a
-        file that it names is missing.
+        If the file cannot be read, a key is unknown, a value is invalid, or a file that it names is
+        missing. The message is one line with the file and the key.
     """
     table = read_toml(path, "data set", "give a TOML file")
     try:
-        # Absolute, for processes elsewhere read the meshes of scenes.
+        # The path is absolute, because other processes read the meshes of scenes.
         return _spec(table, path.resolve().parent)
     except InputError as error:
         raise InputError(f"data set file '{path}': {error}") from None
@@ -118,19 +126,21 @@ def _spec(table: Table, folder: Path) -> Spec:
 
 
 def _folder(table: Table, beside: Path) -> Path:
-    """Of the recordings: below the file's own, or below one that a variable of the environment allows."""
+    """Folder of the recordings, below the file's own or below that of an environment variable."""
     named = check_text("data set", "folder", table.get("folder", "."))
     allowed, below = beside, named
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
             raise InputError(
-                f"folder = {shown(named)}: the environment has no such variable; set it to the folder of recordings"
+                f"folder = {shown(named)}: the environment has no such variable; "
+                "set it to the folder of recordings"
             )
         allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
     there = inside(allowed, below)
     if there is None:
         raise InputError(
-            f"folder = {shown(named)} leaves the folder of the file; put recordings below it, or name a variable of the "
+            f"folder = {shown(named)} leaves the folder of the file; "
+            "put recordings below it, or name a variable of the "
             'environment that holds their folder: "${RECORDINGS}"'
         )
     if not there.is_dir():
@@ -189,7 +199,7 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
 
 
 def _comparable(value: object) -> object:
-    """The same where it is a number or a text; a table or a list, which is refused later, becomes its text."""
+    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
     return value if isinstance(value, int | float | str | None) else repr(value)
 
 
@@ -197,7 +207,8 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     source = check_text("[each]", key, value)
     if source.endswith(".toml") and inside(folder, source) is None:
         raise InputError(
-            f"[each] {key} = {shown(source)} leaves the folder of the file; put it beside it or below"
+            f"[each] {key} = {shown(source)} leaves the folder of the file; "
+            "put it beside it or below"
         )
     try:
         return load(folder / source if source.endswith(".toml") else source)
@@ -231,13 +242,14 @@ def _actor(where: str, table: Table) -> Actor:
 
 
 def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
-    """A list of whole numbers as it is, and a number as those below it."""
+    """Return a list of whole numbers as it is, or for a count all numbers below it."""
     value = table[key]
     if isinstance(value, list) and value and len(set(map(str, value))) == len(value):
         return tuple(_whole(where, key, number) for number in value)
     if isinstance(value, list):
         raise InputError(
-            f"{where}{key} = {shown(value)}; it must be a list of different whole numbers, not empty"
+            f"{where}{key} = {shown(value)}; "
+            "it must be a list of different whole numbers, not empty"
         )
     count = _whole(where, key, value)
     if count == 0:
@@ -257,7 +269,8 @@ def _recorded(where: str, table: Table, windows: Table, folder: Path) -> Recorde
     for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
         if name is not None and inside(folder, name) is None:
             raise InputError(
-                f"{where}{key} = {shown(name)} leaves the folder of recordings; name files in it or below"
+                f"{where}{key} = {shown(name)} leaves the folder of recordings; "
+                "name files in it or below"
             )
         if name is not None and not (folder / name).is_file():
             raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")

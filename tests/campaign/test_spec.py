@@ -12,8 +12,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from rtradar.campaign.spec import Windows
 from rtradar.campaign.spec_file import _spec, read_spec
-from rtradar.campaign.windows import Windows
 from rtradar.errors import InputError
 
 SMALL = """
