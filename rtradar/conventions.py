@@ -2,7 +2,7 @@
 
 World axes
     x points from the radar to the person, y to the left, z up; metres; the floor is z = 0. Motion
-    capture is y-up: world (x, y, z) = mocap (z, x, y). The radar of the paper stands at (-4, 1, 1)
+    capture is y-up: world (x, y, z) = mocap (z, x, y). The radar of the paper is at (-4, 1, 1)
     m, its boresight along +x, its axes parallel to the world's.
 
 Angles

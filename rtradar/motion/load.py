@@ -1,4 +1,4 @@
-"""`load_motion`: one door for every file format."""
+"""`load_motion`, the reader of every file format."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ READERS = Registry(
         "c3d": "rtradar.motion.load:read_c3d",
     },
 )
-"""What reads motion files, by their ending without the dot."""
+"""Readers of motion files, by the ending of the file without the dot."""
 
 register_reader = READERS.register
 

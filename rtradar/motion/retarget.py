@@ -238,10 +238,10 @@ def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
         longest = int(np.argmax(spans))
         parts = 2 if len(pieces) == 2 else 3
         pieces[longest : longest + 1] = [(*pieces[longest][:2], 1 / parts)] * parts
-    bones = [(_between(motion, a, b), share) for a, b, share in pieces]
+    bones = [(_between(motion, a, b), fraction) for a, b, fraction in pieces]
     return {
-        node: _Bone(bone.offset * share, bone.rotations)
-        for node, (bone, share) in zip(("lowerback", "upperback", "thorax"), bones, strict=True)
+        node: _Bone(bone.offset * fraction, bone.rotations)
+        for node, (bone, fraction) in zip(("lowerback", "upperback", "thorax"), bones, strict=True)
     }
 
 

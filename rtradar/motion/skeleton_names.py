@@ -2,7 +2,7 @@
 
 HDM05 and CMU have 31 joints. The 24-joint chain (`CHAIN_24`, that of SMPL) leaves out the thumbs,
 and the joints inside what moves as one: upper neck, ball of the foot, radius, hand. Its neck and
-collars are not separated in HDM05, they all stand at the thorax; without the three and with the top
+collars are not separated in HDM05, they are all at the thorax; without the three and with the top
 of the head added, 22 nodes and 21 bones remain, one a body part.
 """
 
@@ -72,7 +72,7 @@ CHAIN_24: Mapping[str, str] = {
     "l_hand": "lfingers",
     "r_hand": "rfingers",
 }
-"""The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) where each stands."""
+"""The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) of each."""
 
 _NODE_OF_24 = {
     "pelvis": "root",
@@ -111,7 +111,7 @@ class Convention:
 def _both(
     left: Mapping[str, tuple[str, ...]], left_word: str, right_word: str
 ) -> dict[str, tuple[str, ...]]:
-    """Names of both sides from templates with ``@`` where the side stands."""
+    """Names of both sides, from templates with ``@`` in place of the side."""
     return {
         f"{side}_{node}": tuple(name.replace("@", word) for name in names)
         for side, word in (("l", left_word), ("r", right_word))

@@ -1,4 +1,4 @@
-"""Closed forms of scattering: the judge. Nothing here knows of rays, meshes or the echo models."""
+"""Closed forms of scattering, the reference. Nothing here uses rays, meshes or echo models."""
 
 from rtradar.rcs.ellipsoid import ellipsoid, ellipsoid_radii
 from rtradar.rcs.sphere import sphere

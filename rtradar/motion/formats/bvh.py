@@ -38,10 +38,10 @@ _REACH_M = (0.7, 1.5)
 It is 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
 
 _SHORTEST_S, _LONGEST_S = 1e-6, 10.0
-"""What a frame may last."""
+"""Limits of the duration of a frame [s]."""
 
 _STRETCH_M = 0.02
-"""Bones whose position channels move more than this are not rigid."""
+"""Largest movement of the position channels of a rigid bone [m]."""
 
 
 @dataclass
@@ -52,7 +52,7 @@ class _Joint:
     offset: NDArray[np.float64] = field(default_factory=lambda: np.zeros(3))
     channels: tuple[str, ...] = ()
     column: int = 0
-    """Of its first channel among those of all joints."""
+    """Index of the joint's first channel among those of all joints."""
 
 
 def load_bvh(path: Path, unit_m: float | None = None) -> Motion:

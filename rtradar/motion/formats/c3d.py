@@ -78,7 +78,8 @@ def load_c3d(path: Path, unit_m: float | None = None) -> Motion:
     Returns
     -------
     Motion
-        On the 22 nodes, rigid; how joints are found tells `rtradar.motion.formats.markers`.
+        Motion of the rigid 22-node skeleton; `rtradar.motion.formats.markers` says how joints are
+        found.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""From markers on the skin to the 22 nodes of the body.
+"""Conversion of markers on the skin to the 22 nodes of the body.
 
 The marker set is the one of 41 markers that CMU and HDM05 recordings carry, in Vicon's names: four
 on the head (LFHD, RFHD, LBHD, RBHD), C7, T10, CLAV and STRN about the chest, four on the waist

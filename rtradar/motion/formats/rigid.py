@@ -1,4 +1,4 @@
-"""From joints that were measured one by one to the nearest rigid skeleton."""
+"""Conversion of joints that were measured one by one to the nearest rigid skeleton."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def smooth(u: Array) -> Array:
 
 
 def bump(u: Array) -> Array:
-    """From 0 (u <= 0) over 1 (u = 1/2) to 0 (u >= 1), first and second derivative 0 at the ends."""
+    """Curve from 0 (u <= 0) over 1 (u = 1/2) to 0 (u >= 1), with derivatives of 0 at the ends."""
     u = np.clip(u, 0.0, 1.0)
     return 64 * (u * (1 - u)) ** 3
 
@@ -28,9 +28,9 @@ def keyed(t: Array, times: ArrayLike, values: ArrayLike) -> Array:
     moves = np.diff(keys, axis=0)
     reached = np.cumsum(np.concatenate([keys[:1], moves[:-1]]), axis=0)
     under_way = np.clip(np.searchsorted(at, t, side="right") - 1, 0, len(moves) - 1)
-    share = smooth((t - at[under_way]) / np.diff(at)[under_way])
+    fraction = smooth((t - at[under_way]) / np.diff(at)[under_way])
     return np.asarray(
-        reached[under_way] + moves[under_way] * share.reshape(-1, *(1,) * (keys.ndim - 1))
+        reached[under_way] + moves[under_way] * fraction.reshape(-1, *(1,) * (keys.ndim - 1))
     )
 
 

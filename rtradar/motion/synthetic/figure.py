@@ -198,8 +198,8 @@ def rotations(pose: Pose, height_m: float) -> Array:
     bones = offsets(height_m)
     bent = pose.pelvis.inv() * pose.thorax
     turned: dict[str, Rotation] = {"root": pose.pelvis, "thorax": pose.thorax, "head": pose.head}
-    for node, share in (("lowerback", 1 / 3), ("upperback", 2 / 3)):
-        turned[node] = pose.pelvis * Rotation.from_rotvec(share * bent.as_rotvec())
+    for node, fraction in (("lowerback", 1 / 3), ("upperback", 2 / 3)):
+        turned[node] = pose.pelvis * Rotation.from_rotvec(fraction * bent.as_rotvec())
     turned["neck"] = pose.thorax * Rotation.from_rotvec(
         0.5 * (pose.thorax.inv() * pose.head).as_rotvec()
     )

@@ -33,7 +33,9 @@ STRAIGHT_M = 4.2
 """Walks up to this length just go straight."""
 
 STANCE = 0.57
-"""Part of the cycle that a foot stands: so 7 % of it on both, twice (Winter has 60 %)."""
+"""Fraction of the cycle for which a foot is on the floor: both are for 7 % of it, twice.
+
+Winter has 60 %."""
 
 MIDSTANCE = 0.22
 """Part of the cycle from landing until the body is over the foot."""

@@ -56,7 +56,7 @@ class Traits:
 
     @property
     def clearance_m(self) -> float:
-        """How much a swinging foot is lifted [m]."""
+        """Height to which a swinging foot is lifted [m]."""
         return 0.042 * self.height_m
 
     @property
