@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS, Radar
 from rtradar.scatter import MODELS
+from rtradar.scatter.echo_models import affordable_models
 
 PARTS = ("models", "growth")
 """What may be measured alone: models with baseline and floors, or growth with the size of the problem."""
 
 RADARS = tuple(PRESETS.built_in)
-FIDELITIES = ("analytic-paper", "analytic", "specular", "fresnel", "physical-optics")
+FIDELITIES = tuple(affordable_models(12.0))
 """Radars and models by default: those that take less than minutes for seconds of radar."""
 
 CHEAPEST = "analytic"

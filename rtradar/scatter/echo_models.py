@@ -22,8 +22,8 @@ MODELS = Registry(
     "rtradar.models",
     "fidelity",
     {
-        "analytic-paper": "rtradar.scatter.models.analytic:analytic_paper",
-        "analytic": "rtradar.scatter.models.analytic:analytic",
+        "analytic-paper": "rtradar.scatter.models.analytic:AnalyticPaper",
+        "analytic": "rtradar.scatter.models.analytic:Analytic",
         "specular": "rtradar.scatter.models.specular:Specular",
         "fresnel": "rtradar.scatter.models.fresnel:Fresnel",
         "physical-optics": "rtradar.scatter.models.physical_optics:PhysicalOptics",
@@ -93,6 +93,17 @@ def build_model(
         radar,
         body,
     )
+
+
+def models_that(ability: str) -> list[str]:
+    """Names of the built-in models with an ability, such as ``supports_rooms``, cheapest first."""
+    return [name for name in MODELS.built_in if getattr(MODELS[name], ability, False)]
+
+
+def affordable_models(most: float) -> list[str]:
+    """Names of the built-in models that cost at most so many times as much as `analytic`."""
+    costs = {name: MODELS[name].relative_cost for name in models_that("relative_cost")}  # type: ignore[attr-defined]
+    return [name for name, cost in costs.items() if cost <= most]
 
 
 def takes_backend(fidelity: str) -> bool:

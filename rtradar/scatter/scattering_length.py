@@ -14,6 +14,7 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.common.validity import warn_of_small_radii
+from rtradar.scatter.echo_models import MODELS
 from rtradar.scatter.models.analytic import far_field_echo
 
 if TYPE_CHECKING:
@@ -24,21 +25,19 @@ Field = Callable[..., NDArray[np.complex128]]
 
 
 class _Home(NamedTuple):
-    """Where the field of a model is computed: module and function within this package; whether it takes meshes, and traces."""
+    """Where the field of a model is computed: module and function within this package."""
 
     module: str
     function: str
-    meshes: bool
-    hides: bool = True
 
 
 _HOMES = {
-    "analytic": _Home("scattering_length", "_analytic_field", meshes=False, hides=False),
-    "specular": _Home("scattering_length", "_specular_field", meshes=False),
-    "fresnel": _Home("models.fresnel", "fresnel_scattering", meshes=False),
-    "physical-optics": _Home("facets.target", "facet_scattering", meshes=True),
-    "reference": _Home("facets.target", "facet_scattering", meshes=True),
-    "rays": _Home("ray_tubes.target", "rays_scattering", meshes=True),
+    "analytic": _Home("scattering_length", "_analytic_field"),
+    "specular": _Home("scattering_length", "_specular_field"),
+    "fresnel": _Home("models.fresnel", "fresnel_scattering"),
+    "physical-optics": _Home("facets.target", "facet_scattering"),
+    "reference": _Home("facets.target", "facet_scattering"),
+    "rays": _Home("ray_tubes.target", "rays_scattering"),
 }
 _COMMON = ("target", "tx", "rx", "frequency", "polarization")
 
@@ -97,11 +96,11 @@ def scattering_length(
         raise InputError(
             f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(_HOMES)}"
         )
-    home = _HOMES[fidelity]
+    home, model = _HOMES[fidelity], MODELS[fidelity]
     if isinstance(target, Ellipsoids):
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
             _refuse_inside(target, name, antennas)
-    elif not home.meshes:
+    elif not model.accepts_meshes:  # type: ignore[attr-defined]
         raise InputError(
             f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it needs curvature in closed form"
         )
@@ -114,7 +113,7 @@ def scattering_length(
             raise InputError(
                 f"scattering_length: '{fidelity}' has no option '{option}'; it has: {allowed}"
             )
-    if isinstance(target, Ellipsoids) and home.hides:
+    if isinstance(target, Ellipsoids) and model.traces:  # type: ignore[attr-defined]
         target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
         _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,25 @@ def anchor_step(radar: Radar, apart_s: float = _ANCHORS_S) -> int:
     A limb at 5 m/s goes 5 cm in 10 ms.
     """
     return max(1, round(apart_s / radar.chirp_interval_s))
+
+
+class BuiltInModel:
+    """What the models of rtradar say of themselves; lists of models are derived from it.
+
+    Models of other packages need none of this: what they do not say is False, or not known.
+    """
+
+    traces: ClassVar[bool] = True
+    """Whether the model traces rays, so that parts of the body hide each other."""
+
+    supports_rooms: ClassVar[bool] = False
+    """Whether the model of the person is part of `Multipath`, for scenes with walls."""
+
+    accepts_meshes: ClassVar[bool] = False
+    """Whether `scattering_length` by this model takes meshes as well as ellipsoids."""
+
+    relative_cost: ClassVar[float | None] = None
+    """Rough time per part and chirp over that of `analytic`; None if it depends on the pose."""
 
 
 class EchoModel(Protocol):

@@ -14,7 +14,7 @@ from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.common.body_material import Surface
-from rtradar.scatter.common.poses import chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 
 _NO_BISECTOR = 1e-24  # square of the sum of two opposite unit vectors, as rounding leaves it
 _LANES = 8
@@ -158,15 +158,15 @@ def _cross_section(
     return ellipsoid(semi_axes[:, 0], semi_axes[:, 1], semi_axes[:, 2], theta, phi)
 
 
-class Analytic:
-    """`analytic`, and with ``paper`` the plane-wave model of the paper.
+class Analytic(BuiltInModel):
+    """`analytic`: the specular range to each antenna, and the cross-section of each ellipsoid.
 
     Parameters
     ----------
     radar : Radar
+        Radar, where it is in the scene.
     body : Body
-    paper : bool
-        Range of the centre and plane waves over the array instead of the specular range to each antenna.
+        Body, which hides none of its own parts.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     material : {"perfect-conductor", "skin"}
@@ -178,39 +178,37 @@ class Analytic:
         Where a body is not made of that, or it is not known over the sweep.
     """
 
+    traces = False
+    supports_rooms = True
+    relative_cost = 1.0
+
     def __init__(
         self,
         radar: Radar,
         body: Body,
         *,
-        paper: bool = False,
         spreading: bool = True,
         material: str = "perfect-conductor",
     ) -> None:
-        self._radar, self._body, self._paper, self._spreading = radar, body, paper, spreading
+        self._radar, self._body, self._spreading = radar, body, spreading
         self._surface = Surface(material, radar)
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        if self._paper:
-            length, amplitude = plane_wave_echo(self._radar, *at[1:], spreading=self._spreading)
-        else:
-            length, amplitude = far_field_echo(*at[1:], spreading=self._spreading)
+        length, amplitude = self._returns(at)
         echo = self._surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
-
-def analytic(
-    radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor"
-) -> Analytic:
-    """`Analytic` as the model of that name."""
-    return Analytic(radar, body, spreading=spreading, material=material)
+    def _returns(self, at: ChirpPoses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return far_field_echo(*at[1:], spreading=self._spreading)
 
 
-def analytic_paper(
-    radar: Radar, body: Body, *, spreading: bool = True, material: str = "perfect-conductor"
-) -> Analytic:
-    """`Analytic` as in the paper."""
-    return Analytic(radar, body, paper=True, spreading=spreading, material=material)
+class AnalyticPaper(Analytic):
+    """`analytic-paper`: the range of each centre and plane waves over the array, as in the paper."""
+
+    supports_rooms = False
+
+    def _returns(self, at: ChirpPoses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return plane_wave_echo(self._radar, *at[1:], spreading=self._spreading)

@@ -17,7 +17,7 @@ from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights
-from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.models.auto_errors import (
@@ -73,7 +73,7 @@ class _Group(NamedTuple):
     bounces: NDArray[np.int64]
 
 
-class Auto:
+class Auto(BuiltInModel):
     """`auto`: only what the tolerance requires of each part is modelled; where the way changes, echoes are faded over.
 
     Parameters

@@ -5,16 +5,18 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.scatter.echo_models import MODELS
 from rtradar.scatter.models.auto_errors import (
     ANALYTIC,
     FRESNEL,
     LEFT_OUT,
     PHYSICAL_OPTICS,
+    WAYS,
     Forecast,
 )
 
-_COST = np.array([0.0, 1.0, 1.5, 6.0, 12.0, 200.0])
-"""Of a part, by and large: it says which change to try first, where several would do."""
+_COST = np.array([0.0, *(MODELS[name].relative_cost for name in WAYS[1:])])  # type: ignore[attr-defined]
+"""Rough cost of a part: it says which change to try first, where several would do."""
 
 
 _SYSTEMATIC, _INTERFERING = 0.5, 0.6

@@ -13,7 +13,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.common.nodes import sweep_nodes
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.fresnel_zones.grid import zone_rays
 from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
 from rtradar.scatter.fresnel_zones.occluders import TracedHiders, hiding_parts
@@ -32,7 +32,7 @@ _WIDE = 0.1
 """Bandwidth over centre frequency above which shares differ over the sweep."""
 
 
-class Fresnel:
+class Fresnel(BuiltInModel):
     """`fresnel`: lengths and returns of `specular`, times the share V of the Fresnel zones that is in view.
 
     Parameters
@@ -51,6 +51,8 @@ class Fresnel:
     InputError
         Where ``shadow_rays`` is out of range.
     """
+
+    relative_cost = 6.0
 
     def __init__(
         self,

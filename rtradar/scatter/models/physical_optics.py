@@ -16,7 +16,7 @@ from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.envelope import (
     PIECES,
     TOGETHER,
@@ -73,7 +73,7 @@ def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):
                         out[part] += weight * value[part] * strength[chirp, receiver, part]
 
 
-class PhysicalOptics:
+class PhysicalOptics(BuiltInModel):
     """`physical-optics`: specular point at every chirp, facets at anchors, three frequencies and a few places of the array.
 
     Parameters
@@ -104,6 +104,9 @@ class PhysicalOptics:
     -----
     Equation :eq:`envelope` of the theory page; :eq:`po` in each anchor.
     """
+
+    accepts_meshes = True
+    relative_cost = 12.0
 
     def __init__(
         self,

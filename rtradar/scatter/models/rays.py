@@ -17,7 +17,7 @@ from rtradar.kernels.blends import hermite_weights
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options
@@ -36,7 +36,7 @@ _NODES_PER_HZ = (1e-9, 2.5e-9)
 Array = NDArray[np.float64]
 
 
-class Rays:
+class Rays(BuiltInModel):
     """`rays`: tubes fixed in the material of the body, shot from each Tx.
 
     The path over the specular point of each part is exact at every chirp; rays are shot at anchors, and what varies slowly, the
@@ -66,6 +66,9 @@ class Rays:
     BackendError
         Where no backend of that kind works here.
     """
+
+    accepts_meshes = True
+    relative_cost = 100.0
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.moving_body import FacetBody
 from rtradar.scatter.specular_point.solver import mirror
 
@@ -17,7 +17,7 @@ _NODES = 7
 the integral at each frequency itself three leave 1 to 3 % at 12 GHz."""
 
 
-class Reference:
+class Reference(BuiltInModel):
     """`reference`: path lengths and facets at every chirp; visibility from every Tx and Rx once in every TDM cycle.
 
     In one cycle of the paper's radars a limb at 5 m/s goes 4 mm, less than a facet.
@@ -33,6 +33,9 @@ class Reference:
     facets : int, optional
         Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a grown person.
     """
+
+    accepts_meshes = True
+    relative_cost = 200.0
 
     def __init__(
         self,

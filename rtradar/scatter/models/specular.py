@@ -9,14 +9,14 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.body_material import Surface
-from rtradar.scatter.common.poses import chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.specular_point.solver import mirror
 from rtradar.scatter.specular_point.visibility import MirrorVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 
-class Specular:
+class Specular(BuiltInModel):
     """`specular`: lengths and returns in float64 at every chirp, occlusion from Mitsuba.
 
     Parameters
@@ -35,6 +35,9 @@ class Specular:
     InputError
         Where a body is not made of that, or it is not known over the sweep.
     """
+
+    supports_rooms = True
+    relative_cost = 1.5
 
     def __init__(
         self,

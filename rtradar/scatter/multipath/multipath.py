@@ -19,6 +19,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.array_ends import ArrayEnds
 from rtradar.scatter.common.body_material import Surface, body_material
 from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses, one_echo_a_part
+from rtradar.scatter.echo_models import MODELS, models_that
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.multipath.image_paths import WallPath, corners, wall_paths
 from rtradar.scatter.multipath.interpolation import weigh
@@ -103,15 +104,16 @@ class Multipath:
             raise InputError(
                 f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3"
             )
-        if fidelity not in ("specular", "analytic"):
+        if fidelity not in (allowed := models_that("supports_rooms")):
             raise InputError(
-                f"fidelity '{fidelity}' knows no walls; allowed in a room: specular, analytic"
+                f"fidelity '{fidelity}' knows no walls; allowed in a room: {', '.join(allowed)}"
             )
+        traces: bool = MODELS[fidelity].traces  # type: ignore[attr-defined]
         self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
         self._visibility: MirrorVisibility | None = None
         tracers = None
-        if fidelity == "specular":
+        if traces:
             from rtradar.trace.backends.backend import select, use
             from rtradar.trace.body_tracer import BodyTracer
             from rtradar.trace.room_tracer import RoomTracer
@@ -137,7 +139,7 @@ class Multipath:
         self.paths: tuple[WallPath, ...] = wall_paths(
             scene.walls, np.asarray(radar.position_m), order
         )
-        self._over_walls = WallEchoes(radar, self.paths, far_field=fidelity == "analytic")
+        self._over_walls = WallEchoes(radar, self.paths, far_field=not traces)
         parts = len(body.part_names)
         self._path, self._part = (
             array.ravel() for array in np.divmod(np.arange(len(self.paths) * parts), parts)

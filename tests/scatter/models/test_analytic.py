@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
-from rtradar.scatter.models.analytic import Analytic, far_field_echo, plane_wave_echo
+from rtradar.scatter.models.analytic import Analytic, AnalyticPaper, far_field_echo, plane_wave_echo
 from rtradar.signal import synthesize
 
 Array = NDArray[np.float64]
@@ -304,7 +304,7 @@ def test_plane_waves_reach_the_array_as_in_the_paper(angle_deg: float, line: str
     # a target on the side where the index rises; nothing on the other line. Range: of the centre.
     angle, range_m = math.radians(angle_deg), 4.0
     body = at_angles(range_m, angle if line == "y" else 0.0, 0.0 if line == "y" else angle)
-    echoes = Analytic(FLAT, body, paper=True).echoes(np.arange(12))
+    echoes = AnalyticPaper(FLAT, body).echoes(np.arange(12))
     lead = 2 * range_m - echoes.length[..., 0]
     index = 8 * (np.arange(6)[:, None] - 2.5) + (np.arange(8) - 3.5)
     expected = index * FLAT.start_wavelength_m / 2 * math.sin(angle)
@@ -323,7 +323,7 @@ def test_far_away_plane_waves_are_exact(place: tuple[float, float, float]) -> No
     far = 1e6
     body = toy(parts=1)
     body.centres = far * np.array([place])
-    length = Analytic(FLAT, body, paper=True).echoes(np.arange(12)).length[..., 0]
+    length = AnalyticPaper(FLAT, body).echoes(np.arange(12)).length[..., 0]
     exact = np.linalg.norm(FLAT.tx - body.centres, axis=1)[:, None] + np.linalg.norm(
         FLAT.rx[FLAT.rx_of_tx] - body.centres, axis=2
     )
@@ -335,9 +335,7 @@ def test_far_away_plane_waves_are_exact(place: tuple[float, float, float]) -> No
 def test_the_papers_amplitude_is_that_of_the_line_of_sight(spreading: bool) -> None:
     body = at_angles(4.0, 0.3, -0.2)
     amplitude = (
-        Analytic(FLAT, body, paper=True, spreading=spreading)
-        .echoes(np.arange(12))
-        .amplitude[0, ..., 0]
+        AnalyticPaper(FLAT, body, spreading=spreading).echoes(np.arange(12)).amplitude[0, ..., 0]
     )
     local = -body.frames[0].T @ body.centres[0] / 4.0
     sigma = ellipsoid(*body.semi_axes[0], math.acos(local[2]), math.atan2(local[1], local[0]))
@@ -353,7 +351,7 @@ def test_the_papers_amplitude_is_that_of_the_line_of_sight(spreading: bool) -> N
 def test_echoes_keep_the_contract(paper: bool, channels: Any) -> None:
     radar = Radar(channels=channels)
     chirps = np.arange(24) + 7
-    echoes = Analytic(radar, toy(parts=4), paper=paper).echoes(chirps)
+    echoes = (AnalyticPaper if paper else Analytic)(radar, toy(parts=4)).echoes(chirps)
     assert echoes.length.shape == (24, radar.n_rx, 4)
     assert echoes.amplitude.shape == (1, 24, radar.n_rx, 4)
     assert echoes.frequency.tolist() == [radar.centre_frequency_hz]
@@ -381,7 +379,7 @@ def test_each_chirp_has_its_own_transmitter_receivers_and_pose() -> None:
 
 @both_models
 def test_which_chirps_are_asked_together_does_not_matter(paper: bool) -> None:
-    model = Analytic(LOW, toy(velocity=np.array([1.0, -2.0, 0.5])), paper=paper)
+    model = (AnalyticPaper if paper else Analytic)(LOW, toy(velocity=np.array([1.0, -2.0, 0.5])))
     whole, part = model.echoes(np.arange(40)), model.echoes(np.arange(13, 31))
     np.testing.assert_array_equal(part.length, whole.length[13:31])
     np.testing.assert_array_equal(part.amplitude, whole.amplitude[:, 13:31])
@@ -398,7 +396,8 @@ def test_past_the_end_the_body_rests() -> None:
 def test_the_centre_is_a_surface_farther_in_the_papers_model() -> None:
     body = toy()
     ours, papers = (
-        Analytic(LOW, body, paper=paper).echoes(np.arange(12)) for paper in (False, True)
+        (AnalyticPaper if paper else Analytic)(LOW, body).echoes(np.arange(12))
+        for paper in (False, True)
     )
     # On the mean over the array: the plane waves lead and lag by up to 0.1 m.
     nearer = (papers.length - ours.length).mean(axis=(0, 1))

@@ -453,7 +453,7 @@ def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> 
         ({"spreading": False}, "spreading may be off in free space only"),
         ({"order": -1}, "order = -1"),
         ({"order": True}, "order = True"),
-        ({"fidelity": "rays"}, "allowed in a room: specular, analytic"),
+        ({"fidelity": "rays"}, "allowed in a room: analytic, specular"),
         ({"material": "wood"}, "allowed: perfect-conductor, skin"),
     ],
 )

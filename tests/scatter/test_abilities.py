@@ -1,0 +1,32 @@
+"""What models say of themselves, and the lists that are derived from it."""
+
+from __future__ import annotations
+
+import argparse
+
+import pytest
+
+from rtradar.cli import captures
+from rtradar.scatter import MODELS, takes_backend
+from rtradar.scatter.echo_models import affordable_models, models_that
+
+
+def test_a_model_traces_if_it_takes_a_backend() -> None:
+    assert models_that("traces") == [name for name in MODELS.built_in if takes_backend(name)]
+
+
+def test_models_are_listed_cheapest_first() -> None:
+    names = affordable_models(float("inf"))
+    assert names == [name for name in MODELS.built_in if name != "auto"]
+    costs = [MODELS[name].relative_cost for name in names]  # type: ignore[attr-defined]
+    assert costs == sorted(costs)
+
+
+def test_the_help_of_run_names_every_model(capsys: pytest.CaptureFixture[str]) -> None:
+    parser = argparse.ArgumentParser()
+    captures.add(parser.add_subparsers())
+    with pytest.raises(SystemExit):
+        parser.parse_args(["run", "--help"])
+    words = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
+    listed = words.partition("--fidelity FIDELITY ")[2].partition(", or of a package")[0]
+    assert listed.split(", ") == list(MODELS.built_in)
