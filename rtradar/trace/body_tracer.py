@@ -15,9 +15,13 @@ from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene
+from rtradar.trace.near_rays import near_rays
 from rtradar.trace.rays import rays_of
-from rtradar.trace.sightlines import DOUBTFUL, clearances, outline_rays
-from rtradar.trace.unit_sphere import SUBDIVISIONS, UnitSphere
+from rtradar.trace.unit_sphere import UnitSphere
+
+
+SUBDIVISIONS = 4
+"""5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
 
 @dataclass(frozen=True)
@@ -107,19 +111,14 @@ class BodyTracer:
     ) -> NDArray[np.bool_]:
         """Whether no other part stands between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
 
-        A target lies on part ``own (ray,)``, which cannot hide it, or on none, -1. Rays that pass every outline at a distance are
-        told in closed form; Mitsuba decides the others, outline by outline.
+        A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba decides about every line of sight
+        and every part that the line comes near.
         """
         if self._pose is None:
             raise RuntimeError("BodyTracer: pose the body before rays are sent")
-        clear = clearances(origins, targets, own, *self._pose, self._semi_axes)
-        seen = clear > 0
-        doubtful = np.flatnonzero(np.abs(clear) < DOUBTFUL)
-        rays, whose = outline_rays(
-            origins[doubtful], targets[doubtful], own[doubtful], *self._pose, self._semi_axes
-        )
-        seen[doubtful] = True
-        seen[doubtful[whose[self._sphere.meets(rays)]]] = False
+        rays, line = near_rays(origins, targets, own, *self._pose, self._semi_axes)
+        seen = np.ones(len(origins), dtype=bool)
+        seen[line[self._sphere.meets(rays)]] = False
         return seen
 
     def first_hits(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Hits:

@@ -1,9 +1,8 @@
 """Ask Mitsuba, for every vertex of every part that faces an antenna, which other part stands before it.
 
-Float32 decides visibility only. A line of sight that passes an ellipsoid by more than a hundredth of its semi-axes, or goes
-through it deeper than that, needs no ray: no triangle stands out or in as far. What is left lies along outlines, where
-triangles decide. A ray is brought to the axes in which the part that it may meet is the unit sphere: the same triangles
-for every part, so there is nothing to pose, and each ray starts two radii before what it may meet.
+Float32 decides visibility only. Each line of sight is brought to the axes in which the part that it may meet is the unit sphere,
+so there is nothing to pose, and each ray starts two radii before what it may meet. Lines that pass outside a volume a tenth
+larger than the part have no ray traced.
 """
 
 from __future__ import annotations
@@ -16,56 +15,32 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.trace.clearance import into_ball
-from rtradar.trace.outlines import VIEWS, may_hide, outlines
+from rtradar.trace.near_rays import NEAR
 from rtradar.trace.unit_sphere import UnitSphere
-
-_NEAR = 0.01
-"""Lines of sight are traced that pass a part, outside or inside of its outline, by less than this share of its semi-axes."""
 
 
 @inlined(fastmath=True)
-def _pass(x, y, z, start, turn, shift, occluder, entry, first, nearest):
-    """What a occluder, the unit ball in its own axes, does to the ways to vertices; how many come near its outline.
+def _nearest(x, y, z, start, turn, shift, nearest):
+    """Where the lines of sight to vertices come nearest to a part, as a fraction of the line; how many come near it.
 
-    ``first`` becomes its number where it certainly hides a vertex, and does so before ``entry``, the share of the way at
-    which what hides it was met. ``nearest`` is the share at which the way comes nearest to the occluder's middle, where that
-    is near its outline; else -1.
+    The part is the unit sphere in its own axes. ``nearest`` is -1 where the line passes outside the bounding volume.
     """
     s0, s1, s2 = start[0], start[1], start[2]
     square = s0 * s0 + s1 * s1 + s2 * s2
-    outside, inside = (1 + _NEAR) ** 2, (1 - _NEAR) ** 2
+    bound = NEAR * NEAR
     count = 0
     for vertex in range(len(x)):
-        w0 = (
-            turn[0, 0] * x[vertex]
-            + turn[0, 1] * y[vertex]
-            + turn[0, 2] * z[vertex]
-            + (shift[0] - s0)
-        )
-        w1 = (
-            turn[1, 0] * x[vertex]
-            + turn[1, 1] * y[vertex]
-            + turn[1, 2] * z[vertex]
-            + (shift[1] - s1)
-        )
-        w2 = (
-            turn[2, 0] * x[vertex]
-            + turn[2, 1] * y[vertex]
-            + turn[2, 2] * z[vertex]
-            + (shift[2] - s2)
-        )
+        w0 = turn[0, 0] * x[vertex] + turn[0, 1] * y[vertex] + turn[0, 2] * z[vertex]
+        w1 = turn[1, 0] * x[vertex] + turn[1, 1] * y[vertex] + turn[1, 2] * z[vertex]
+        w2 = turn[2, 0] * x[vertex] + turn[2, 1] * y[vertex] + turn[2, 2] * z[vertex]
+        w0, w1, w2 = w0 + (shift[0] - s0), w1 + (shift[1] - s1), w2 + (shift[2] - s2)
         span = w0 * w0 + w1 * w1 + w2 * w2
         back = -(s0 * w0 + s1 * w1 + s2 * w2)
-        # Least square of the distance along the way, times its span: no division.
+        # Least square of the distance along the line, times its span: no division.
         least = square * span - back * back if back < span else (square - 2 * back + span) * span
-        hides, near = least < inside * span, least < outside * span
-        met = (back - math.sqrt(max(back * back - span * (square - 1), 0.0))) / span
-        before = hides and met < entry[vertex]
-        first[vertex] = occluder if before else first[vertex]
-        entry[vertex] = met if before else entry[vertex]
-        doubt = near and not hides
-        nearest[vertex] = min(back / span, 1.0) if doubt else -1.0
-        count += doubt
+        near = least < bound * span
+        nearest[vertex] = max(min(back / span, 1.0), 0.0) if near else -1.0
+        count += near
     return count
 
 
@@ -104,119 +79,110 @@ def _grown(rays):
     return out
 
 
-@compiled()
-def _choose(antennas, parts, centres, frames, semi_axes, vertices, margin, hidden):
-    """Name what certainly hides a vertex, and the rays that have to be followed for others.
+@inlined()
+def _may_stand_before(antenna, part, other, centres, longest):
+    """Whether the bounding ball of a part may occlude that of another: it begins nearer, and their cones overlap."""
+    to_part, to_other, along = 0.0, 0.0, 0.0
+    for i in range(3):
+        a, b = centres[part, i] - antenna[i], centres[other, i] - antenna[i]
+        to_part += a * a
+        to_other += b * b
+        along += a * b
+    to_part, to_other = math.sqrt(to_part), math.sqrt(to_other)
+    own, its = NEAR * longest[part], NEAR * longest[other]
+    if to_other - its >= to_part + own:
+        return False
+    if to_part <= own or to_other <= its:
+        return True
+    angle = math.acos(min(1.0, max(-1.0, along / (to_part * to_other))))
+    return angle < math.asin(own / to_part) + math.asin(its / to_other)
 
-    Of each ray: where it starts, which way it goes and how far, in axes in which what it may meet is the unit ball (7,);
-    the place in ``hidden`` that it answers for, and what hides it if the ray meets anything (2,).
+
+@compiled()
+def _rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
+    """Return the rays that decide which part occludes which vertex.
+
+    Of each ray: start, direction and length in axes where the part that it may meet is the unit sphere (7,); place of the vertex
+    in (antenna, n, vertex), and the part (2,); and where on the line of sight it comes nearest to that part.
     """
     every, n_vertices = len(centres), vertices.shape[2]
-    turn, shift, start, local, way = (
-        np.empty((3, 3)),
-        np.empty(3),
-        np.empty(3),
-        np.empty(3),
-        np.empty(3),
-    )
-    low, high, near, far = (
-        np.empty((every, VIEWS)),
-        np.empty((every, VIEWS)),
-        np.empty(every),
-        np.empty(every),
-    )
-    chosen, occluders = np.empty(n_vertices, dtype=np.int64), np.empty(every, dtype=np.int64)
-    faces, begins, begin, places = (
-        np.empty(n_vertices),
-        np.empty(n_vertices),
-        np.empty(n_vertices),
-        np.empty((3, n_vertices)),
-    )
+    turn, shift, start, local = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    way, longest = np.empty(3), np.zeros(every)
+    for part in range(every):
+        for i in range(3):
+            longest[part] = max(longest[part], semi_axes[part, i])
+    chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
+    faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
+    nearest = np.empty(n_vertices)
     rays, whose, count = (
-        np.empty((7, 4096), dtype=np.float32),
+        np.empty((8, 4096), dtype=np.float32),
         np.empty((2, 4096), dtype=np.int64),
         0,
     )
-    entry, first, nearest = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
-    wider = np.empty((every, 3))
-    for part in range(every):
-        for i in range(3):
-            wider[part, i] = semi_axes[part, i] * (1 + _NEAR)
     for a in range(len(antennas)):
-        outlines(antennas[a], centres, frames, wider, low, high, near, far)
         for n in range(len(parts)):
             part = parts[n]
-            found = 0
-            for other in range(every):
-                if other != part and may_hide(part, other, low, high, near, far):
-                    occluders[found] = other
-                    found += 1
-            if found == 0:
-                continue
-            for i in range(3):
-                local[i] = 0.0
-                for j in range(3):
-                    local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
-            # Occluder by occluder and coordinate by coordinate: these loops run in vector lanes.
+            facing = np.uint64(0)
+            looked_at = False
             all_x, all_y, all_z = vertices[part, 0], vertices[part, 1], vertices[part, 2]
-            _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
-            x, y, z, facing = places[0], places[1], places[2], np.uint64(0)
-            for vertex in range(n_vertices):
-                # The next one takes its place where this one is not wanted: no branch.
-                chosen[facing], begin[facing] = vertex, begins[vertex]
-                x[facing], y[facing], z[facing] = all_x[vertex], all_y[vertex], all_z[vertex]
-                facing += np.uint64(faces[vertex])
-            x, y, z = x[:facing], y[:facing], z[:facing]
-            for i in range(facing):
-                entry[i], first[i] = math.inf, -1.0
-            before, slot = count, (a * len(parts) + n) * n_vertices
-            for k in range(found):
-                into_ball(
-                    part, occluders[k], antennas[a], centres, frames, semi_axes, turn, shift, start
-                )
-                if (
-                    _pass(x, y, z, start, turn, shift, float(occluders[k]), entry, first, nearest)
-                    == 0
-                ):
+            x, y, z = places[0], places[1], places[2]
+            slot = (a * len(parts) + n) * n_vertices
+            for other in range(every):
+                if other == part:
+                    continue
+                if not _may_stand_before(antennas[a], part, other, centres, longest):
+                    continue
+                if not looked_at:
+                    # The vertices that face the antenna, once for all parts that may occlude them.
+                    looked_at = True
+                    for i in range(3):
+                        local[i] = 0.0
+                        for j in range(3):
+                            local[i] += frames[part, j, i] * (antennas[a, j] - centres[part, j])
+                    _facing(local, all_x, all_y, all_z, semi_axes[part], margin, faces, begins)
+                    for vertex in range(n_vertices):
+                        # The next one takes its place where this one is not wanted: no branch.
+                        chosen[facing], begin[facing] = vertex, begins[vertex]
+                        x[facing], y[facing] = all_x[vertex], all_y[vertex]
+                        z[facing] = all_z[vertex]
+                        facing += np.uint64(faces[vertex])
+                x, y, z = places[0][:facing], places[1][:facing], places[2][:facing]
+                into_ball(part, other, antennas[a], centres, frames, semi_axes, turn, shift, start)
+                if _nearest(x, y, z, start, turn, shift, nearest) == 0:
                     continue
                 for i in range(facing):
-                    if nearest[i] < 0 or nearest[i] > begin[i]:
+                    if nearest[i] < 0:
                         continue
                     if count == rays.shape[1]:
                         rays, whose = _grown(rays), _grown(whose)
                     span = 0.0
                     for j in range(3):
-                        way[j] = (
-                            turn[j, 0] * x[i]
-                            + turn[j, 1] * y[i]
-                            + turn[j, 2] * z[i]
-                            + shift[j]
-                            - start[j]
-                        )
+                        way[j] = turn[j, 0] * x[i] + turn[j, 1] * y[i] + turn[j, 2] * z[i]
+                        way[j] += shift[j] - start[j]
                         span += way[j] * way[j]
                     distance = math.sqrt(span)
                     ahead = max(nearest[i] - 2 / distance, 0.0)
+                    # What is met behind the near side of the vertex's own part does not count.
+                    if ahead >= begin[i]:
+                        continue
                     for j in range(3):
-                        rays[j, count], rays[3 + j, count] = (
-                            start[j] + ahead * way[j],
-                            way[j] / distance,
-                        )
-                    rays[6, count] = (1 - ahead) * distance
-                    whose[0, count], whose[1, count] = i, occluders[k]
+                        rays[j, count] = start[j] + ahead * way[j]
+                        rays[3 + j, count] = way[j] / distance
+                    rays[6, count] = (begin[i] - ahead) * distance
+                    rays[7, count] = nearest[i]
+                    whose[0, count], whose[1, count] = slot + chosen[i], other
                     count += 1
-            # What certainly hides a vertex needs no rays to what stands behind it.
-            kept = before
-            for ray in range(before, count):
-                i = whose[0, ray]
-                for row in range(7):
-                    rays[row, kept] = rays[row, ray]
-                whose[0, kept], whose[1, kept] = slot + chosen[i], whose[1, ray]
-                kept += entry[i] >= begin[i]
-            count = kept
-            for i in range(facing):
-                if entry[i] < begin[i]:
-                    hidden[a, n, chosen[i]] = int(first[i])
     return rays[:, :count], whose[:, :count]
+
+
+@compiled()
+def _settle(met, fraction, whose, occluder):
+    """Name of each vertex the part that is met first, by where its rays come nearest to the parts that they meet."""
+    first = np.full(len(occluder), np.inf, dtype=np.float32)
+    for ray in range(len(met)):
+        vertex = whose[0, ray]
+        if met[ray] and fraction[ray] < first[vertex]:
+            first[vertex], occluder[vertex] = fraction[ray], whose[1, ray]
 
 
 class FacetTracer:
@@ -264,7 +230,7 @@ class FacetTracer:
             Another part that hides it, nearer to the antenna than its own part on the same line; else -1.
         """
         hidden = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
-        rays, (slot, occluder) = _choose(
+        rays, whose = _rays(
             np.ascontiguousarray(antennas, dtype=np.float64),
             np.ascontiguousarray(parts, dtype=np.int64),
             np.ascontiguousarray(centres, dtype=np.float64),
@@ -272,8 +238,6 @@ class FacetTracer:
             self._semi_axes,
             vertices,
             float(margin),
-            hidden,
         )
-        met = self._sphere.meets(rays)
-        hidden.ravel()[slot[met]] = occluder[met]
+        _settle(self._sphere.meets(rays[:7]), rays[7], whose, hidden.ravel())
         return hidden

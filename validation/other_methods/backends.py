@@ -28,8 +28,7 @@ import rtradar as rt
 from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
 from rtradar.kernels.jit import compiled
 from rtradar.trace.backends.backend import available, select, use
-from rtradar.trace.body_tracer import BodyTracer, Hits
-from rtradar.trace.unit_sphere import SUBDIVISIONS
+from rtradar.trace.body_tracer import SUBDIVISIONS, BodyTracer, Hits
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]

@@ -13,7 +13,8 @@ def positive_share(a, b, c):
         return 1.0
     if high <= 0:
         return 0.0
+    # Quotients before products: squares of tiny numbers are 0.
     middle = a + b + c - low - high
     if middle <= 0:
-        return high * high / ((high - low) * (high - middle))
-    return 1 - low * low / ((high - low) * (middle - low))
+        return high / (high - low) * (high / (high - middle))
+    return 1 - low / (high - low) * (low / (middle - low))

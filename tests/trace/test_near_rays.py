@@ -1,0 +1,145 @@
+"""Lines of sight past ellipsoids: what Mitsuba says of them, held against a closed form in float64."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+import rtradar as rt
+from rtradar.body import Body
+from rtradar.body.body import Poses
+from rtradar.scatter import build_model
+from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.body_tracer import BodyTracer
+from rtradar.trace.near_rays import NEAR, near_rays
+from rtradar.trace.unit_sphere import UnitSphere
+
+Array = NDArray[np.float64]
+
+
+def random_body(seed: int, parts: int = 6) -> tuple[Array, Array, Array]:
+    rng = np.random.default_rng(seed)
+    return (
+        rng.uniform(-0.6, 0.6, (parts, 3)),
+        Rotation.random(parts, rng=rng).as_matrix(),
+        rng.uniform(0.05, 0.3, (parts, 3)),
+    )
+
+
+def distances(origins: Array, targets: Array, centres: Array, frames: Array, axes: Array) -> Array:
+    """Least distance (line, part) of each line from each part's centre, where the part is the unit sphere."""
+    starts = np.einsum("pji,lpj->lpi", frames, origins[:, None] - centres) / axes
+    lines = np.einsum("pji,lj->lpi", frames, targets - origins) / axes
+    along = -np.sum(starts * lines, axis=2) / np.sum(lines * lines, axis=2)
+    return np.linalg.norm(starts + np.clip(along, 0, 1)[..., None] * lines, axis=2)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_mitsuba_says_what_the_closed_form_says(seed: int, backend: Backend) -> None:
+    centres, frames, axes = random_body(seed, parts=12)
+    tracer = BodyTracer(use(backend), axes)
+    tracer.pose(centres, frames)
+    rng = np.random.default_rng(seed)
+    origins = np.array([-4.0, 0.5, 0.3]) + rng.uniform(-0.3, 0.3, (600, 3))
+    targets, own = rng.uniform(-0.9, 0.9, (600, 3)), rng.integers(-1, 12, 600)
+    least = distances(origins, targets, centres, frames, axes)
+    lines = np.flatnonzero(own >= 0)
+    least[lines, own[lines]] = np.inf
+    clear = np.abs(least.min(axis=1) - 1) > 1e-6  # float32 decides nearer to the surface
+    seen = tracer.sees(origins, targets, own)
+    assert 0.2 < seen.mean() < 0.9
+    np.testing.assert_array_equal(seen[clear], (least.min(axis=1) > 1)[clear])
+
+
+def test_a_target_on_no_part_is_occluded_by_any(backend: Backend) -> None:
+    """Three points on one line: before a ball of 0.1 m, inside, and behind it; and a line that passes 1 mm beside it."""
+    tracer = BodyTracer(use(backend), np.full((2, 3), 0.1))
+    tracer.pose(np.array([[1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]), np.tile(np.eye(3), (2, 1, 1)))
+    origins = np.zeros((5, 3))
+    targets = np.array(
+        [[0.89, 0, 0], [1.0, 0, 0], [2.0, 0, 0], [2.0, 2 * 0.1016, 0], [2.0, 2 * 0.0994, 0]]
+    )
+    own = np.full(5, -1)
+    np.testing.assert_array_equal(
+        tracer.sees(origins, targets, own), [True, False, False, True, False]
+    )
+    np.testing.assert_array_equal(tracer.sees(origins, targets, np.zeros(5, dtype=np.int64)), True)
+
+
+@pytest.mark.parametrize("seed", [4, 5])
+def test_no_part_near_a_line_is_ruled_out(seed: int) -> None:
+    """Every pair of a line and a part that comes within its bounding volume has a ray, and no other pair."""
+    centres, frames, axes = random_body(seed)
+    rng = np.random.default_rng(seed)
+    origins = np.array([-4.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (300, 3))
+    targets, own = rng.uniform(-0.6, 0.6, (300, 3)), rng.integers(-1, 6, 300)
+    near = distances(origins, targets, centres, frames, axes) < NEAR
+    near[np.flatnonzero(own >= 0), own[own >= 0]] = False
+    _, line = near_rays(origins, targets, own, centres, frames, axes)
+    np.testing.assert_array_equal(np.bincount(line, minlength=300), near.sum(axis=1))
+
+
+def test_rays_start_two_radii_before_a_part_and_end_at_the_target() -> None:
+    centres, frames, axes = random_body(7)
+    rng = np.random.default_rng(7)
+    origins = np.array([-4.0, 0.0, 0.0]) + rng.uniform(-0.2, 0.2, (200, 3))
+    targets, own = rng.uniform(-0.6, 0.6, (200, 3)), rng.integers(-1, 6, 200)
+    rays, line = near_rays(origins, targets, own, centres, frames, axes)
+    assert rays.dtype == np.float32
+    assert len(line) > 25
+    np.testing.assert_allclose(np.linalg.norm(rays[3:6], axis=0), 1, atol=1e-6)
+    assert np.linalg.norm(rays[:3], axis=0).max() < 2 + NEAR + 1e-5
+    # In axes of some part other than its own, each ray ends at its target.
+    ends = rays[:3] + rays[6] * rays[3:6]
+    local = np.einsum("pji,npj->npi", frames, targets[line][:, None] - centres) / axes
+    gap = np.linalg.norm(local - ends.T[:, None], axis=-1)
+    gap[np.arange(len(line))[own[line] >= 0], own[line][own[line] >= 0]] = np.inf
+    assert gap.min(axis=1).max() < 1e-4
+
+
+class BesideADisc:
+    """A walker and, as the last part, a vast thin disc that all lines of sight pass at 1.03 to 1.07 of its radius."""
+
+    def __init__(self, body: Body) -> None:
+        self._body, self.duration_s = body, body.duration_s
+        self.part_names = (*body.part_names, "disc")
+        self.semi_axes = np.concatenate([body.semi_axes, [[0.5, 100.0, 100.0]]])
+
+    def at(self, times: Array) -> Poses:
+        poses = self._body.at(times)
+        n = len(poses.centres)
+        centres = np.broadcast_to([-2.0, 105.0, 0.0], (n, 1, 3))
+        frames = np.broadcast_to(np.eye(3), (n, 1, 3, 3))
+        return Poses(
+            np.concatenate([poses.centres, centres], axis=1),
+            np.concatenate([poses.frames, frames], axis=1),
+            self.semi_axes,
+        )
+
+
+@pytest.mark.parametrize(
+    ("fidelity", "options"),
+    [("specular", {}), ("physical-optics", {"facets": 320}), ("reference", {"facets": 320})],
+)
+def test_the_tracer_decides(
+    fidelity: str, options: dict[str, int], backend: Backend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disc beside all lines of sight occludes nothing, and everything once every ray is said to hit."""
+    body = BesideADisc(Body.from_motion(rt.synthetic_motion("walk", seed=0)))
+    radar = rt.Radar(name="small", tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=64)
+
+    def power() -> Array:
+        model = build_model(fidelity, radar, body, variant=backend.kind, **options)  # type: ignore[arg-type]
+        echoes = model.echoes(np.arange(2))
+        each = (np.abs(echoes.amplitude) ** 2).sum(axis=(0, 1, 2))
+        return np.bincount(echoes.part, each, len(body.part_names))[:-1]
+
+    assert (power() > 0).sum() > 15
+
+    def every_ray_hits(_: UnitSphere, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        return np.ones(rays.shape[1], dtype=bool)
+
+    monkeypatch.setattr(UnitSphere, "meets", every_ray_hits)
+    np.testing.assert_array_equal(power(), 0)
