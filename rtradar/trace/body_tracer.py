@@ -19,7 +19,6 @@ from rtradar.trace.near_rays import near_rays
 from rtradar.trace.rays import rays_of
 from rtradar.trace.unit_sphere import UnitSphere
 
-
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
