@@ -1,7 +1,8 @@
-"""Rays from lines of sight past the parts of a body that they come near, each in axes where that part is the unit sphere.
+"""Rays along lines of sight past the parts of a body that they come near.
 
-A part is ruled out only where a line passes a ball or an ellipsoid that is a tenth larger than the part. Whether a ray meets the
-part itself is for Mitsuba to say.
+Each ray is in axes where that part is the unit sphere. A part is ruled out only where a line passes
+outside a ball or an ellipsoid that is a tenth larger than the part. Whether a ray meets the part
+itself is for Mitsuba to say.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from rtradar.kernels.jit import compiled, inlined
 
 NEAR = 1.1
-"""Size of the bounding volumes over that of the parts: a line that passes outside of them has no ray traced."""
+"""Size of the bounding volumes over that of the parts: lines outside of them have no ray traced."""
 
 
 def near_rays(
@@ -54,7 +55,7 @@ def near_rays(
 
 @inlined()
 def _bundle(places, own, counts, middle, radius):
-    """Add up the mean (own, 3) of one end of the lines to each part, and their largest squared distance (own,) from it."""
+    """Add up the mean (own, 3) of one end of the lines to each part, and the largest square from it."""
     for ray in range(len(own)):
         for i in range(3):
             middle[own[ray], i] += places[ray, i] / counts[own[ray]]
@@ -67,7 +68,7 @@ def _bundle(places, own, counts, middle, radius):
 
 @compiled()
 def _near_parts(origins, targets, own, centres, longest):
-    """Return which parts come near any of the lines to a part, (own, part): bounding balls against bundles of lines."""
+    """Return which parts' bounding balls come near the bundle of lines to a part, (own, part)."""
     # The last row is that of targets on no part, -1.
     parts = len(centres)
     middles, radii, counts = (

@@ -1,7 +1,7 @@
 """The unit sphere in a Mitsuba scene: Mitsuba decides which rays meet it.
 
-Every ellipsoid is this sphere in axes of its own, so there is nothing to pose. Mitsuba's shape ``sphere`` is exact: its answers
-for rays that start two radii away are those of float64 (`validation/occlusion.py`).
+Every ellipsoid is this sphere in axes of its own, so there is nothing to pose. Its answers for rays
+that start two radii away are held against float64 in `validation/other_methods/occlusion.py`.
 """
 
 from __future__ import annotations
@@ -33,12 +33,10 @@ class UnitSphere:
     def __init__(self, mi: Any) -> None:
         self._mi = mi
         self._scene = mi.load_dict({"type": "scene", "unit_sphere": {"type": "sphere"}})
-        self.rays_traced = 0
 
     def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
         """Which rays (7, ray) meet it: start and direction in its axes, and how far they go."""
         mi = self._mi
-        self.rays_traced += rays.shape[1]
         if rays.shape[1] == 0:  # Dr.Jit takes the process down over arrays without entries
             return np.zeros(0, dtype=np.bool_)
         if mi.variant().startswith("scalar"):
