@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
 from rtradar.scatter.specular_point.solver import mirror
@@ -172,10 +173,9 @@ class MirrorVisibility:
                     here.start[parts],
                 )
                 continue
-            share = (chirps[inside] - first) / self._step
-            share = (share**2 * (3 - 2 * share))[:, None, None]
+            ramp = smoothstep((chirps[inside] - first) / self._step)[:, None, None]
             before, after = self._anchor(first), self._anchor(last)
             seen, seen_next = (anchor.visible[..., parts][tx[inside]] for anchor in (before, after))
-            weight[inside] = (1 - share) * seen + share * seen_next
+            weight[inside] = (1 - ramp) * seen + ramp * seen_next
             start[inside] = before.start[parts]
         return weight, start
