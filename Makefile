@@ -38,7 +38,7 @@ docs: $(VENV)/.installed-docs
 	$(BIN)/python -m sphinx --fail-on-warning --keep-going --doctree-dir out/doctrees docs out/docs
 
 clean:
-	rm -rf $(VENV) out docs/api docs/auto_gallery build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) out docs/api docs/auto_gallery docs/drawn build dist .pytest_cache .ruff_cache .mypy_cache .import_linter_cache .hypothesis
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 # A stamp stands for one set of packages; it is renewed when what it was made from changes.

@@ -1,4 +1,4 @@
-"""Write a page for each public package, from its ``__all__``: what is public is said in one place."""
+"""Write a page for each public package, from its ``__all__``."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PACKAGES = {
     "rtradar.process": "Processing",
     "rtradar.rcs": "Closed forms",
 }
-"""Packages with a page, and their titles: motion, radar, scene, run, results, and the pieces that a run is made of."""
+"""Packages with a page, and their titles, in the order of use."""
 
 FIRST_PAGE = {
     "Motion": ("load_motion", "synthetic_motion", "Motion"),
@@ -88,7 +88,7 @@ def page(package: str) -> str:
 
 
 def write(folder: Path) -> None:
-    """Write all pages and their list; one that has not changed keeps its date, and is not built anew."""
+    """Write all pages and their list. A page that has not changed keeps its date."""
     names = [package.replace(".", "_") for package in PACKAGES]
     title = "Python interface"
     pages = dict(zip(names, map(page, PACKAGES), strict=True))

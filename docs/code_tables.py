@@ -1,4 +1,4 @@
-"""Tables of the pages that follow from the code: a page names one, and Sphinx writes it at each build."""
+"""Tables of the pages that Sphinx writes from the code at each build."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ PAPER = {
         "{:.2f}°",
     ),
 }
-"""Limits of a radar: their names, what the paper's Table 2 says of its 12 GHz radar, and how they are written here."""
+"""Limits of a radar: name, value in the paper's Table 2, and format."""
 
 
 def pipe_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -54,7 +54,7 @@ def described(text: str) -> Iterable[tuple[list[str], str, str]]:
 
 
 def keys(thing: type) -> str:
-    """Keys of the TOML table that makes a dataclass, by its docstring and the defaults of its fields."""
+    """Keys of the TOML table of a dataclass, from its docstring and the defaults of its fields."""
     defaults = {field.name: field.default for field in dataclasses.fields(thing)}
     rows = []
     for names, kind, meaning in described(inspect.getdoc(thing) or ""):
@@ -174,7 +174,7 @@ class CodeTable(Directive):
     required_arguments = 1
 
     def run(self) -> list[nodes.Node]:
-        """Write it in Markdown, and let the page's parser read it; the page is read anew at the next build."""
+        """Write it in Markdown for the parser of the page, which is read anew at the next build."""
         self.state.document.settings.env.note_reread()
         node = nodes.container()
         lines = TABLES[self.arguments[0]]().splitlines()

@@ -1,4 +1,4 @@
-"""How Sphinx builds these pages: ``make docs``, into out/docs, without the internet, warnings being errors."""
+"""Settings by which Sphinx builds these pages (``make docs``); it needs no internet."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ sys.path.insert(0, str(HERE))
 
 import api_pages  # noqa: E402
 import code_tables  # noqa: E402
+import drawings  # noqa: E402
 
 import rtradar  # noqa: E402
 
@@ -37,7 +38,7 @@ sphinx_gallery_conf = {
     "examples_dirs": "gallery",
     "gallery_dirs": "auto_gallery",
     "filename_pattern": r"[0-9]_\w+\.py",
-    "within_subsection_order": "FileNameSortKey",  # else by length, and the training before its data set
+    "within_subsection_order": "FileNameSortKey",  # else the training comes before its data set
     "abort_on_example_error": True,
     "download_all_examples": False,
     "write_computation_times": False,
@@ -56,7 +57,7 @@ def inline_math(page: Any, node: nodes.math) -> None:
 
 
 def displayed_math(page: Any, node: nodes.math_block) -> None:
-    """A formula of its own, with its number and, where it has one, the label that docstrings cite."""
+    """A displayed formula with its number and, where it has one, the label that docstrings cite."""
     page.body.append(page.starttag(node, "div", CLASS="math"))
     if node["number"]:
         page.body.append(f'<span class="eqno">({node["number"]}) <small>{node["label"]}</small>')
@@ -67,7 +68,8 @@ def displayed_math(page: Any, node: nodes.math_block) -> None:
 
 
 def setup(app: Sphinx) -> None:
-    """Teach Sphinx MathML and tables from the code, and write the API's pages from what is public."""
+    """Teach Sphinx MathML and tables from the code; draw, and write the API's pages."""
     app.add_directive("from-code", code_tables.CodeTable)
     app.add_html_math_renderer("mathml", (inline_math, None), (displayed_math, None))
     app.connect("builder-inited", lambda app: api_pages.write(Path(app.srcdir) / "api"))
+    app.connect("builder-inited", lambda app: drawings.draw(Path(app.srcdir) / "drawn"))

@@ -2,8 +2,9 @@
 
     python docs/count_code.py [FOLDER]
 
-FOLDER is a checkout, this one if left out; another commit is counted in a `git worktree` of it. Lines are those that hold code,
-not blank, comment or docstring. Near-copies are pylint's, of eight lines or more, where pylint is installed.
+FOLDER is a checkout, this one if left out; another commit is counted in a `git worktree` of it.
+Lines are those that hold code, not blank, comment or docstring. Near-copies are pylint's, of eight
+lines or more, where pylint is installed.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import tomllib
 from collections import Counter
 from importlib.metadata import PackageNotFoundError, requires
 from pathlib import Path
+from typing import cast
 
 LONG = 250
 _NO_CODE = {
@@ -50,8 +52,9 @@ def code_lines(source: str) -> int:
 
 
 def dependencies(project: dict[str, object]) -> tuple[int, int]:
-    """Packages that the project names for those who only use it, and all that these bring in this environment."""
-    named = {re.split(r"[^\w.-]", str(line))[0].lower() for line in project["dependencies"]}  # type: ignore[attr-defined]
+    """Packages that a user needs, and all that these bring into this environment."""
+    needed = cast("list[str]", project["dependencies"])
+    named = {re.split(r"[^\w.-]", line)[0].lower() for line in needed}
     found: set[str] = set()
     waiting = set(named)
     while waiting:

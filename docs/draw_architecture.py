@@ -1,10 +1,11 @@
-"""Draw how data flows through the packages of rtradar, from the code alone, into docs/architecture.svg.
+"""Draw the flow of data through the packages of rtradar, from the code alone.
 
     python docs/draw_architecture.py [--out docs/architecture.svg]
 
-Rows stand in the order of the import-linter contract in pyproject.toml; data flow against the imports, which grimp finds, so
-downward. An arc means that a package takes from another; those that follow from others are left out, or nothing could be seen.
-What stands under "hands on" are the classes that other packages import from there.
+Rows are in the order of the import-linter contract in pyproject.toml; data flow against the
+imports, which grimp finds, so downward. An arc means that a package takes from another; those that
+follow from others are left out, or nothing could be seen. What is written under "hands on" are the
+classes that other packages import from there.
 """
 
 from __future__ import annotations
@@ -86,7 +87,8 @@ def drawing() -> str:
     rows = {name: _TOP + _ROW * place for place, name in enumerate(order())}
     height = _TOP + _ROW * len(rows)
     lines = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" font-family="sans-serif" font-size="12">',
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {_WIDTH} {height}" '
+        'font-family="sans-serif" font-size="12">',
         f'<rect width="{_WIDTH}" height="{height}" fill="white"/>',
         f'<text x="{_LEFT}" y="22" font-weight="bold">package</text>',
         f'<text x="{_LEFT + 140}" y="22" font-weight="bold">what it is; hands on</text>',
@@ -95,22 +97,25 @@ def drawing() -> str:
     for name, y in rows.items():
         gives = ", ".join(sorted(handed[name]))
         lines += [
-            f'<rect x="{_LEFT - 6}" y="{y - 11}" width="130" height="22" rx="4" fill="#eef3f8" stroke="#556"/>',
+            f'<rect x="{_LEFT - 6}" y="{y - 11}" width="130" height="22" rx="4" '
+            'fill="#eef3f8" stroke="#556"/>',
             f'<text x="{_LEFT}" y="{y + 4}">{escape(name)}</text>',
             f'<text x="{_LEFT + 140}" y="{y - 1}" font-size="10">{escape(summary(name))}</text>',
-            f'<text x="{_LEFT + 140}" y="{y + 11}" font-size="10" fill="#225522" font-style="italic">{escape(gives)}</text>',
+            f'<text x="{_LEFT + 140}" y="{y + 11}" font-size="10" fill="#225522" '
+            f'font-style="italic">{escape(gives)}</text>',
         ]
     return "\n".join([*lines, "</svg>", ""])
 
 
 def arcs(edges: Iterable[tuple[str, str]], rows: dict[str, int]) -> list[str]:
-    """Each flow as an arc at the left of the rows, the farther the wider, with an arrow where it ends."""
+    """Each flow as an arc at the left of the rows, the wider the farther it goes."""
     found = []
     for place, (giver, taker) in enumerate(edges):
         start, end, x = rows[giver] + 5, rows[taker] - 5, _LEFT - 6
         reach, colour = x - 14 - (end - start) * 0.42, _COLOURS[place % len(_COLOURS)]
         found += [
-            f'<path d="M{x} {start} C{reach:.0f} {start} {reach:.0f} {end} {x - 6} {end}" fill="none" stroke="{colour}"/>',
+            f'<path d="M{x} {start} C{reach:.0f} {start} {reach:.0f} {end} {x - 6} {end}" '
+            f'fill="none" stroke="{colour}"/>',
             f'<path d="M{x} {end} l-8 -4 v8 z" fill="{colour}"/>',
         ]
     return found

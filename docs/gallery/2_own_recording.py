@@ -2,8 +2,9 @@
 Your own recording
 ==================
 
-ASF/AMC recordings, as those of HDM05 and CMU, and BVH are read by one function. Where ``RTRADAR_MOCAP`` names a folder with
-AMC files the first of them is taken; elsewhere this script says so and writes itself a small one: somebody who waves.
+ASF/AMC recordings, as those of HDM05 and CMU, and BVH are read by one function. Where
+``RTRADAR_MOCAP`` names a folder with AMC files the first of them is taken; elsewhere this script
+says so and writes itself a small one: somebody who waves.
 """
 
 import os
@@ -21,11 +22,15 @@ OUT.mkdir(parents=True, exist_ok=True)
 SECONDS = float(os.environ.get("RTRADAR_GALLERY_S", 3.0))
 
 # %%
-# Bones: name, parent, direction (x to the left, y up, z forward) and length. HDM05 and CMU name them so, and have ten more.
-MIDDLE = """lowerback root 0 1 0 .12|upperback lowerback 0 1 0 .12|thorax upperback 0 1 0 .12|lowerneck thorax 0 1 0 .1
+# Bones: name, parent, direction (x to the left, y up, z forward) and length. HDM05 and CMU name
+# them so, and have ten more.
+MIDDLE = """lowerback root 0 1 0 .12|upperback lowerback 0 1 0 .12
+thorax upperback 0 1 0 .12|lowerneck thorax 0 1 0 .1
 head lowerneck 0 1 0 .18"""
-SIDE = """?hipjoint root @1 -.5 0 .1|?femur ?hipjoint 0 -1 0 .42|?tibia ?femur 0 -1 0 .42|?toes ?tibia 0 -.3 1 .2
-?clavicle thorax @1 .4 0 .18|?humerus ?clavicle @.3 -1 0 .28|?wrist ?humerus @.3 -1 0 .25|?fingers ?wrist @.3 -1 0 .16"""
+SIDE = """?hipjoint root @1 -.5 0 .1|?femur ?hipjoint 0 -1 0 .42
+?tibia ?femur 0 -1 0 .42|?toes ?tibia 0 -.3 1 .2
+?clavicle thorax @1 .4 0 .18|?humerus ?clavicle @.3 -1 0 .28
+?wrist ?humerus @.3 -1 0 .25|?fingers ?wrist @.3 -1 0 .16"""
 
 
 def write_wave(asf: Path, amc: Path) -> None:
@@ -53,7 +58,8 @@ def write_wave(asf: Path, amc: Path) -> None:
 
 
 # %%
-# Names of recordings begin with that of their skeleton: ``HDM_bd.asf``, ``HDM_bd_kickLFront1Reps_001_120.amc``.
+# Names of recordings begin with that of their skeleton: ``HDM_bd.asf``,
+# ``HDM_bd_kickLFront1Reps_001_120.amc``.
 recordings = sorted(Path(os.environ.get("RTRADAR_MOCAP", "none")).rglob("*.amc"))
 pairs = [
     (amc, asf)
@@ -64,9 +70,7 @@ pairs = [
 if pairs:
     amc, asf = pairs[0]
 else:
-    print(
-        "RTRADAR_MOCAP names no folder with AMC files: a small recording is written and taken instead"
-    )
+    print("RTRADAR_MOCAP names no folder with AMC files: a small recording is written instead")
     amc, asf = OUT / "waver.amc", OUT / "waver.asf"
     write_wave(asf, amc)
 motion = rt.load_motion(amc, skeleton=asf)

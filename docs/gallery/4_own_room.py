@@ -2,8 +2,9 @@
 Your own room
 =============
 
-A scene is a TOML file, too: walls of ITU-R P.2040 materials, furniture that comes along or any closed mesh. Walls return
-what hits them and show the person once more, as a ghost; what stands still is taken out by ``clutter_removal``.
+A scene is a TOML file, too: walls of ITU-R P.2040 materials, furniture that comes along or any
+closed mesh. Walls return what hits them and show the person once more, as a ghost; static clutter
+is removed by ``clutter_removal``.
 """
 
 import os
@@ -50,8 +51,9 @@ position_m = [1.2, 1.2, 0]
 (OUT / "my_room.toml").write_text(ROOM)
 
 # %%
-# The same walk in free space and in the room, and there with the mean of the chirps taken out. A small array is quick. The map
-# sums abs(amplitude)^2 [m^2] over the channels, with the loss 1 / R^4 in it: taken out, cells read as cross-sections.
+# The same walk in free space and in the room, and there with the mean of the chirps taken out. A
+# small array is quick. The map sums abs(amplitude)^2 [m^2] over the channels, with the loss 1 / R^4
+# in it: taken out, cells read as cross-sections.
 radar = rt.Radar(
     name="12 GHz",
     tx_y=2,

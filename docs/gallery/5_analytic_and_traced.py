@@ -2,8 +2,8 @@
 Analytic against traced
 =======================
 
-The closed form adds up all parts of a body; ray tracing knows which of them another one hides. `rt.compare` runs several
-models on one recording with the same noise and says what differs.
+The closed form adds up all parts of a body; ray tracing knows which of them another one hides.
+`rt.compare` runs several models on one recording with the same noise and says what differs.
 """
 
 import os
@@ -30,7 +30,8 @@ found = rt.compare(
 print(found.table())
 
 # %%
-# Each model's run lies in a folder of its name. Power is summed over range and velocity, of all channels.
+# Each model's run lies in a folder of its name. Power is summed over range and velocity, of all
+# channels.
 figure, (above, below) = plt.subplots(2, 1, figsize=(8, 6), layout="constrained")
 power = {}
 for model in ("analytic", "specular"):

@@ -2,8 +2,9 @@
 Choose a fidelity level
 =======================
 
-The echo models trade accuracy for time. Here one pose of a kick, seen from the side, meets each of them; its error is
-set against what it costs. The page "Choosing a fidelity level" has the same for whole runs, both radars and all activities.
+The echo models trade accuracy for time. Here one pose of a kick, seen from the side, meets each of
+them; its error is set against what it costs. The page "Choosing a fidelity level" has the same for
+whole runs, both radars and all activities.
 """
 
 import os
@@ -20,7 +21,8 @@ OUT = Path(os.environ.get("RTRADAR_GALLERY_OUT", "out/gallery"))
 OUT.mkdir(parents=True, exist_ok=True)
 
 # %%
-# `rt.scattering_length` takes ellipsoids (or a mesh) and any antennas: here one Tx, and Rx along 1 m of a line.
+# `rt.scattering_length` takes ellipsoids (or a mesh) and any antennas: here one Tx, and Rx along 1
+# m of a line.
 kick = place(rt.synthetic_motion("kick", seed=0, duration_s=2.0), heading_deg=70)
 pose = rt.Body.from_motion(kick).ellipsoids(1.0)
 rx = np.stack([np.full(48, -4.0), np.linspace(0.5, 1.5, 48), np.full(48, 1.0)], axis=1)

@@ -2,8 +2,8 @@
 Build a data set
 ================
 
-A TOML file says what a data set shall hold; ``rtradar dataset build`` makes what is missing of it, on all cores, and may be
-stopped at any time. ``rtradar/campaign/spec.py`` lists all keys.
+A TOML file says what a data set shall hold; ``rtradar dataset build`` makes what is missing of it,
+on all cores, and may be stopped at any time. ``rtradar/campaign/spec.py`` lists all keys.
 """
 
 import os

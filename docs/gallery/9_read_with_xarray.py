@@ -2,8 +2,9 @@
 Read the cube with xarray
 =========================
 
-``maps.h5`` is NetCDF-4 with named axes and units, which xarray opens as it is. With ``save_if`` the IF samples are kept, too, in
-``if.zarr``, chirp by chirp in TDM order; a few lines make them the cube of a frame.
+``maps.h5`` is NetCDF-4 with named axes and units, which xarray opens as it is. With ``save_if`` the
+IF samples are kept, too, in ``if.zarr``, chirp by chirp in TDM order; a few lines make them the
+cube of a frame.
 """
 
 import os
@@ -24,7 +25,8 @@ rt.run(
 )
 
 # %%
-# The IF samples (chirp, rx, sample), cut into TDM cycles: (cycle, tx, rx, sample), with the time of each cycle's first chirp.
+# The IF samples (chirp, rx, sample), cut into TDM cycles: (cycle, tx, rx, sample), with the time of
+# each cycle's first chirp.
 stored = zarr.open_array(OUT / "cube" / "if.zarr", mode="r")
 cycles = stored.shape[0] // radar.n_tx
 cube = xr.DataArray(
@@ -36,7 +38,8 @@ cube = xr.DataArray(
 print(cube.sizes)
 
 # %%
-# A range profile over time of one channel by NumPy's own FFT, beside the map that the run made of all channels.
+# A range profile over time of one channel by NumPy's own FFT, beside the map that the run made of
+# all channels.
 profile = np.abs(np.fft.fft(cube.isel(tx=0, rx=0) * np.hanning(cube.sizes["sample"]))) ** 2
 figure, (left, right) = plt.subplots(1, 2, figsize=(11, 4), layout="constrained")
 left.pcolormesh(radar.range_m, cube.cycle, 10 * np.log10(profile), cmap="viridis")
