@@ -1,0 +1,44 @@
+"""The README repeats figures of the pages; each of them is one that a script wrote there."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def rows(page: str, heading: str) -> list[list[str]]:
+    """Cells of the table that has this heading; empty cells at its end are left out."""
+    lines = iter((ROOT / page).read_text(encoding="utf-8").splitlines())
+    found = []
+    for line in lines:
+        if line.startswith(heading):
+            next(lines)
+            for row in lines:
+                if not row.startswith("|"):
+                    break
+                found.append([cell.strip() for cell in row.strip().strip("|").split(" | ")])
+    assert found, f"{page} has no table {heading}"
+    return found
+
+
+CLAIMS = rows("README.md", "| claim | worst")
+LEVELS = rows("README.md", "| level | what it computes")
+
+
+@pytest.mark.parametrize("claim", CLAIMS, ids=lambda claim: claim[0])
+def test_claims_of_the_readme_are_those_of_the_validation(claim: list[str]) -> None:
+    figures = [row[2:4] + row[5:] for row in rows("docs/validation.md", "| key | claim")]
+    assert claim[1:] in figures
+
+
+@pytest.mark.parametrize("level", LEVELS, ids=lambda level: level[0])
+def test_costs_and_errors_of_the_readme_are_those_of_the_page_of_levels(level: list[str]) -> None:
+    error, _, cost = next(
+        row[1:4]
+        for row in rows("docs/choosing-a-level.md", "| level | 12 GHz: complex error")
+        if row[0] == level[0]
+    )
+    assert (level[4] if error != "-" else "-", level[3]) == (error, cost)
