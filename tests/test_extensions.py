@@ -16,7 +16,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.motion.load import READERS
+from rtradar.motion.formats import READERS
 from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
 from rtradar.scatter import MODELS, build_model

@@ -14,8 +14,7 @@ from rtradar.body.ellipsoids import Ellipsoids
 from rtradar.errors import InputError
 from rtradar.kernels.motion import pose_ellipsoids
 from rtradar.motion.motion import Motion
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES, to_nodes
 
 _SIDED: Mapping[str, tuple[str, float]] = {
     "hip": ("hip", 0.07),
@@ -77,7 +76,7 @@ class Body:
     Parameters
     ----------
     motion : Motion
-        On the 22 nodes of `rtradar.motion.skeleton_names.NODES`; `from_motion` takes any other.
+        On the 22 nodes of `rtradar.motion.skeleton.NODES`; `from_motion` takes any other.
     semi_axes : (part, 3) float64
         a, b across the bone and c along it [m].
 
@@ -115,7 +114,7 @@ class Body:
         Parameters
         ----------
         motion : Motion
-            Motion of any known kind of skeleton (`rtradar.motion.retarget.to_nodes`); its ``girth``
+            Motion of any known kind of skeleton (`rtradar.motion.skeleton.to_nodes`); its ``girth``
             multiplies the radii.
 
         Returns

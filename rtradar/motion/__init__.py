@@ -1,9 +1,9 @@
 """Motion capture and synthetic actors: what a person does, at any time."""
 
-from rtradar.motion.load import load_motion, register_reader
+from rtradar.motion.formats import load_motion, register_reader
 from rtradar.motion.motion import Motion
 from rtradar.motion.placement import cut, place
-from rtradar.motion.synthetic.actor import ACTIVITIES, synthetic_motion
+from rtradar.motion.synthetic import ACTIVITIES, synthetic_motion
 
 __all__ = [
     "ACTIVITIES",

@@ -17,6 +17,8 @@ from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
 
+Array = NDArray[np.float64]
+
 _TIME_SLACK_S = 1e-9
 """Times this far outside the recording are rounding, not a mistake, and are moved to its end."""
 
@@ -70,9 +72,9 @@ class Motion:
     name: str
     joints: tuple[str, ...]
     parents: tuple[int, ...]
-    offsets: NDArray[np.float64]
-    root_positions: NDArray[np.float64]
-    rotations: NDArray[np.float64]
+    offsets: Array
+    root_positions: Array
+    rotations: Array
     rate_hz: float
     first_frame_s: float = 0.0
     length_s: float | None = None
@@ -80,56 +82,47 @@ class Motion:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", printable(self.name))  # that of a file may be any bytes
-        for field in ("offsets", "root_positions", "rotations"):
-            array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
-            if not all(np.isfinite(rows).all() for (rows,) in in_blocks(array)):
-                raise InputError(
-                    f"Motion {self.name}: {field} holds NaN or infinity; every value must be finite"
-                )
-            object.__setattr__(self, field, array)
         count, frames = len(self.joints), len(self.root_positions)
         for field, shape in (
             ("offsets", (count, 3)),
             ("root_positions", (frames, 3)),
             ("rotations", (frames, count, 4)),
         ):
-            if getattr(self, field).shape != shape or not frames or not count:
-                raise InputError(
-                    f"Motion {self.name}: {field} has shape {getattr(self, field).shape}; it must "
-                    f"be {shape}"
-                )
+            array = np.ascontiguousarray(getattr(self, field), dtype=np.float64)
+            if not all(np.isfinite(rows).all() for (rows,) in in_blocks(array)):
+                raise self._refusal(f"{field} holds NaN or infinity; every value must be finite")
+            if array.shape != shape or not frames or not count:
+                raise self._refusal(f"{field} has shape {array.shape}; it must be {shape}")
+            object.__setattr__(self, field, array)
         if len(set(self.joints)) != count:
-            raise InputError(
-                f"Motion {self.name}: joint names repeat; every joint needs its own name"
-            )
+            raise self._refusal("joint names repeat; every joint needs its own name")
         if (
             len(self.parents) != count
             or self.parents[0] != -1
             or any(not 0 <= p < j for j, p in enumerate(self.parents) if j)
         ):
-            raise InputError(
-                f"Motion {self.name}: parents must name one root first (-1), and stand before "
-                "their children"
-            )
+            raise self._refusal("parents must name one root first (-1), and precede their children")
         if not (math.isfinite(self.rate_hz) and self.rate_hz > 0):
-            raise InputError(f"Motion {self.name}: rate_hz = {self.rate_hz}; it must be positive")
+            raise self._refusal(f"rate_hz = {self.rate_hz}; it must be positive")
         object.__setattr__(self, "rotations", sign_continuous(self.rotations))
         norms = (np.linalg.norm(rows, axis=-1) for (rows,) in in_blocks(self.rotations))
         extremes = np.array([(norm.min(), norm.max()) for norm in norms])
         least, largest = extremes[:, 0].min(), extremes[:, 1].max()
         if least < 1 - 1e-6 or largest > 1 + 1e-6:
-            raise InputError(
-                f"Motion {self.name}: rotations are not unit quaternions (norm {least:.3g} to "
-                f"{largest:.3g})"
+            raise self._refusal(
+                f"rotations are not unit quaternions (norm {least:.3g} to {largest:.3g})"
             )
         last = self.first_frame_s + (frames - 1) / self.rate_hz
         if self.first_frame_s > 0 or (
             self.length_s is not None and not 0 <= self.length_s <= last + _TIME_SLACK_S
         ):
-            raise InputError(
-                f"Motion {self.name}: frames from {self.first_frame_s:.6g} to {last:.6g} s do not "
-                f"cover 0 to {self.length_s} s"
+            raise self._refusal(
+                f"frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to "
+                f"{self.length_s} s"
             )
+
+    def _refusal(self, why: str) -> InputError:
+        return InputError(f"Motion {self.name}: {why}")
 
     # -- the recording -----------------------------------------------------------------------------
 
@@ -141,12 +134,12 @@ class Motion:
         return self.first_frame_s + (len(self.root_positions) - 1) / self.rate_hz
 
     @property
-    def frame_times(self) -> NDArray[np.float64]:
+    def frame_times(self) -> Array:
         """Time of each frame (frame,) [s]; others than 0 to `duration_s` serve interpolation."""
         return self.first_frame_s + np.arange(len(self.root_positions)) / self.rate_hz
 
     @cached_property
-    def positions(self) -> NDArray[np.float64]:
+    def positions(self) -> Array:
         """Joints at the frames, (frame, joint, 3) [m], world."""
         return file_backed(
             self._forward(*frames) for frames in in_blocks(self.root_positions, self.rotations)
@@ -154,7 +147,7 @@ class Motion:
 
     # -- at any time -------------------------------------------------------------------------------
 
-    def at(self, times: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, times: ArrayLike) -> tuple[Array, Array]:
         """Interpolate the pose at any time, with exactly rigid bones.
 
         Rotations go through a C2 cubic spline of the sign-continuous quaternion components,
@@ -193,69 +186,52 @@ class Motion:
             )
         ok = (instants >= -_TIME_SLACK_S) & (instants <= self.duration_s + _TIME_SLACK_S)
         if not ok.all():
-            wrong = instants[~ok][0]
-            raise InputError(
-                f"Motion {self.name}: time {wrong:.6g} s is outside the recording, 0 to "
+            raise self._refusal(
+                f"time {instants[~ok][0]:.6g} s is outside the recording, 0 to "
                 f"{self.duration_s:.6g} s"
             )
         instants = np.clip(instants, 0.0, self.duration_s)
         if len(self.root_positions) == 1:
-            quaternions = np.repeat(self.rotations, len(instants), axis=0)
-            return self._forward(
-                np.repeat(self.root_positions, len(instants), axis=0), quaternions
-            ), quaternions
+            roots, still = (
+                np.repeat(values, len(instants), axis=0)
+                for values in (self.root_positions, self.rotations)
+            )
+            return self._forward(roots, still), still
         positions = np.empty((len(instants), len(self.joints), 3))
         quaternions = np.empty((len(instants), len(self.joints), 4))
-        blocks = np.floor((instants - self.first_frame_s) * self.rate_hz / _BLOCK_FRAMES).astype(
-            np.int64
-        )
-        skeleton = (
-            np.ascontiguousarray(self.offsets, dtype=np.float64),
-            np.asarray(self.parents, dtype=np.int64),
-        )
+        found = positions, quaternions.reshape(len(instants), -1)
+        frame = (instants - self.first_frame_s) * self.rate_hz
+        blocks = np.floor(frame / _BLOCK_FRAMES).astype(np.int64)
+        skeleton = self.offsets, np.asarray(self.parents, dtype=np.int64)
         for block in sorted(set(blocks.tolist())):
             here = np.flatnonzero(blocks == block)
             root, rotation = self._splines(block)
             cubics = root.c, rotation.c.reshape(*rotation.c.shape[:2], -1)
-            pose(
-                instants,
-                here,
-                root.x,
-                *cubics,
-                *skeleton,
-                positions,
-                quaternions.reshape(len(instants), -1),
-            )
+            pose(instants, here, root.x, *cubics, *skeleton, *found)
         return positions, quaternions
 
     def _splines(self, block: int) -> tuple[PPoly, PPoly]:
         """Splines of the root and the rotations for one block of frames, which saves memory."""
         with _splines_lock:
-            found = self._kept_splines.get(block)
-            if found is None:
+            if block not in self._kept_splines:
                 first = max(0, block * _BLOCK_FRAMES - _BLOCK_MARGIN)
                 frames = slice(first, (block + 1) * _BLOCK_FRAMES + _BLOCK_MARGIN + 1)
-                times = (
-                    self.first_frame_s
-                    + (first + np.arange(len(self.root_positions[frames]))) / self.rate_hz
-                )
-                found = (
+                times = self.frame_times[frames]
+                splines = (
                     PchipInterpolator(times, self.root_positions[frames]),
                     CubicSpline(times, self.rotations[frames]),
                 )
                 release_pages(self.root_positions, self.rotations)
                 while len(self._kept_splines) >= _BLOCKS_KEPT:
                     self._kept_splines.pop(next(iter(self._kept_splines)))
-                self._kept_splines[block] = found
-            return found
+                self._kept_splines[block] = splines
+            return self._kept_splines[block]
 
     @cached_property
     def _kept_splines(self) -> dict[int, tuple[PPoly, PPoly]]:
         return {}
 
-    def _forward(
-        self, roots: NDArray[np.float64], quaternions: NDArray[np.float64]
-    ) -> NDArray[np.float64]:
+    def _forward(self, roots: Array, quaternions: Array) -> Array:
         positions = quaternion_rotate(quaternions, self.offsets)
         positions[:, 0] = roots
         for joint, parent in enumerate(self.parents[1:], start=1):
@@ -295,19 +271,19 @@ class Motion:
         -------
         Motion
         """
-        half = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
-        s, c = half[2], half[3]
+        yaw = np.array([0.0, 0.0, math.sin(yaw_rad / 2), math.cos(yaw_rad / 2)])
+        s, c = yaw[2:]
 
-        def turned(rotations: NDArray[np.float64]) -> NDArray[np.float64]:
+        def rotated(rotations: Array) -> Array:  # quaternion_multiply, without the zeros of yaw
             x, y, z, w = (rotations[..., k] for k in range(4))
             return np.stack([c * x - s * y, c * y + s * x, c * z + s * w, c * w - s * z], axis=-1)
 
         return dataclasses.replace(
             self,
             root_positions=file_backed(
-                quaternion_rotate(half, roots) for (roots,) in in_blocks(self.root_positions)
+                quaternion_rotate(yaw, roots) for (roots,) in in_blocks(self.root_positions)
             ),
-            rotations=file_backed(turned(rotations) for (rotations,) in in_blocks(self.rotations)),
+            rotations=file_backed(rotated(rotations) for (rotations,) in in_blocks(self.rotations)),
         )
 
     def shifted(self, by_m: ArrayLike) -> Motion:
@@ -322,8 +298,6 @@ class Motion:
         -------
         Motion
         """
-        moved = file_backed(
-            roots + np.asarray(by_m, dtype=np.float64)
-            for (roots,) in in_blocks(self.root_positions)
-        )
+        by = np.asarray(by_m, dtype=np.float64)
+        moved = file_backed(roots + by for (roots,) in in_blocks(self.root_positions))
         return dataclasses.replace(self, root_positions=moved)

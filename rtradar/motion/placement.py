@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES, to_nodes
 from rtradar.system.row_files import column
 
 MARGIN_FRAMES = 16
@@ -36,10 +35,7 @@ A fighter who steps sideways does not walk."""
 
 
 def place(
-    motion: Motion,
-    start_s: float = 0.0,
-    duration_s: float | None = None,
-    heading_deg: float = 0.0,
+    motion: Motion, start_s: float = 0.0, duration_s: float | None = None, heading_deg: float = 0.0
 ) -> Motion:
     """Cut an interval out of a recording and put it before the radar.
 
@@ -68,11 +64,8 @@ def place(
         Where the interval is not inside the recording.
     """
     _check(motion, start_s, duration_s, heading_deg)
-    length = (
-        motion.duration_s - start_s
-        if duration_s is None
-        else min(duration_s, motion.duration_s - start_s)
-    )
+    rest = motion.duration_s - start_s
+    length = rest if duration_s is None else min(duration_s, rest)
     part = cut(motion, start_s, length)
     nodes = to_nodes(part)
     inside = (part.frame_times >= -1e-9) & (part.frame_times <= length + 1e-9)
@@ -98,8 +91,7 @@ def _check(motion: Motion, start_s: float, duration_s: float | None, heading_deg
         if start_s + duration_s > motion.duration_s + 1e-6:
             raise InputError(
                 f"start {start_s:g} s and duration {duration_s:g} s end past the recording: "
-                f"{there}, "
-                f"at most {motion.duration_s - start_s:.6g} s from there"
+                f"{there}, at most {motion.duration_s - start_s:.6g} s from there"
             )
     if not math.isfinite(heading_deg):
         raise InputError(f"heading {heading_deg} degrees; it must be finite")
@@ -140,9 +132,8 @@ def hip_headings(nodes: Motion) -> NDArray[np.float64]:
     """Horizontal unit vectors (frame, 2) of the hips' heading, at right angles to the hip axis."""
     hips = [column(nodes.positions, NODES.index(hip)) for hip in ("l_hip", "r_hip")]
     left = hips[0][:, :2] - hips[1][:, :2]
-    return np.stack([left[:, 1], -left[:, 0]], axis=1) / np.maximum(
-        np.linalg.norm(left, axis=1, keepdims=True), 1e-9
-    )
+    ahead = np.stack([left[:, 1], -left[:, 0]], axis=1)
+    return ahead / np.maximum(np.linalg.norm(left, axis=1, keepdims=True), 1e-9)
 
 
 def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -154,9 +145,8 @@ def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
     # Where the headings cancel out, their mean says nothing, and the first frame is used instead.
     along = mean if float(np.linalg.norm(mean)) > 1e-6 else headings[0]
     to_the_left = along[0] * headings[:, 1] - along[1] * headings[:, 0]
-    angle = math.atan2(along[1], along[0]) + float(
-        np.median(np.arctan2(to_the_left, headings @ along))
-    )
+    away = float(np.median(np.arctan2(to_the_left, headings @ along)))
+    angle = math.atan2(along[1], along[0]) + away
     return np.array([math.cos(angle), math.sin(angle)])
 
 
@@ -166,20 +156,16 @@ def walk_direction(
     """Direction (2,) of a walk, or None where it is none.
 
     It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a
-    way not longer than 1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point, along
-    the ``headings`` (frame, 2) of the hips. The direction is that of the farthest point, so a walk
-    there and back counts, and goes there first.
+    path not longer than 1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point,
+    along the ``headings`` (frame, 2) of the hips. The direction is that of the farthest point, so a
+    walk there and back counts, and goes there first.
     """
-    farthest = _farthest(roots)
+    away = roots[:, :2] - roots[0, :2]
+    last = int(np.argmax(np.linalg.norm(away, axis=1)))
+    farthest = np.asarray(away[last])
     distance = float(np.linalg.norm(farthest))
-    reached = int(np.argmax(np.linalg.norm(roots[:, :2] - roots[0, :2], axis=1)))
-    way = float(np.linalg.norm(np.diff(roots[: reached + 1, :2], axis=0), axis=1).sum())
-    if distance < max(WALK_DISTANCE_M, WALK_STRAIGHTNESS * way):
+    path = float(np.linalg.norm(np.diff(roots[: last + 1, :2], axis=0), axis=1).sum())
+    if distance < max(WALK_DISTANCE_M, WALK_STRAIGHTNESS * path):
         return None
     along = float(np.median(np.abs(headings @ farthest))) / distance
     return farthest if along >= WALK_ALONG_HEADING else None
-
-
-def _farthest(roots: NDArray[np.float64]) -> NDArray[np.float64]:
-    away = roots[:, :2] - roots[0, :2]
-    return np.asarray(away[int(np.argmax(np.linalg.norm(away, axis=1)))])

@@ -45,9 +45,8 @@ def _is_count(value: Any) -> bool:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
-def _is_position(value: Any) -> bool:
-    sequence = isinstance(value, list | tuple | np.ndarray)
-    return sequence and len(value) == 3 and all(map(_is_number, value))
+def _same(value: Any) -> Any:
+    return value
 
 
 _POSITIVE = FieldRule(
@@ -55,14 +54,9 @@ _POSITIVE = FieldRule(
     float,
     "it must be a positive, finite number",
 )
-_POSITION = FieldRule(
-    _is_position,
-    lambda value: tuple(map(float, value)),
-    "it must be three finite numbers [m]",
-)
 _ANTENNA = FieldRule(
-    lambda value: value is None or isinstance(value, Antenna),
-    lambda value: value,
+    lambda value: isinstance(value, Antenna | None),
+    _same,
     "it must be a table of an antenna's fields",
 )
 
@@ -76,9 +70,7 @@ def _count(least: int) -> FieldRule:
 
 
 def _choice(*allowed: str) -> FieldRule:
-    return FieldRule(
-        lambda value: value in allowed, lambda value: value, f"allowed: {', '.join(allowed)}"
-    )
+    return FieldRule(lambda value: value in allowed, _same, f"allowed: {', '.join(allowed)}")
 
 
 def _between(least: float, most: float, *, optional: bool = True) -> FieldRule:
@@ -97,22 +89,23 @@ def _if(allows: Callable[[Any], bool], convert: type) -> FieldRule:
 
 
 FIELD_RULES: dict[str, FieldRule] = {
-    "start_frequency_hz": _POSITIVE,
-    "bandwidth_hz": _POSITIVE,
-    "chirp_duration_s": _POSITIVE,
-    "frame_duration_s": _POSITIVE,
-    "frame_hop_s": _POSITIVE,
-    "tx_spacing_wavelengths": _POSITIVE,
-    "rx_spacing_wavelengths": _POSITIVE,
+    **dict.fromkeys(("start_frequency_hz", "bandwidth_hz", "chirp_duration_s"), _POSITIVE),
+    **dict.fromkeys(("frame_duration_s", "frame_hop_s"), _POSITIVE),
+    **dict.fromkeys(("tx_spacing_wavelengths", "rx_spacing_wavelengths"), _POSITIVE),
     "samples_per_chirp": _count(1),
-    "tx_y": _count(0),
-    "tx_z": _count(0),
-    "rx_y": _count(0),
-    "rx_z": _count(0),
+    **dict.fromkeys(("tx_y", "tx_z", "rx_y", "rx_z"), _count(0)),
     "channels": _choice("pairs", "all"),
     "polarization": _choice("v", "h"),
     "multiplexing": _choice("tdm", "fdm", "ddm"),
-    "position_m": _POSITION,
+    "position_m": FieldRule(
+        lambda value: (
+            isinstance(value, list | tuple | np.ndarray)
+            and len(value) == 3
+            and all(map(_is_number, value))
+        ),
+        lambda value: tuple(map(float, value)),
+        "it must be three finite numbers [m]",
+    ),
     "transmit_power_dbm": _between(-200, 200),
     "noise_figure_db": _between(0, 100),
     "noise_temperature_k": _between(0, 1e6, optional=False),

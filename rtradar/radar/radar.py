@@ -1,4 +1,9 @@
-"""The radar: its fields, how it is loaded, and every quantity that follows from the fields."""
+"""The radar: its fields, how it is loaded, and every quantity that follows from the fields.
+
+A new radar with a name is a function that returns a `Radar`, registered by `register_radar`, by an
+entry point of the group ``rtradar.radars``, or in `PRESETS`; a TOML file with the fields of `Radar`
+as its keys needs no code.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
-from rtradar.conventions import (
-    BOLTZMANN_J_PER_K,
-    NOISE_FIGURE_TEMPERATURE_K,
-    SPEED_OF_LIGHT_MPS,
-)
+from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.system.checks import printable
@@ -184,8 +185,7 @@ class Radar:
         Raises
         ------
         InputError
-            Where the file cannot be read, is not TOML, or has an unknown key or a value without
-            meaning.
+            Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
         path = Path(source)
         if str(source) in PRESETS or path.suffix != ".toml":
@@ -227,18 +227,12 @@ class Radar:
 
     @property
     def range_bin_m(self) -> float:
-        """Range resolution and width of one range bin, c / 2B [m] (paper, eq. 2).
-
-        Equation :eq:`range-axis` of the theory page.
-        """
+        """Range resolution and width of one range bin, c / 2B [m] (:eq:`range-axis`)."""
         return SPEED_OF_LIGHT_MPS / (2 * self.bandwidth_hz)
 
     @property
     def max_range_m(self) -> float:
-        """Range whose beat frequency equals the sample rate, c Fs / 2s [m] (paper, eq. 1).
-
-        Equation :eq:`range-axis` of the theory page.
-        """
+        """Range whose beat frequency is the sample rate, c Fs / 2s [m] (:eq:`range-axis`)."""
         return self.range_bin_m * self.samples_per_chirp
 
     @cached_property
@@ -292,20 +286,15 @@ class Radar:
 
     @property
     def max_angle_deg(self) -> float:
-        """Unambiguous azimuth and elevation, asin(lambda / 2d) at the sweep centre [deg].
-
-        The paper's eq. 5, and equation :eq:`angle-axis` of the theory page.
-        """
+        """Unambiguous azimuth and elevation, asin(lambda / 2d) [deg] (:eq:`angle-axis`)."""
         return math.degrees(math.asin(min(1.0, 1 / (2 * self._virtual_spacing_wavelengths))))
 
     @property
     def angle_resolution_deg(self) -> float:
-        """Half-power beam width of one uniform virtual line at broadside, 0.886 lambda / N d [deg].
+        """Half-power beam width of one virtual line at broadside, 0.886 lambda / N d [deg].
 
-        It is that of the far field. Where the spacings of Tx and Rx do not fill a line without
-        gaps, it is the width for a line of as many elements.
-
-        Equation :eq:`angle-axis` of the theory page.
+        It is that of the far field (:eq:`angle-axis`). Where the spacings of Tx and Rx do not fill
+        a line without gaps, it is the width for a line of as many elements.
         """
         elements = max(self.tx_y * self.rx_y, self.tx_z * self.rx_z)
         if elements < 2:
@@ -354,10 +343,7 @@ class Radar:
 
     @property
     def receiver_rate_hz(self) -> float:
-        """Complex sample rate of a receiver before it separates the bands of FDM [Hz].
-
-        Without FDM it is the `sample_rate_hz`.
-        """
+        """Complex sample rate of a receiver before it separates the bands of FDM, if any [Hz]."""
         return self.sample_rate_hz + float(np.ptp(self.tx_offset_hz))
 
     @property
@@ -370,10 +356,7 @@ class Radar:
 
     @property
     def cycles_per_frame(self) -> int:
-        """Number of whole cycles in one frame (133 of the paper's 133.3).
-
-        Under DDM it is a multiple of `n_doppler_bands`.
-        """
+        """Number of whole cycles in one frame; a multiple of `n_doppler_bands` under DDM."""
         cycles = math.floor(self.frame_duration_s / self.cycle_duration_s * (1 + 1e-12))
         return cycles - cycles % self.n_doppler_bands
 
@@ -387,8 +370,34 @@ class Radar:
         """Number of chirps in the whole cycles of one frame."""
         return self.cycles_per_frame * self.n_tx
 
+    @property
+    def max_velocity_mps(self) -> float:
+        """Unambiguous velocity, lambda / (4 cycle) [m/s] (:eq:`doppler-axis`)."""
+        return self.wavelength_m / (4 * self.cycle_duration_s)
+
+    @property
+    def velocity_bin_mps(self) -> float:
+        """Velocity resolution and width of one Doppler bin [m/s] (:eq:`doppler-axis`)."""
+        return self.wavelength_m / (2 * self.cycles_per_frame * self.cycle_duration_s)
+
+    def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
+        """Give the velocity of each Doppler bin, ascending, zero at index ``n_cycles // 2``.
+
+        Parameters
+        ----------
+        n_cycles : int
+            Number of cycles in the frame that is transformed.
+
+        Returns
+        -------
+        (velocity,) float64
+            Velocity [m/s].
+        """
+        bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
+        return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))
+
     def tx_of_chirp(self, chirp: NDArray[np.integer]) -> NDArray[np.int64]:
-        """Find the transmitter of each chirp; equation :eq:`tdm` of the theory page.
+        """Find the transmitter of each chirp (:eq:`tdm`).
 
         Parameters
         ----------
@@ -403,14 +412,12 @@ class Radar:
         return np.asarray(chirp, dtype=np.int64) % self.n_tx
 
     def chirp_times(self, n: int, first: int = 0) -> NDArray[np.float64]:
-        """Give the centres of ``n`` successive chirps; equation :eq:`tdm` of the theory page.
+        """Give the centres of ``n`` successive chirps (:eq:`tdm`).
 
         Parameters
         ----------
-        n : int
-            Number of chirps.
-        first : int
-            Number of the first chirp.
+        n, first : int
+            Number of chirps, and the number of the first.
 
         Returns
         -------
@@ -452,9 +459,7 @@ class Radar:
             Numbers of cycles; empty where the capture is shorter than one frame.
         """
         last = n_chirps // self.n_tx - self.cycles_per_frame
-        if last < 0:
-            return np.zeros(0, dtype=np.int64)
-        candidates = np.arange(math.floor((last + 0.5) / self.hop_cycles) + 1)
+        candidates = np.arange(max(0, math.floor((last + 0.5) / self.hop_cycles) + 1))
         starts = np.rint(candidates * self.hop_cycles).astype(np.int64)
         return np.unique(starts[starts <= last])
 
@@ -474,50 +479,14 @@ class Radar:
         centres = np.asarray(starts) + self.cycles_per_frame / 2
         return np.asarray(centres * self.cycle_duration_s, dtype=np.float64)
 
-    @property
-    def max_velocity_mps(self) -> float:
-        """Unambiguous velocity, lambda / (4 cycle), at the sweep centre [m/s] (paper, eq. 3).
-
-        Equation :eq:`doppler-axis` of the theory page.
-        """
-        return self.wavelength_m / (4 * self.cycle_duration_s)
-
-    @property
-    def velocity_bin_mps(self) -> float:
-        """Velocity resolution and width of one Doppler bin at the sweep centre [m/s].
-
-        The paper's eq. 4, and equation :eq:`doppler-axis` of the theory page.
-        """
-        return self.wavelength_m / (2 * self.cycles_per_frame * self.cycle_duration_s)
-
-    def velocity_mps(self, n_cycles: int) -> NDArray[np.float64]:
-        """Give the velocity of each Doppler bin, ascending, zero at index ``n_cycles // 2``.
-
-        Parameters
-        ----------
-        n_cycles : int
-            Number of cycles in the frame that is transformed.
-
-        Returns
-        -------
-        (velocity,) float64
-            Velocity [m/s].
-        """
-        bins = np.arange(n_cycles, dtype=np.float64) - n_cycles // 2
-        return bins * (self.wavelength_m / (2 * n_cycles * self.cycle_duration_s))
-
     # -- powers (derived) --------------------------------------------------------------------------
 
     @property
     def watts_per_m2(self) -> float:
         r"""Received power [W] of an echo with \|amplitude\|^2 = 1 m^2.
 
-        P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest.
-
-        Raises
-        ------
-        InputError
-            Where the radar does not state its transmit power.
+        P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest. An `InputError` is raised where
+        the radar does not state its transmit power.
         """
         if self.transmit_power_dbm is None:
             raise InputError(
@@ -535,12 +504,8 @@ class Radar:
 
         T is the `noise_temperature_k` of what the antennas see, F the noise factor and B the sample
         rate. Noise factors are defined for a source at 290 K, so the receiver itself adds the noise
-        of 290 K (F - 1), whatever the antennas see.
-
-        Raises
-        ------
-        InputError
-            Where the radar does not state its noise figure.
+        of 290 K (F - 1), whatever the antennas see. An `InputError` is raised where the radar does
+        not state its noise figure.
         """
         if self.noise_figure_db is None:
             raise InputError(
@@ -548,6 +513,5 @@ class Radar:
                 "give it"
             )
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
-        return float(
-            BOLTZMANN_J_PER_K * (self.noise_temperature_k + receiver_k) * self.sample_rate_hz
-        )
+        noise_k = self.noise_temperature_k + receiver_k
+        return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)

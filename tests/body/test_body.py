@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from rtradar.body import PART_NAMES, Body, Ellipsoids
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, synthetic_motion
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES
 
 RADII = {
     "hip": 0.07,

@@ -14,7 +14,7 @@ import pytest
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, load_motion, place, synthetic_motion
 from rtradar.motion.formats import text_file as textfile
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES
 
 
 @pytest.mark.parametrize("frames", [1, 3, 4, 5, 8, 11])

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from rtradar.errors import InputError
 from rtradar.motion import Motion, cut, place, synthetic_motion
 from rtradar.motion.placement import MARGIN_FRAMES, hip_headings, median_heading, walk_direction
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES
 
 
 @pytest.fixture(scope="module")

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from rtradar.motion import Motion, load_motion, place
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES, to_nodes
 
 BVH = "bandai_namco_CC-BY-NC/dataset-1_{}_normal_001.bvh"
 FILES = {

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 from rtradar.errors import InputError
 from rtradar.motion import Motion, synthetic_motion
 from rtradar.motion.quaternions import quaternion_multiply
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import ASF_JOINTS, CHAIN_24, NODE_PARENT, NODES, plain
+from rtradar.motion.skeleton import ASF_JOINTS, CHAIN_24, NODE_PARENT, NODES, plain, to_nodes
 
 
 def test_31_to_24_to_22() -> None:

@@ -28,8 +28,7 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.motion.formats.c3d import LONGEST_GAP_S, bridged, read_markers
 from rtradar.motion.formats.markers import NEEDED
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES, to_nodes
 from rtradar.pipeline.agreement import chamfer
 from rtradar.validate.rows import Row, judged, main, reported
 

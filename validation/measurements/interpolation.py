@@ -27,7 +27,7 @@ from scipy.interpolate import Akima1DInterpolator, CubicSpline, PchipInterpolato
 from scipy.spatial.transform import Rotation, RotationSpline, Slerp
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.motion.load import load_motion
+from rtradar.motion.formats import load_motion
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.validate.rows import Row, main, reported

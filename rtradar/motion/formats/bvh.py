@@ -8,8 +8,6 @@ a last joint is kept even where its end site has no length.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator
-from contextlib import closing
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -18,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, check_size, fail, numbers, read_lines
+from rtradar.motion.formats.text_file import FRAMES_AT_ONCE, TextFile
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate, quaternions_to_world, to_world
 from rtradar.system.row_files import FileBackedRows, column, in_blocks
@@ -32,8 +30,8 @@ UNITS_M = {
 }
 """Length units that BVH files use; the format itself has none."""
 
-_REACH_M = (0.7, 1.5)
-"""Limits of the length of bones from the root to the farthest end of a person [m].
+_SIZE_M = (0.7, 1.5)
+"""Limits of the length of a person's bones from the root to the farthest end [m].
 
 It is 0.56 to 0.72 of a standing height of 1.25 to 2.1 m."""
 
@@ -55,29 +53,19 @@ class _Joint:
     """Index of the joint's first channel among those of all joints."""
 
 
-def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
-    """Read a BVH file.
+def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+    """Read a BVH file; an `InputError` names the file and the line.
 
     Position channels of joints below the root replace the joint's offset; they must be constant but
     for the joint that carries the whole body (Bandai-Namco: ``Hips`` under a still ``joint_Root``),
-    which becomes the root.
-
-    Parameters
-    ----------
-    path : Path
-    unit_m : float, optional
-        Metres in one unit of the file; found from the size of the person where not given.
-
-    Raises
-    ------
-    InputError
-        Naming file and line.
+    which becomes the root. The unit is found from the size of the person where it is not given.
     """
-    with closing(read_lines(path, "BVH motion")) as text:
-        lines = enumerate(text, start=1)
-        joints = _read_hierarchy(lines, path)
-        n_frames, rate_hz = _read_header(lines, path)
-        values = _read_frames(lines, n_frames, joints, path)
+    if skeleton is not None:
+        raise InputError(f"{path}: a BVH file holds its own skeleton; leave {skeleton} out")
+    with TextFile(path, "BVH motion") as text:
+        joints = _read_hierarchy(text)
+        n_frames, rate_hz = _read_header(text)
+        values = _read_frames(text, n_frames, joints)
 
     top = _carrier(joints, values)
     kept = [j for j in range(len(joints)) if top in _chain(joints, j)]
@@ -90,27 +78,22 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     scale = _unit(joints, kept, offsets, path) if unit_m is None else unit_m
     if not 0 < scale < np.inf:
         raise InputError(f"{path}: unit_m = {scale}; it must be positive (0.01 for centimetres)")
-    for k, j in enumerate(kept[1:], start=1):
-        stretch = spreads[k] * scale
+    for j, stretch in zip(kept, spreads * scale, strict=True):
         if stretch > _STRETCH_M:
-            raise fail(
-                path,
-                joints[j].line,
+            raise text.fail(
                 f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be "
                 "rigid",
+                joints[j].line,
             )
-    carriers = [kept[0]] + [joints[j].parent for j in kept[1:]]
+    carriers = [kept[0], *(joints[j].parent for j in kept[1:])]
     roots, rotations = FileBackedRows(), FileBackedRows()
     for (frames,) in in_blocks(values):
         quaternions = _quaternions(joints, frames)
         places = np.zeros((len(frames), 3))
-        for ancestor in _chain(
-            joints, top
-        ):  # from the file's root down to the joint that carries the body
+        # From the file's root down to the joint that carries the body.
+        for ancestor in _chain(joints, top):
             parent, own = joints[ancestor].parent, _places(joints[ancestor], frames)
-            places = places + (
-                own if parent < 0 else quaternion_rotate(quaternions[:, parent], own)
-            )
+            places += own if parent < 0 else quaternion_rotate(quaternions[:, parent], own)
         roots.append(to_world(places * scale))
         rotations.append(quaternions_to_world(quaternions[:, carriers]))
     return Motion(
@@ -124,134 +107,118 @@ def load_bvh(path: Path, unit_m: float | None = None) -> Motion:
     )
 
 
-def _read_hierarchy(lines: Iterator[tuple[int, str]], path: Path) -> list[_Joint]:
+def _read_hierarchy(text: TextFile) -> list[_Joint]:
     """Joints in the file's order (parents first), up to MOTION."""
     joints: list[_Joint] = []
     stack: list[int] = []
-    pending, number, begun = -1, 0, False
-    for number, raw in lines:
+    pending, begun = -1, False
+    for raw in text:
         words = raw.split()
         if not words or words[0] == "HIERARCHY":
             begun |= bool(words)
             continue
         if not begun:
-            raise fail(path, number, "no HIERARCHY before it; this is not a BVH file")
+            raise text.fail("no HIERARCHY before it; this is not a BVH file")
         key = words[0].upper()
         if key == "MOTION":
             if stack or not joints:
-                raise fail(path, number, "MOTION before the hierarchy ends; a brace is missing")
+                raise text.fail("MOTION before the hierarchy ends; a brace is missing")
             for before, joint in itertools.pairwise(joints):
                 joint.column = before.column + len(before.channels)
             return joints
         if key in ("ROOT", "JOINT", "END"):
             if (key == "ROOT") == bool(joints):
-                raise fail(path, number, "a BVH file must have exactly one ROOT, first")
+                raise text.fail("a BVH file must have exactly one ROOT, first")
             if key != "ROOT" and not stack:
-                raise fail(path, number, f"{words[0]} outside the braces of the root")
+                raise text.fail(f"{words[0]} outside the braces of the root")
             parent = stack[-1] if stack else -1
             name = f"{joints[parent].name}_end" if key == "END" else " ".join(words[1:])
             if not name or any(joint.name == name for joint in joints):
-                raise fail(path, number, f"joint {name!r}: every joint needs a name of its own")
-            joints.append(_Joint(name, parent, number))
-            check_size(path, len(joints))
+                raise text.fail(f"joint {name!r}: every joint needs a name of its own")
+            joints.append(_Joint(name, parent, text.line))
+            text.check_size(len(joints))
             pending = len(joints) - 1
         elif key == "{":
             if pending < 0:
-                raise fail(path, number, "an opening brace without a joint before it")
+                raise text.fail("an opening brace without a joint before it")
             stack.append(pending)
             pending = -1
         elif key == "}":
             if not stack:
-                raise fail(path, number, "a closing brace too many")
+                raise text.fail("a closing brace too many")
             stack.pop()
         elif key == "OFFSET" and stack:
-            offset = numbers(words[1:], path, number)
+            offset = text.numbers(words[1:])
             if len(offset) != 3:
-                raise fail(path, number, f"OFFSET has {len(offset)} values; it needs three")
+                raise text.fail(f"OFFSET has {len(offset)} values; it needs three")
             joints[stack[-1]].offset = np.array(offset)
         elif key == "CHANNELS" and stack:
-            joints[stack[-1]].channels = _channel_names(words, path, number)
+            joints[stack[-1]].channels = _channel_names(words, text)
         else:
-            raise fail(path, number, f"{words[0][:40]!r} is not expected in a BVH hierarchy")
-    raise fail(path, number, "no MOTION; the file may be cut off")
+            raise text.fail(f"{words[0][:40]!r} is not expected in a BVH hierarchy")
+    raise text.fail("no MOTION; the file may be cut off")
 
 
-def _channel_names(words: list[str], path: Path, line: int) -> tuple[str, ...]:
+def _channel_names(words: list[str], text: TextFile) -> tuple[str, ...]:
     names = tuple(word.lower() for word in words[2:])
     allowed = {axis + kind for axis in "xyz" for kind in ("position", "rotation")}
-    if (
-        len(words) < 2
-        or words[1] != str(len(names))
-        or not set(names) <= allowed
-        or len(set(names)) != len(names)
-    ):
-        raise fail(
-            path, line, "CHANNELS needs a count and as many different Xposition ... Zrotation"
-        )
+    if words[1:2] != [str(len(names))] or not set(names) <= allowed or len(set(names)) < len(names):
+        raise text.fail("CHANNELS needs a count and as many different Xposition ... Zrotation")
     return names
 
 
-def _read_header(lines: Iterator[tuple[int, str]], path: Path) -> tuple[int, float]:
+def _read_header(text: TextFile) -> tuple[int, float]:
     """Number of frames, and frames per second."""
-    number = 0
-    frames: int | None = None
-    interval: float | None = None
-    for number, raw in lines:
+    frames, interval = 0, 0.0
+    for raw in text:
         words = raw.replace(":", ": ").split()
         if not words:
             continue
         if words[0].lower() == "frames:":
-            count = numbers(words[1:2], path, number)
+            count = text.numbers(words[1:2])
             if not count or count[0] < 1 or count[0] != int(count[0]):
-                raise fail(path, number, "Frames: needs a positive whole number")
+                raise text.fail("Frames: needs a positive whole number")
             frames = int(count[0])
         elif [word.lower() for word in words[:2]] == ["frame", "time:"]:
-            time = numbers(words[2:3], path, number)
+            time = text.numbers(words[2:3])
             if not time or not _SHORTEST_S <= time[0] <= _LONGEST_S:
-                raise fail(
-                    path,
-                    number,
+                raise text.fail(
                     f"Frame Time: needs a positive number of seconds, {_SHORTEST_S:g} to "
-                    f"{_LONGEST_S:g}",
+                    f"{_LONGEST_S:g}"
                 )
             interval = time[0]
         else:
-            raise fail(path, number, "Frames: and Frame Time: must stand before the values")
-        if frames is not None and interval is not None:
-            rate_hz = 1 / interval
+            raise text.fail("Frames: and Frame Time: must come before the values")
+        if frames and interval:
+            rate_hz, whole = 1 / interval, round(1 / interval)
             # Frame times are written with few digits (0.0333333, .0083333): a whole rate is meant.
-            return frames, (
-                round(rate_hz) if abs(rate_hz - round(rate_hz)) < 1e-3 * rate_hz else rate_hz
-            )
-    raise fail(path, number, "no Frames: or Frame Time:; the file may be cut off")
+            return frames, whole if abs(rate_hz - whole) < 1e-3 * rate_hz else rate_hz
+    raise text.fail("no Frames: or Frame Time:; the file may be cut off")
 
 
-def _read_frames(
-    lines: Iterator[tuple[int, str]], n_frames: int, joints: list[_Joint], path: Path
-) -> NDArray[np.float64]:
+def _read_frames(text: TextFile, n_frames: int, joints: list[_Joint]) -> NDArray[np.float64]:
     """Values (frame, channel)."""
     width, read = joints[-1].column + len(joints[-1].channels), 0
     values, rows = FileBackedRows(), list[list[float]]()
-    for number, raw in lines:
+    for raw in text:
         words = raw.split()
         if not words:
             continue
-        row = numbers(words, path, number)
+        row = text.numbers(words)
         if len(row) != width:
-            raise fail(
-                path,
-                number,
-                f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels",
+            raise text.fail(
+                f"frame {read + 1} has {len(row)} values where the hierarchy has {width} channels"
             )
         rows.append(row)
         read += 1
-        check_size(path, len(joints), read)
+        text.check_size(len(joints), read)
         if len(rows) == FRAMES_AT_ONCE:
             values.append(np.array(rows))
             rows.clear()
     if read != n_frames:
         raise InputError(
-            f"{path}: {read} frames where the header promises {n_frames}; the file may be cut off"
+            f"{text.path}: {read} frames where the header promises {n_frames}; the file may be cut "
+            "off"
         )
     values.append(np.array(rows).reshape(-1, width))
     return values.rows()
@@ -263,9 +230,8 @@ def _places(joint: _Joint, values: NDArray[np.float64]) -> NDArray[np.float64]:
     if not moved:
         return joint.offset[None]
     places = np.tile(joint.offset, (len(values), 1))
-    places[:, ["xyz".index(joint.channels[k][0]) for k in moved]] = column(
-        values, [joint.column + k for k in moved]
-    )
+    axes = ["xyz".index(joint.channels[k][0]) for k in moved]
+    places[:, axes] = column(values, [joint.column + k for k in moved])
     return places
 
 
@@ -276,11 +242,9 @@ def _quaternions(joints: list[_Joint], values: NDArray[np.float64]) -> NDArray[n
         turns = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
         order = "".join(joint.channels[k][0].upper() for k in turns)
         angles = values[:, [joint.column + k for k in turns]]
-        local = (
-            Rotation.from_euler(order, angles, degrees=True)
-            if order
-            else Rotation.identity(len(values))
-        )
+        local = Rotation.identity(len(values))
+        if order:
+            local = Rotation.from_euler(order, angles, degrees=True)
         world.append(local if joint.parent < 0 else world[joint.parent] * local)
     return np.stack([rotation.as_quat() for rotation in world], axis=1)
 
@@ -303,24 +267,21 @@ def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
         if len(children) != 1:
             return carrier
         top = children[0]
-        # A joint that keeps its place in its parent to a millionth of its distance is a bone, not a
-        # carrier.
-        if np.ptp(_places(joints[top], values), axis=0).max() > 1e-6 * (
-            1 + np.abs(joints[top].offset).max()
-        ):
+        # A joint that moves in its parent by less than a millionth of its distance is a bone.
+        least = 1e-6 * (1 + np.abs(joints[top].offset).max())
+        if np.ptp(_places(joints[top], values), axis=0).max() > least:
             carrier = top
 
 
 def _unit(joints: list[_Joint], kept: list[int], offsets: NDArray[np.float64], path: Path) -> float:
-    reach = {kept[0]: 0.0}
+    distance = {kept[0]: 0.0}
     for j, offset in zip(kept[1:], offsets[1:], strict=True):
-        reach[j] = reach[joints[j].parent] + float(np.linalg.norm(offset))
-    longest = max(reach.values())
-    fitting = [unit for unit in UNITS_M.values() if _REACH_M[0] <= longest * unit <= _REACH_M[1]]
+        distance[j] = distance[joints[j].parent] + float(np.linalg.norm(offset))
+    longest = max(distance.values())
+    fitting = [unit for unit in UNITS_M.values() if _SIZE_M[0] <= longest * unit <= _SIZE_M[1]]
     if len(fitting) != 1:
         raise InputError(
             f"{path}: a person {longest:.4g} units from hip to farthest end fits none of "
-            f"{', '.join(UNITS_M)}; "
-            f"give unit_m (metres a unit)"
+            f"{', '.join(UNITS_M)}; give unit_m (metres a unit)"
         )
     return fitting[0]

@@ -12,50 +12,39 @@ import re
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.markers import NEEDED, joint_centres
-from rtradar.motion.formats.rigid import rigid_motion
+from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import to_world
 from rtradar.system.checks import shown
 from rtradar.system.files import open_regular
 
-UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+_UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Values of POINT:UNITS."""
 
 LONGEST_GAP_S = 0.1
-"""Gaps of a marker up to this long are bridged."""
+"""Longest gap of a marker that is bridged [s]."""
 
-_STANDS_M = 0.5
+_UPRIGHT_M = 0.5
 """Least median height of the head above the ankles [m]; below, z is not up or the unit is wrong."""
 
 _SHANK_M = (0.2, 0.7)
-"""Distance of knee and ankle markers of people, children included."""
+"""Limits of the distance of knee and ankle markers of people, children included [m]."""
 
 
 @dataclass(frozen=True)
 class Markers:
     """Recorded positions of some markers of a C3D file.
 
-    Parameters
-    ----------
-    path : Path
-        File that error messages name.
-    names : tuple of str
-        Names of the markers in upper case, without the subject's prefix.
-    positions : (frame, marker, 3) float64
-        Positions, world [m]; NaN where the marker was not seen.
-    rate_hz : float
-        Number of frames per second [Hz].
-    first_frame : int
-        Number that the file gives its first frame.
-    says_up : bool
-        Whether the file says which axis is up.
+    ``positions (frame, marker, 3) float64`` are in world axes [m], NaN where a marker was not seen;
+    ``names`` are in upper case, without the subject's prefix. ``first_frame`` is the number that
+    the file gives its first frame, and ``says_up`` tells whether it says which axis is up.
     """
 
     path: Path
@@ -66,31 +55,32 @@ class Markers:
     says_up: bool
 
 
-def load_c3d(path: Path, unit_m: float | None = None) -> Motion:
-    """Read a C3D file and find the 22 joints from its markers.
+class _Content(NamedTuple):
+    """Content of a C3D file: labels, points (frame, point, 5), and what the file says of them."""
 
-    Parameters
-    ----------
-    path : Path
-    unit_m : float, optional
-        Metres in one unit of the file, for files that do not say (POINT:UNITS).
+    labels: list[str]
+    points: NDArray[np.float32]
+    rate_hz: float
+    first_frame: int
+    unit: str
+    upward: str
 
-    Returns
-    -------
-    Motion
-        Motion of the rigid 22-node skeleton; `rtradar.motion.formats.markers` says how joints are
-        found.
 
-    Raises
-    ------
-    InputError
-        Where the file is none or damaged, or a marker is missing or unseen for longer than
-        `LONGEST_GAP_S`; naming it and the frames, by the file's numbers.
+def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
+    """Read a C3D file, and find the 22 joints of a rigid skeleton from its markers (`markers`).
+
+    ``unit_m`` is for files that do not say it (POINT:UNITS). An `InputError` is raised where the
+    file is none or damaged, or a marker is missing or unseen for longer than `LONGEST_GAP_S`; it
+    names the marker and the frames, by the file's numbers.
     """
+    if skeleton is not None:
+        raise InputError(
+            f"{path}: a C3D file holds markers, from which joints are found; leave {skeleton} out"
+        )
     seen = read_markers(path, NEEDED, unit_m)
     positions = bridged(seen)
     markers = {name: positions[:, k] for k, name in enumerate(seen.names)}
-    _check_size(seen, markers)
+    _check_person(seen, markers)
     centres, pelvis, thorax = joint_centres(markers)
     return rigid_motion(path.stem, centres, pelvis, thorax, seen.rate_hz)
 
@@ -98,10 +88,8 @@ def load_c3d(path: Path, unit_m: float | None = None) -> Motion:
 def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None) -> Markers:
     """Read some markers of a C3D file, gaps and all.
 
-    Raises
-    ------
-    InputError
-        Where the file cannot be read, is damaged or cut off, or a marker is not in it.
+    An `InputError` is raised where the file cannot be read, is damaged or cut off, or a marker is
+    not in it.
     """
     try:
         with (
@@ -109,7 +97,7 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
             warnings.catch_warnings(record=True) as caught,
         ):
             warnings.simplefilter("always")
-            labels, points, rate_hz, first, unit, upward = _read(handle)
+            read = _read(handle)
     except OSError as error:
         raise InputError(
             f"{path}: cannot read this C3D file ({error.strerror or error}); check the path"
@@ -121,55 +109,54 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
         raise InputError(
             f"{path}: not a C3D file, or a damaged one ({reason}); export it again"
         ) from None
-    if any("end of file" in str(warning.message) for warning in caught):
-        raise InputError(
-            f"{path}: ends after {len(points)} frames where its header promises more; the file is "
-            "cut off"
-        )
-    if not len(points):
-        raise InputError(f"{path}: no frame of markers in this C3D file; export it again")
-    if not 1.0 <= rate_hz <= 100_000.0:
-        raise InputError(
-            f"{path}: POINT:RATE is {rate_hz:g} frames a second; it must be 1 to 100000, mend the "
-            "file"
-        )
-    if upward not in ("", "+Z", "+Y"):
-        raise InputError(
-            f"{path}: POINT:Y_SCREEN is {upward[:20]!r}; +Z and +Y are understood, turn the "
-            "recording"
-        )
-    scale = unit_m if unit_m is not None else UNITS_M.get(unit.lower())
-    if scale is None or not 0 < scale < np.inf:
-        said = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {unit[:20]!r}"
-        raise InputError(
-            f"{path}: {said}; {', '.join(UNITS_M)} are understood, give unit_m (metres a unit, "
-            "positive)"
-        )
-    chosen = points[:, [_column(path, labels, name) for name in names]]
+    scale = unit_m if unit_m is not None else _UNITS_M.get(read.unit.lower(), 0.0)
+    unit = f"unit_m is {unit_m}" if unit_m is not None else f"POINT:UNITS is {read.unit[:20]!r}"
+    for wrong, what in (
+        (
+            any("end of file" in str(warning.message) for warning in caught),
+            f"ends after {len(read.points)} frames where its header promises more; the file is cut "
+            "off",
+        ),
+        (not len(read.points), "no frame of markers in this C3D file; export it again"),
+        (
+            not 1.0 <= read.rate_hz <= 100_000.0,
+            f"POINT:RATE is {read.rate_hz:g} frames a second; it must be 1 to 100000, mend the "
+            "file",
+        ),
+        (
+            read.upward not in ("", "+Z", "+Y"),
+            f"POINT:Y_SCREEN is {read.upward[:20]!r}; +Z and +Y are understood, turn the recording",
+        ),
+        (
+            not 0 < scale < np.inf,
+            f"{unit}; {', '.join(_UNITS_M)} are understood, give unit_m (metres a unit, positive)",
+        ),
+    ):
+        if wrong:
+            raise InputError(f"{path}: {what}")
+    chosen = read.points[:, [_column(path, read.labels, name) for name in names]]
     # Not seen: a negative residual, or the origin to the last bit, where other software puts it.
-    hidden = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
+    unseen = (chosen[..., 3] < 0) | ~chosen[..., :3].any(axis=2)
     places = chosen[..., :3].astype(np.float64) * scale
-    if upward == "+Y":
+    if read.upward == "+Y":
         places = to_world(places)
-    places[hidden] = np.nan
-    return Markers(path, names, places, rate_hz, first, bool(upward))
+    places[unseen] = np.nan
+    return Markers(path, names, places, read.rate_hz, read.first_frame, bool(read.upward))
 
 
 def bridged(seen: Markers) -> NDArray[np.float64]:
     """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines.
 
-    Raises
-    ------
-    InputError
-        Where a gap is longer, or at an end of the recording, where there is nothing to go on.
+    An `InputError` is raised where a gap is longer, or at an end of the recording, where nothing
+    lies on its other side.
     """
     positions = seen.positions.copy()
     frames = np.arange(len(positions))
     for k, name in enumerate(seen.names):
-        hidden = np.isnan(positions[:, k, 0])
-        if not hidden.any():
+        unseen = np.isnan(positions[:, k, 0])
+        if not unseen.any():
             continue
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], hidden, [False]]).astype(np.int8)))
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], unseen, [0]])))
         for begin, end in zip(edges[::2], edges[1::2], strict=True):
             first, last = seen.first_frame + begin, seen.first_frame + end - 1
             where = f"{seen.path}: marker {name} is not seen in frames {first} to {last}"
@@ -182,7 +169,7 @@ def bridged(seen: Markers) -> NDArray[np.float64]:
                     f"{where}, {(end - begin) / seen.rate_hz:.3g} s; gaps up to {LONGEST_GAP_S} s "
                     "are bridged, fill this one"
                 )
-        positions[hidden, k] = CubicSpline(frames[~hidden], positions[~hidden, k])(frames[hidden])
+        positions[unseen, k] = CubicSpline(frames[~unseen], positions[~unseen, k])(frames[unseen])
     return positions
 
 
@@ -195,8 +182,7 @@ class _Bounded(io.BufferedReader):
         )
 
 
-def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, str, str]:
-    """Read labels, points (frame, point, 5), rate, first frame, unit, and the axis that is up."""
+def _read(handle: object) -> _Content:
     import c3d  # not before a file asks for it
 
     reader = c3d.Reader(handle)
@@ -210,54 +196,41 @@ def _read(handle: object) -> tuple[list[str], NDArray[np.float32], float, int, s
     labels = [str(label) for label in reader.point_labels]
     frames = [points for _, points, _ in reader.read_frames(copy=True)]
     points = np.array(frames, dtype=np.float32).reshape(len(frames), -1, 5)
-    return (
-        labels,
-        points,
-        float(reader.point_rate),
-        int(reader.first_frame),
-        text("POINT:UNITS"),
-        text("POINT:Y_SCREEN").upper(),
+    rate, first = float(reader.point_rate), int(reader.first_frame)
+    return _Content(
+        labels, points, rate, first, text("POINT:UNITS"), text("POINT:Y_SCREEN").upper()
     )
 
 
 def _column(path: Path, labels: list[str], name: str) -> int:
-    found = [
-        k
-        for k, label in enumerate(labels)
-        if re.sub(r"^.*:", "", label.strip(" \0")).upper() == name
-    ]
-    if not found:
+    plain = [re.sub(r"^.*:", "", label.strip(" \0")).upper() for label in labels]
+    if name not in plain:
         some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
         raise InputError(
             f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers "
-            "of CMU and HDM05 are "
-            "understood, rename or add it"
+            "of CMU and HDM05 are understood, rename or add it"
         )
-    if len(found) > 1:
+    if plain.count(name) > 1:
         raise InputError(
-            f"{path}: marker {name} is there {len(found)} times; keep one person's markers"
+            f"{path}: marker {name} is there {plain.count(name)} times; keep one person's markers"
         )
-    return found[0]
+    return plain.index(name)
 
 
-def _check_size(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
-    shank = float(
-        np.median(
-            [np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"]
-        )
-    )
+def _check_person(seen: Markers, markers: dict[str, NDArray[np.float64]]) -> None:
+    shanks = [
+        np.linalg.norm(markers[f"{side}KNE"] - markers[f"{side}ANK"], axis=1) for side in "LR"
+    ]
+    shank = float(np.median(shanks))
     if not _SHANK_M[0] <= shank <= _SHANK_M[1]:
         raise InputError(
             f"{seen.path}: knee and ankle markers are {shank:.3g} m apart, a person's "
-            f"{_SHANK_M[0]} to {_SHANK_M[1]} m; "
-            "check POINT:UNITS and the markers' names"
+            f"{_SHANK_M[0]} to {_SHANK_M[1]} m; check POINT:UNITS and the markers' names"
         )
-    above = float(
-        np.median(markers["LFHD"][:, 2] - (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2)
-    )
-    if above < _STANDS_M and not seen.says_up:
+    ankles = (markers["LANK"][:, 2] + markers["RANK"][:, 2]) / 2
+    above = float(np.median(markers["LFHD"][:, 2] - ankles))
+    if above < _UPRIGHT_M and not seen.says_up:
         raise InputError(
             f"{seen.path}: the head is {above:.3g} m above the ankles along z, in the median; to "
-            "tell what is up, give one who "
-            "stands, or POINT:Y_SCREEN (+Z or +Y)"
+            "tell what is up, give one who stands, or POINT:Y_SCREEN (+Z or +Y)"
         )

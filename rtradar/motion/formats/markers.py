@@ -1,4 +1,4 @@
-"""Conversion of markers on the skin to the 22 nodes of the body.
+"""Conversion of markers on the skin to the 22 nodes of the body, and of these to a rigid skeleton.
 
 The marker set is the one of 41 markers that CMU and HDM05 recordings carry, in Vicon's names: four
 on the head (LFHD, RFHD, LBHD, RBHD), C7, T10, CLAV and STRN about the chest, four on the waist
@@ -24,28 +24,25 @@ HDM05, technical report CG-2007-2, Universitaet Bonn, 2007.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from rtradar.motion.skeleton_names import NODES
+from rtradar.errors import InputError
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, sign_continuous
+from rtradar.motion.skeleton import MINIMUM_PART_M, NODE_PARENT, NODES
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
-class Centre:
-    """Position of a joint's centre relative to its markers.
+class Centre(NamedTuple):
+    """Position of a joint's centre relative to the mean of its markers.
 
-    Parameters
-    ----------
-    markers : tuple of str
-        Their mean is where the offset begins; ``@`` stands for the side, L or R.
-    segment : str
-        Name of the segment in whose axes the offset is given.
-    offset_m : tuple of float
-        Offset forward, to the left (on the right side: to the right), and up [m].
+    In the names of markers ``@`` stands for the side, L or R. The offset [m] is forward, to the
+    left (on the right side: to the right) and up in the axes of the segment.
     """
 
     markers: tuple[str, ...]
@@ -99,17 +96,8 @@ A straight arm has no such plane of its own."""
 def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     """Find the 22 nodes, and the orientations of pelvis and chest.
 
-    Parameters
-    ----------
-    markers : mapping of str to (frame, 3) float64
-        Positions of all markers of `NEEDED`, world [m].
-
-    Returns
-    -------
-    centres : (frame, node, 3) float64
-        Positions of the nodes, world [m].
-    pelvis, thorax : (frame, 3, 3) float64
-        Rotations; the columns point forward, left and up.
+    ``markers`` are the positions (frame, 3) of all of `NEEDED`, world [m]. The nodes are (frame,
+    node, 3); the rotations of pelvis and thorax (frame, 3, 3) have columns forward, left and up.
     """
     frames = _segments(markers)
     shanks = [
@@ -118,16 +106,14 @@ def joint_centres(markers: Mapping[str, Array]) -> tuple[Array, Array, Array]:
     size = float(np.median(shanks)) / SHANK_M
     centres = []
     for node in NODES:
-        side, name = node[0].upper(), node[2:]
-        centre = CENTRES[node] if node in CENTRES else CENTRES[name]
+        side = node[0].upper()
+        centre = CENTRES[node if node in CENTRES else node[2:]]
         forward, left, up = centre.offset_m
         frame = frames.get(centre.segment, frames.get(f"{side} {centre.segment}"))
         assert frame is not None  # every segment of the table is made
         offset = size * np.array([forward, -left if node.startswith("r_") else left, up])
-        centres.append(
-            _middle(markers, *(marker.replace("@", side) for marker in centre.markers))
-            + frame @ offset
-        )
+        own = (marker.replace("@", side) for marker in centre.markers)
+        centres.append(_middle(markers, *own) + frame @ offset)
     return np.stack(centres, axis=1), frames["pelvis"], frames["thorax"]
 
 
@@ -143,14 +129,13 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
     )
     frames = {
         "thorax": thorax,
-        "pelvis": _level(
-            middle("LFWT", "LBWT") - middle("RFWT", "RBWT"),
-            middle("LFWT", "RFWT") - middle("LBWT", "RBWT"),
-        ),
-        "head": _level(
-            middle("LFHD", "LBHD") - middle("RFHD", "RBHD"),
-            middle("LFHD", "RFHD") - middle("LBHD", "RBHD"),
-        ),
+        **{
+            name: _level(
+                middle(f"LF{end}", f"LB{end}") - middle(f"RF{end}", f"RB{end}"),
+                middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
+            )
+            for name, end in (("pelvis", "WT"), ("head", "HD"))
+        },
     }
     for side, sign in (("L", 1.0), ("R", -1.0)):
         shoulder, elbow, knee, ankle = (
@@ -169,16 +154,16 @@ def _bend(shoulder: Array, elbow: Array, wrist: Array, thorax: Array, sign: floa
     """Direction (frame, 3) in which the forearm leaves the upper arm's line, or would leave it."""
     arm, fore = _unit(elbow - shoulder), _unit(wrist - elbow)
     bent = fore - np.sum(fore * arm, axis=1, keepdims=True) * arm
-    # An arm that hangs down, out and forward bends forward and up; the shortest turn takes it to
+    # An arm that hangs down, out and forward bends forward and up; the smallest rotation takes it to
     # where this arm points.
     rest, ahead = _unit(np.array([0.5, 0.5 * sign, -0.7])), _unit(np.array([0.7, 0.0, 0.5]))
     local = np.einsum("tji,tj->ti", thorax, arm)
-    turn = rest + local
-    # Two mirrorings, along rest and along rest + local, are that turn. Opposite to rest there is
-    # none, and any will do.
-    mirrored = ahead - 2 * np.dot(ahead, rest) * rest
-    along = np.sum(turn * turn, axis=1, keepdims=True)
-    held = mirrored - 2 * turn * (turn @ mirrored)[:, None] / np.maximum(along, 1e-9)
+    half = rest + local
+    # Two reflections, along rest and along rest + local, are that rotation. Opposite to rest there
+    # is none, and any will do.
+    reflected = ahead - 2 * np.dot(ahead, rest) * rest
+    along = np.sum(half * half, axis=1, keepdims=True)
+    held = reflected - 2 * half * (half @ reflected)[:, None] / np.maximum(along, 1e-9)
     lacking = np.maximum(_STRAIGHT - np.linalg.norm(bent, axis=1, keepdims=True), 0.0)
     return np.asarray(bent + lacking * np.einsum("tij,tj->ti", thorax, held))
 
@@ -203,3 +188,72 @@ def _level(left: Array, forward: Array) -> Array:
     y = _unit(left)
     z = _unit(np.cross(forward, y))
     return np.stack([np.cross(y, z), y, z], axis=2)
+
+
+_ON_THE_PELVIS = ("lowerback", "upperback", "hip", "knee", "ankle", "toe")
+"""Nodes whose bones rotate with the pelvis where they do not bend, the others with the chest."""
+
+
+def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_hz: float) -> Motion:
+    """Make the motion of a rigid skeleton whose bones point as the joints do.
+
+    A bone is as long as its joints are apart in the median, and points from one to the other in
+    every frame. Joints do not say how a bone is rotated about itself: seen from pelvis or chest it
+    takes from frame to frame the smallest rotation to its next direction, so that nothing on it
+    spins. ``centres (frame, node, 3)`` are in world axes [m], ``pelvis`` and ``thorax`` rotation
+    matrices (frame, 3, 3). An `InputError` is raised where two joints of a bone coincide.
+    """
+    parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
+    bones = centres[:, 1:] - centres[:, parents]
+    spans = np.linalg.norm(bones, axis=2)
+    for bone, frame in np.argwhere(~(spans.T > MINIMUM_PART_M / 2)):
+        ends = f"{NODE_PARENT[NODES[1 + bone]]!r} and {NODES[1 + bone]!r}"
+        raise InputError(
+            f"{name}: {ends} are {spans[frame, bone] * 1e3:.3g} mm apart in frame {frame + 1}; "
+            f"every body part needs at least {MINIMUM_PART_M * 1e3 / 2:g} mm, mend the markers "
+            "about it"
+        )
+    held = {
+        key: sign_continuous(Rotation.from_matrix(axes).as_quat())
+        for key, axes in (("pelvis", pelvis), ("thorax", thorax))
+    }
+    carriers = np.stack(
+        [
+            held["pelvis" if node.split("_")[-1] in _ON_THE_PELVIS else "thorax"]
+            for node in NODES[1:]
+        ],
+        axis=1,
+    )
+    directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
+    rotations = quaternion_multiply(carriers, _followed(directions))
+    lengths = np.median(spans, axis=0)
+    return Motion(
+        name=name,
+        joints=NODES,
+        parents=(-1, *parents),
+        offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
+        root_positions=centres[:, 0],
+        rotations=np.concatenate(
+            [held["pelvis"][:, None], rotations / np.linalg.norm(rotations, axis=2, keepdims=True)],
+            axis=1,
+        ),
+        rate_hz=rate_hz,
+    )
+
+
+def _followed(directions: Array) -> Array:
+    """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
+    before, after = directions[:-1], directions[1:]
+    cosine = np.sum(before * after, axis=2, keepdims=True)
+    steps = np.concatenate([np.cross(before, after), 1 + cosine], axis=2)
+    norms = np.linalg.norm(steps, axis=2, keepdims=True)
+    # A bone that points the other way in the next frame has no smallest rotation: half a turn about
+    # any line across it will do.
+    across = _unit(np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=2)]))
+    half = np.concatenate([across, np.zeros_like(norms)], axis=2)
+    steps = np.where(norms > 1e-6, steps / np.maximum(norms, 1e-6), half)
+    rotations = np.empty((*directions.shape[:2], 4))
+    rotations[0] = [0.0, 0.0, 0.0, 1.0]
+    for frame, step in enumerate(steps):
+        rotations[frame + 1] = quaternion_multiply(step, rotations[frame])
+    return rotations / np.linalg.norm(rotations, axis=2, keepdims=True)

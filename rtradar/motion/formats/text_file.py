@@ -1,4 +1,4 @@
-"""Reading the text of motion files, with errors that name the file and the line."""
+"""Text of motion files, with errors that name the file and the line."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import codecs
 import io
 import math
 import os
-from collections.abc import Generator
+from collections.abc import Generator, Iterator
 from pathlib import Path
+from typing import Self
 
 from tqdm import tqdm
 
@@ -15,127 +16,126 @@ from rtradar.errors import InputError
 from rtradar.system.files import open_regular
 
 FRAMES_AT_ONCE = 512
-"""Frames that are held as Python's numbers, which take four times the memory of an array's."""
+"""Number of frames kept as Python's numbers, which take four times the memory of an array's."""
 
-_MOST_BYTES = 2_000_000_000
-_MOST_CHARACTERS = 1_000_000
-"""In a line."""
+_MOST_BYTES, _MOST_CHARACTERS = 2_000_000_000, 1_000_000
+"""Limits of the size of a file, some six hours at 120 Hz, and of the length of a line."""
 
-_MOST_JOINTS = 1000
-_MOST_POSES = 100_000_000
+_MOST_JOINTS, _MOST_POSES = 1000, 100_000_000
 _LARGEST = 1e9
-"""In whatever unit: a thousand kilometres in millimetres, a million turns in degrees."""
+"""Largest value in whatever unit: 1000 km in millimetres, a million rotations in degrees."""
 
-_LOOKED_AT_FIRST = 65_536
-_LONG_BYTES = 20_000_000
-_CHARACTERS_A_STEP = 1_000_000
+_FIRST_BYTES, _LONG_BYTES, _CHARACTERS_A_STEP = 65_536, 20_000_000, 1_000_000
 
 
-def read_lines(path: Path, kind: str) -> Generator[str]:
-    """Yield the lines of a text file, with a progress bar where it takes long.
+class TextFile:
+    """Lines of a text file, one after the other, with a progress bar where reading takes long.
 
-    The generator must be closed before an error message is written.
+    The text is Latin-1, for every byte is a character there and only comments use more than ASCII.
+    Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
+    statement, so that it is closed before an error message is written.
 
-    Latin-1, for every byte is a character there and only comments use more than ASCII; line ends
-    may be mixed, and a byte order mark is passed over.
-
-    Raises
-    ------
-    InputError
-        Where the file is not there, is no regular file, is empty, is binary, or is larger than 2 GB
-        (some six hours at 120 Hz).
+    Iterating raises an `InputError` where the file is not there, is no regular file, is empty, is
+    binary, or is larger than 2 GB.
     """
+
+    def __init__(self, path: Path, kind: str) -> None:
+        self.path, self.kind, self.line = path, kind, 0
+        self._lines = self._read()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._lines.close()
+
+    def __iter__(self) -> Iterator[str]:
+        return self
+
+    def __next__(self) -> str:
+        text = next(self._lines)
+        self.line += 1
+        return text
+
+    def fail(self, what: str, line: int | None = None) -> InputError:
+        """Make an error at a line, counted from 1; by default at the one that was read last."""
+        return InputError(f"{self.path}, line {self.line if line is None else line}: {what}")
+
+    def numbers(self, words: list[str]) -> list[float]:
+        """Convert words to finite floats of a size that motion can have."""
+        try:
+            values = [float(word) for word in words]
+        except ValueError:
+            values = [math.nan]
+        if not (all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= _LARGEST):
+            raise self.fail(next(filter(None, map(_complaint, words))))
+        return values
+
+    def check_size(self, joints: int, frames: int = 1) -> None:
+        """Refuse more than a person's motion has: 1000 joints, or 100 million poses of a joint."""
+        if joints > _MOST_JOINTS:
+            raise InputError(
+                f"{self.path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave "
+                "the others out"
+            )
+        if joints * frames > _MOST_POSES:
+            raise InputError(
+                f"{self.path}: {frames} frames of {joints} joints; frames times joints may be "
+                f"{_MOST_POSES}: cut it into shorter ones"
+            )
+
+    def _read(self) -> Generator[str]:
+        path, kind, blank = self.path, self.kind, True
+        try:
+            with io.TextIOWrapper(open_regular(path), encoding="latin-1") as file:
+                size = os.fstat(file.fileno()).st_size
+                if size > _MOST_BYTES:
+                    raise InputError(
+                        f"{path}: {size / 1e6:.0f} MB; a {kind} file may have "
+                        f"{_MOST_BYTES / 1e6:.0f} MB: cut it into shorter ones"
+                    )
+                start = file.buffer.read(_FIRST_BYTES)
+                if b"\0" in start:
+                    raise InputError(f"{path}: binary data; expected {kind} text")
+                file.seek(len(codecs.BOM_UTF8) if start.startswith(codecs.BOM_UTF8) else 0)
+                with _progress(path, size) as bar:
+                    behind = 0
+                    while line := file.readline(_MOST_CHARACTERS + 1):
+                        if "\0" in line:
+                            raise InputError(f"{path}: binary data; expected {kind} text")
+                        if len(line) > _MOST_CHARACTERS:
+                            raise InputError(
+                                f"{path}: a line of more than {_MOST_CHARACTERS} characters; "
+                                f"expected {kind} text"
+                            )
+                        blank = blank and not line.strip()
+                        behind += len(line)
+                        if behind > _CHARACTERS_A_STEP:
+                            bar.update(behind)
+                            behind = 0
+                        yield line
+        except OSError as error:
+            raise InputError(
+                f"{path}: cannot read this {kind} file ({error.strerror}); check the path"
+            ) from None
+        if blank:
+            raise InputError(f"{path}: empty; expected {kind} text")
+
+
+def _progress(path: Path, size: int) -> tqdm:
+    # None shows the bar on a terminal; a bar starts a thread, which small files are not worth.
+    silent = None if size > _LONG_BYTES else True
+    what = f"reading {path.name}"
+    return tqdm(total=size, desc=what, unit="B", unit_scale=True, leave=False, disable=silent)
+
+
+def _complaint(word: str) -> str:
     try:
-        with io.TextIOWrapper(open_regular(path), encoding="latin-1") as file:
-            size = os.fstat(file.fileno()).st_size
-            if size > _MOST_BYTES:
-                raise InputError(
-                    f"{path}: {size / 1e6:.0f} MB; a {kind} file may have {_MOST_BYTES / 1e6:.0f} "
-                    "MB: cut it into shorter ones"
-                )
-            start = file.buffer.read(_LOOKED_AT_FIRST)
-            if b"\0" in start:
-                raise InputError(f"{path}: binary data; expected {kind} text")
-            file.seek(len(codecs.BOM_UTF8) if start.startswith(codecs.BOM_UTF8) else 0)
-            # On a terminal; a bar starts a thread, which small files are not worth.
-            silent = None if size > _LONG_BYTES else True
-            with tqdm(
-                total=size,
-                desc=f"reading {path.name}",
-                unit="B",
-                unit_scale=True,
-                leave=False,
-                disable=silent,
-            ) as bar:
-                blank, behind = True, 0
-                while line := file.readline(_MOST_CHARACTERS + 1):
-                    if "\0" in line:
-                        raise InputError(f"{path}: binary data; expected {kind} text")
-                    if len(line) > _MOST_CHARACTERS:
-                        raise InputError(
-                            f"{path}: a line of more than {_MOST_CHARACTERS} characters; expected "
-                            f"{kind} text"
-                        )
-                    blank = blank and not line.strip()
-                    behind += len(line)
-                    if behind > _CHARACTERS_A_STEP:
-                        bar.update(behind)
-                        behind = 0
-                    yield line
-    except OSError as error:
-        raise InputError(
-            f"{path}: cannot read this {kind} file ({error.strerror}); check the path"
-        ) from None
-    if blank:
-        raise InputError(f"{path}: empty; expected {kind} text")
-
-
-def check_size(path: Path, joints: int, frames: int = 1) -> None:
-    """Refuse files larger than a person's motion: 1000 joints, or 100 million poses of a joint."""
-    if joints > _MOST_JOINTS:
-        raise InputError(
-            f"{path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave the others "
-            "out"
-        )
-    if joints * frames > _MOST_POSES:
-        raise InputError(
-            f"{path}: {frames} frames of {joints} joints; frames times joints may be "
-            f"{_MOST_POSES}: cut it into shorter ones"
-        )
-
-
-def fail(path: Path, line: int, what: str) -> InputError:
-    """An error at a line, counted from 1."""
-    return InputError(f"{path}, line {line}: {what}")
-
-
-def numbers(words: list[str], path: Path, line: int) -> list[float]:
-    """Finite floats of a size that motion can have, or an error that names the word."""
-    try:
-        values = [float(word) for word in words]
+        value = float(word)
     except ValueError:
-        wrong = next(word for word in words if not _is_float(word))
-        raise fail(path, line, f"{wrong[:40]!r} is not a number") from None
-    if not all(map(math.isfinite, values)):
-        wrong = next(
-            word for word, value in zip(words, values, strict=True) if not math.isfinite(value)
-        )
-        raise fail(path, line, f"{wrong[:40]!r}: values must be finite; repair or cut this frame")
-    if any(abs(value) > _LARGEST for value in values):
-        wrong = next(
-            word for word, value in zip(words, values, strict=True) if abs(value) > _LARGEST
-        )
-        raise fail(
-            path,
-            line,
-            f"{wrong[:40]!r}: values may be {_LARGEST:g} at most; repair or cut this frame",
-        )
-    return values
-
-
-def _is_float(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
+        return f"{word[:40]!r} is not a number"
+    if not math.isfinite(value):
+        return f"{word[:40]!r}: values must be finite; repair or cut this frame"
+    if abs(value) > _LARGEST:
+        return f"{word[:40]!r}: values may be {_LARGEST:g} at most; repair or cut this frame"
+    return ""

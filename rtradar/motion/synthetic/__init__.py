@@ -1,1 +1,166 @@
-"""Synthetic actors: how they are built, and how they move."""
+"""Synthetic actors: a person of any size walks, kicks, punches or does jumping jacks."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping
+from typing import Any, TypedDict, Unpack
+
+import numpy as np
+
+from rtradar.errors import InputError
+from rtradar.motion.motion import Motion
+from rtradar.motion.skeleton import NODE_PARENTS, NODES
+from rtradar.motion.synthetic.exercises import jumping_jack, kick, punch
+from rtradar.motion.synthetic.figure import (
+    PosesAt,
+    Subject,
+    draw_subject,
+    lowering,
+    offsets,
+    rotations,
+)
+from rtradar.motion.synthetic.gait import walk
+from rtradar.system.row_files import FileBackedRows, in_blocks
+from rtradar.system.seeds import check_seed, stream
+
+ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
+    "walk": walk,
+    "kick": kick,
+    "punch": punch,
+    "jumping_jack": jumping_jack,
+}
+"""Activities of the actors, by name."""
+
+
+class Traits(TypedDict, total=False):
+    """Size and manner of an actor; `synthetic_motion` says what each trait means."""
+
+    duration_s: float
+    height_m: float
+    build: float
+    tempo: float
+    side: str
+    amplitude: float
+    rate_hz: float
+    take: int
+
+
+_RANGES = {
+    "duration_s": (3.0, 0.0, 3600.0),
+    "height_m": (1.75, 0.8, 2.5),
+    "build": (1.0, 0.4, 2.5),
+    "tempo": (1.0, 0.4, 2.0),
+    "amplitude": (1.0, 0.3, 1.25),
+    "rate_hz": (120.0, 30.0, 10_000.0),
+}
+"""Default, least and largest value of each trait that is a number."""
+
+
+def synthetic_motion(activity: str, seed: int = 0, **traits: Unpack[Traits]) -> Motion:
+    """Make a synthetic actor that faces the radar (-x), on the floor z = 0.
+
+    Joints move along minimum-jerk and harmonic curves (C2), feet do not move while they carry and
+    never sink below the floor, jumps fall freely. A walk of up to 4.2 m goes straight; a longer one
+    turns round within 1.5 m of the middle. The others repeat with short rests.
+
+    Parameters
+    ----------
+    activity : {"walk", "kick", "punch", "jumping_jack"}
+        What the person does.
+    seed : int
+        Number of the subject, which has its own phase, and a few percent of tempo, amplitude and
+        unevenness of the sides.
+    **traits
+        Traits of the actor by name; each may be left out.
+
+        - ``duration_s``: how long the actor moves [s]; 3.
+        - ``height_m``: standing height [m], which segment lengths follow (Drillis and Contini, see
+          `rtradar.motion.synthetic.figure`); 1.75.
+        - ``build``: thickness relative to a normal person of that height; 1.
+        - ``tempo``: speed of the movement; 1 is a walk of about 1.2 m/s.
+        - ``side``: side of the leg or hand that strikes, or of the foot that steps first, "left" or
+          "right"; left.
+        - ``amplitude``: factor of step length, kick height, extension of the arm and width of the
+          jumps; 1.
+        - ``rate_hz``: number of frames per second of the result [Hz]; 120.
+        - ``take``: number of the take; another take of the same subject begins elsewhere in the
+          movement; 0.
+
+    Returns
+    -------
+    Motion
+        Motion of ``duration_s`` at ``rate_hz`` in world axes, not yet placed before a radar.
+
+    Raises
+    ------
+    InputError
+        Where an activity is unknown or a value out of range.
+    """
+    chosen = _checked(activity, traits)
+    subject, height_m = _subject(activity, seed, chosen), chosen["height_m"]
+    duration_s, rate_hz = chosen["duration_s"], chosen["rate_hz"]
+    # Poses are made twice: how far down all must come is not known before the last, and too many
+    # would have to be kept.
+    poses_at = ACTIVITIES[activity](duration_s, subject)
+    times = np.arange(math.ceil(duration_s * rate_hz - 1e-9) + 1) / rate_hz
+    down = [0.0, 0.0, max(lowering(poses_at(some), height_m) for (some,) in in_blocks(times))]
+    roots, rotated = FileBackedRows(), FileBackedRows()
+    for (some,) in in_blocks(times):
+        pose = poses_at(some)
+        pose = dataclasses.replace(pose, root=pose.root - down)
+        roots.append(pose.root)
+        rotated.append(rotations(pose, height_m))
+    bones = offsets(height_m)
+    motion = Motion(
+        name=f"synthetic:{activity}",
+        joints=NODES,
+        parents=NODE_PARENTS,
+        offsets=np.array([bones[node] for node in NODES]),
+        root_positions=roots.rows(),
+        rotations=rotated.rows(),
+        rate_hz=rate_hz,
+        length_s=duration_s,
+        girth=chosen["build"] * height_m / 1.75,
+    )
+    return motion.turned(math.pi)
+
+
+def _checked(activity: str, traits: Traits) -> dict[str, Any]:
+    """All traits, those that are not given by their defaults."""
+    if activity not in ACTIVITIES:
+        raise InputError(f"unknown activity {activity!r}; allowed are {', '.join(ACTIVITIES)}")
+    defaults = {name: default for name, (default, _, _) in _RANGES.items()}
+    chosen: dict[str, Any] = {"side": "left", "take": 0, **defaults}
+    for name in traits:
+        if name not in chosen:
+            raise TypeError(f"synthetic_motion() got an unexpected keyword argument {name!r}")
+    chosen |= traits
+    if chosen["side"] not in ("left", "right"):
+        raise InputError(f"side {chosen['side']!r}; allowed are left and right")
+    take = chosen["take"]
+    if isinstance(take, bool) or not isinstance(take, (int, np.integer)) or take < 0:
+        raise InputError(f"take {take!r}; it must be a whole number, zero or more")
+    for name, (_, low, high) in _RANGES.items():
+        value = chosen[name]
+        if not (math.isfinite(value) and low <= value <= high) or value == 0:
+            raise InputError(
+                f"synthetic {activity}: {name} = {value}; allowed is {low:g} to {high:g}"
+            )
+    return chosen
+
+
+def _subject(activity: str, seed: int, chosen: Mapping[str, Any]) -> Subject:
+    own = check_seed("", seed), list(ACTIVITIES).index(activity)
+    subject = draw_subject(
+        np.random.default_rng(stream(*own)),
+        height_m=chosen["height_m"],
+        side=chosen["side"][0],
+        tempo=chosen["tempo"],
+        amplitude=chosen["amplitude"],
+    )
+    if not chosen["take"]:
+        return subject
+    phase = float(np.random.default_rng(stream(*own, int(chosen["take"]))).uniform())
+    return dataclasses.replace(subject, phase=phase)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -42,9 +42,8 @@ def hermite(
     Each of them is a scalar or (3,).
     """
     span = interval[1] - interval[0]
-    (p0, v0, a0), (p1, v1, a1) = (
-        [np.asarray(value, dtype=np.float64) for value in state] for state in (begin, end)
-    )
+    p0, v0, a0 = (np.asarray(value, dtype=np.float64) for value in begin)
+    p1, v1, a1 = (np.asarray(value, dtype=np.float64) for value in end)
     u = ((t - interval[0]) / span).reshape(-1, *(1,) * p0.ndim)
     p, v, a = (
         p1 - p0 - (v0 + a0 * span / 2) * span,
@@ -52,14 +51,12 @@ def hermite(
         (a1 - a0) * span**2,
     )
     cubic, quartic, quintic = 10 * p - 4 * v + a / 2, -15 * p + 7 * v - a, 6 * p - 3 * v + a / 2
-    return (
-        p0 + v0 * span * u + a0 * span**2 / 2 * u**2 + u**3 * (cubic + u * (quartic + u * quintic))
-    )
+    free = p0 + v0 * span * u + a0 * span**2 / 2 * u**2
+    return free + u**3 * (cubic + u * (quartic + u * quintic))
 
 
-def state(function: object, t: float) -> tuple[Array, Array, Array]:
+def state(function: Callable[[Array], Array], t: float) -> tuple[Array, Array, Array]:
     """Value, velocity and acceleration of ``function(times)`` at a time, by differences."""
-    assert callable(function)
     # Truncation, h^2/12 of the fourth derivative, and rounding, 1e-16/h^2, stay below 1e-5 m/s^2.
     h = 1e-4
     before, here, after = function(np.array([t - h, t, t + h]))

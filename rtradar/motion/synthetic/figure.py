@@ -1,4 +1,4 @@
-"""The synthetic actor's skeleton, and how a pose turns its bones.
+"""Synthetic subjects: how they differ, their skeletons, and how a pose rotates its bones.
 
 Segment lengths are fractions of the standing height after R. Drillis and R. Contini, Body Segment
 Parameters, New York University, technical report 1166.03, 1966 (as printed in D. A. Winter,
@@ -12,19 +12,26 @@ above the sole.
 
 from __future__ import annotations
 
+import math
+import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import reduce
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES
 
 Array = NDArray[np.float64]
 
 SIDES: Mapping[str, float] = {"l": 1.0, "r": -1.0}
 """Sign of y on each side."""
+
+LEFT = np.array([0.0, 1.0, 0.0])
+UP = np.array([0.0, 0.0, 1.0])
 
 ANKLE, SHANK, THIGH, SHOULDER = 0.039, 0.246, 0.245, 0.818
 HIP, ROOT = ANKLE + SHANK + THIGH, ANKLE + SHANK + THIGH + 0.04
@@ -38,8 +45,60 @@ MAXIMUM_REACH = 0.9985
 """Largest extension of a leg relative to its length: at 1 the knee would turn infinitely fast."""
 
 
-@dataclass(frozen=True)
-class Arm:
+@dataclass(frozen=True, kw_only=True)
+class Subject:
+    """A person's size and way of moving.
+
+    ``tempo`` and ``amplitude`` are relative to the nominal actor, with the subject's own few
+    percent. The leg or hand of the ``side``, "l" or "r", acts or steps first. ``phase``, 0 to 1, is
+    the fraction of a step, or of the first rest, at which the movement begins; ``uneven`` has the
+    strength of each side, near 1.
+    """
+
+    height_m: float
+    side: str
+    tempo: float
+    amplitude: float
+    phase: float
+    uneven: Mapping[str, float]
+
+    @property
+    def other(self) -> str:
+        """The side that does not act."""
+        return "r" if self.side == "l" else "l"
+
+    @property
+    def cycle_s(self) -> float:
+        """Duration of two steps [s], 1.1 s at 1.75 m; it grows with the root of the height."""
+        return 1.1 * math.sqrt(self.height_m / 1.75) / self.tempo
+
+    @property
+    def step_m(self) -> float:
+        """One step of a walk [m]."""
+        return 0.375 * self.height_m * self.amplitude
+
+    @property
+    def track_m(self) -> float:
+        """Distance of the footprints from the middle line [m]."""
+        return 0.038 * self.height_m
+
+
+def draw_subject(
+    rng: np.random.Generator, *, height_m: float, side: str, tempo: float, amplitude: float
+) -> Subject:
+    """Draw a subject: 3 % of spread (cut at two sigma) on tempo, amplitude and each side."""
+    spread = 1 + 0.03 * np.clip(rng.standard_normal(4), -2.0, 2.0)
+    return Subject(
+        height_m=height_m,
+        side=side,
+        tempo=tempo * float(spread[0]),
+        amplitude=amplitude * float(spread[1]),
+        phase=float(rng.uniform()),
+        uneven={"l": float(spread[2]), "r": float(spread[3])},
+    )
+
+
+class Arm(NamedTuple):
     """World rotations of one arm's bones; at rest it hangs."""
 
     upper: Rotation
@@ -51,22 +110,10 @@ class Arm:
 class Pose:
     """Pose of the figure at n times, facing +x.
 
-    Parameters
-    ----------
-    root : (n, 3) float64
-        Position of the root [m].
-    pelvis, thorax, head : Rotation
-        Orientations in world axes, n each.
-    ankles : mapping of side to (n, 3) float64
-        Target positions of the ankles [m]; the knees follow.
-    feet : mapping of side to Rotation
-        Orientations of the feet in world axes.
-    left : (n, 3) float64
-        Axis about which the knees bend, roughly; to the left.
-    arms : mapping of side to Arm
-        Rotations of the bones of the arms.
-    shrug : (n,) float64
-        Angle by which both shoulders are raised [rad].
+    ``root (n, 3)`` is its position [m]; pelvis, thorax and head are orientations in world axes, n
+    each. For each side ``ankles`` are the positions (n, 3) that the knees must allow [m], ``feet``
+    the orientations and ``arms`` the rotations of the bones. The knees bend about ``left``,
+    roughly, and ``shrug`` raises both shoulders [rad].
     """
 
     root: Array
@@ -75,18 +122,27 @@ class Pose:
     head: Rotation
     ankles: Mapping[str, Array]
     feet: Mapping[str, Rotation]
-    left: Array
     arms: Mapping[str, Arm]
-    shrug: Array
+    left: Array = field(default_factory=lambda: LEFT)
+    shrug: Array | float = 0.0
 
 
 PosesAt = Callable[[Array], Pose]
 """A pose at any times (n,) [s], the same whatever others are asked for with it."""
 
 
-def turn(axis: str, angle: Array | float) -> Rotation:
-    """Rotation about one axis [rad]; angles (n,) give n rotations."""
-    return Rotation.from_euler(axis, np.asarray(angle)[..., None])
+def xyz(x: Array | float, y: Array | float, z: Array | float) -> Array:
+    """Vectors (n, 3) from their components."""
+    return np.stack(np.broadcast_arrays(x, y, z), axis=-1)
+
+
+def about(**angles: Array | float) -> Rotation:
+    """Product of rotations about axes by angles [rad], the last applied first.
+
+    Angles (n,) give n rotations.
+    """
+    turns = (Rotation.from_euler(axis, np.asarray(a)[..., None]) for axis, a in angles.items())
+    return reduce(operator.mul, turns)
 
 
 def offsets(height_m: float) -> dict[str, Array]:
@@ -117,21 +173,12 @@ def offsets(height_m: float) -> dict[str, Array]:
 def bend(
     reach: Array, first: float, second: float, hinge: Array, forward: float
 ) -> tuple[Rotation, Rotation]:
-    """Solve two-link inverse kinematics: rotations of two bones that reach a point.
+    """Solve two-link inverse kinematics: rotations of two bones, hanging at rest, to a target.
 
-    At rest both bones hang down.
-
-    Parameters
-    ----------
-    reach : (n, 3) float64
-        Vector from the upper joint to the target of the lower end; shortened where it is too long
-        [m].
-    first, second : float
-        Lengths of the two bones [m].
-    hinge : (n, 3) float64
-        Axis of the middle joint, to the left; made perpendicular to ``reach``.
-    forward : float
-        +1: the middle joint goes forward (knee); -1: backward (elbow).
+    ``reach (n, 3)`` goes from the upper joint to the target of the lower end [m], and is shortened
+    where it is longer than the bones of lengths ``first`` and ``second`` [m]. ``hinge (n, 3)`` is
+    the axis of the middle joint, to the left, and is made perpendicular to ``reach``. With
+    ``forward`` = 1 the middle joint goes forward, as a knee does, with -1 backward, as an elbow.
     """
     distance = np.linalg.norm(reach, axis=1, keepdims=True)
     along = reach / distance
@@ -151,12 +198,18 @@ def _hanging(direction: Array, hinge: Array) -> Rotation:
 
 
 def swing_arm(
-    thorax: Rotation, side: str, *, forward: Array, outward: Array, elbow: Array, wrist: float = 0.1
+    thorax: Rotation,
+    side: str,
+    *,
+    forward: Array | float,
+    outward: Array | float,
+    elbow: Array,
+    wrist: float = 0.1,
 ) -> Arm:
     """An arm by its angles [rad]: raised forward, outward, and bent at elbow and wrist."""
-    upper = thorax * turn("x", SIDES[side] * outward) * turn("y", -forward)
-    fore = upper * turn("y", -elbow)
-    return Arm(upper, fore, fore * turn("y", -wrist))
+    upper = thorax * about(x=SIDES[side] * outward, y=-forward)
+    fore = upper * about(y=-elbow)
+    return Arm(upper, fore, fore * about(y=-wrist))
 
 
 def reach_arm(thorax: Rotation, side: str, reach: Array, height_m: float, elbow_out: float) -> Arm:
@@ -166,19 +219,15 @@ def reach_arm(thorax: Rotation, side: str, reach: Array, height_m: float, elbow_
     return Arm(upper, fore, fore)
 
 
-def roll_about_toe(pitch: Array, height_m: float) -> Array:
-    """Displacement of the ankle (n, 3) [m] where a foot along +x lifts its heel by a pitch [rad].
+def rolled(
+    pitch: Array, height_m: float, ahead: float = TOE_X, below: float = ANKLE - TOE_HEIGHT
+) -> Array:
+    """Displacement of the ankle (n, 3) [m] where a foot along +x rotates by a pitch [rad].
 
-    The toe stays where it is.
+    It rotates about a point ahead of the ankle and below it, by default the toe, which stays.
     """
-    return height_m * np.stack(
-        [
-            TOE_X * (1 - np.cos(pitch)) + (ANKLE - TOE_HEIGHT) * np.sin(pitch),
-            np.zeros_like(pitch),
-            TOE_X * np.sin(pitch) - (ANKLE - TOE_HEIGHT) * (1 - np.cos(pitch)),
-        ],
-        axis=1,
-    )
+    sine, rest = np.sin(pitch), 1 - np.cos(pitch)
+    return height_m * xyz(ahead * rest + below * sine, 0.0, ahead * sine - below * rest)
 
 
 def lowering(pose: Pose, height_m: float) -> float:
@@ -196,27 +245,28 @@ def lowering(pose: Pose, height_m: float) -> float:
 def rotations(pose: Pose, height_m: float) -> Array:
     """Rotations (n, node, 4) of all bones of a pose."""
     bones = offsets(height_m)
-    bent = pose.pelvis.inv() * pose.thorax
-    turned: dict[str, Rotation] = {"root": pose.pelvis, "thorax": pose.thorax, "head": pose.head}
-    for node, fraction in (("lowerback", 1 / 3), ("upperback", 2 / 3)):
-        turned[node] = pose.pelvis * Rotation.from_rotvec(fraction * bent.as_rotvec())
-    turned["neck"] = pose.thorax * Rotation.from_rotvec(
-        0.5 * (pose.thorax.inv() * pose.head).as_rotvec()
-    )
+    bent = (pose.pelvis.inv() * pose.thorax).as_rotvec()
+    nod = (pose.thorax.inv() * pose.head).as_rotvec()
+    turned: dict[str, Rotation] = {
+        "root": pose.pelvis,
+        "lowerback": pose.pelvis * Rotation.from_rotvec(bent / 3),
+        "upperback": pose.pelvis * Rotation.from_rotvec(bent * 2 / 3),
+        "thorax": pose.thorax,
+        "neck": pose.thorax * Rotation.from_rotvec(nod / 2),
+        "head": pose.head,
+    }
     for side, sign in SIDES.items():
-        hip = pose.root + pose.pelvis.apply(bones[f"{side}_hip"])
-        thigh, shank = bend(
-            pose.ankles[side] - hip, THIGH * height_m, SHANK * height_m, pose.left, 1.0
-        )
-        arm = pose.arms[side]
+        leg = pose.ankles[side] - pose.root - pose.pelvis.apply(bones[f"{side}_hip"])
+        thigh, shank = bend(leg, THIGH * height_m, SHANK * height_m, pose.left, 1.0)
         turned |= {
             f"{side}_hip": pose.pelvis,
             f"{side}_knee": thigh,
             f"{side}_ankle": shank,
             f"{side}_toe": pose.feet[side],
-            f"{side}_shoulder": pose.thorax * turn("x", sign * pose.shrug),
-            f"{side}_elbow": arm.upper,
-            f"{side}_wrist": arm.fore,
-            f"{side}_hand": arm.hand,
+            f"{side}_shoulder": pose.thorax * about(x=sign * pose.shrug),
+            f"{side}_elbow": pose.arms[side].upper,
+            f"{side}_wrist": pose.arms[side].fore,
+            f"{side}_hand": pose.arms[side].hand,
         }
-    return np.stack([turned[node].as_quat() for node in NODES], axis=1)
+    shape = len(pose.root), 4
+    return np.stack([np.broadcast_to(turned[node].as_quat(), shape) for node in NODES], axis=1)

@@ -10,7 +10,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.motion.formats.text_file import read_lines
+from rtradar.motion.formats.text_file import TextFile
 from rtradar.system.files import read_json
 from rtradar.system.toml_tables import read_toml
 
@@ -84,7 +84,7 @@ def test_a_recording_in_utf_16_is_no_text(tmp_path: Path) -> None:
 
 def test_line_ends_may_be_mixed(tmp_path: Path) -> None:
     (tmp_path / "x").write_bytes(codecs.BOM_UTF8 + b"a\r\nb\rc\n\nd")
-    assert list(read_lines(tmp_path / "x", "some")) == ["a\n", "b\n", "c\n", "\n", "d"]
+    assert list(TextFile(tmp_path / "x", "some")) == ["a\n", "b\n", "c\n", "\n", "d"]
 
 
 def test_toml_and_json_are_the_same_with_it(tmp_path: Path) -> None:

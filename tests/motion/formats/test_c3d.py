@@ -16,8 +16,7 @@ from rtradar.errors import InputError
 from rtradar.motion import load_motion
 from rtradar.motion.formats.c3d import LONGEST_GAP_S, _Bounded, read_markers
 from rtradar.motion.formats.markers import CENTRES, NEEDED, SHANK_M
-from rtradar.motion.retarget import to_nodes
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES, to_nodes
 
 FRAMES, RATE = 90, 120.0
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.motion.formats.rigid import rigid_motion
+from rtradar.motion.formats.markers import rigid_motion
 from rtradar.motion.quaternions import quaternion_rotate
-from rtradar.motion.skeleton_names import NODE_PARENT, NODES
+from rtradar.motion.skeleton import NODE_PARENT, NODES
 
 FRAMES = 200
 PARENTS = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
 from rtradar.motion.quaternions import quaternion_rotate
-from rtradar.motion.skeleton_names import NODES
+from rtradar.motion.skeleton import NODES
 from rtradar.motion.synthetic.curves import bump, hermite, keyed, smooth
 from rtradar.motion.synthetic.figure import ANKLE, HEEL_X, TOE_HEIGHT, bend
 

@@ -1,0 +1,384 @@
+"""The 22 nodes of the paper's body, and the retargeting of any skeleton to them, a rigid tree.
+
+HDM05 and CMU have 31 joints. The 24-joint chain (`CHAIN_24`, that of SMPL) leaves out the thumbs,
+and the joints inside what moves as one: upper neck, ball of the foot, radius, hand. Its neck and
+collars are not separated in HDM05, they are all at the thorax; without the three and with the top
+of the head added, 22 nodes and 21 bones remain, one a body part.
+
+Where one bone of the recording joins two nodes, that bone is taken as it is. Where a chain joins
+them (ankle to toe tip over the ball of the foot, elbow to wrist over the twist joint, wrist to
+finger tips, base to top of the head, thorax to shoulder in a BVH whose neck and collar are
+separate) the part is one rigid bone that always points from the one joint to the other and has the
+median of their distances as its length. Toe tips are up to 3 cm off by that in push-off, the others
+millimetres.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.motion.motion import Motion
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate
+from rtradar.system.row_files import FileBackedRows, in_blocks
+
+Array = NDArray[np.float64]
+
+
+def _chain(side: str, *nodes: str) -> dict[str, str]:
+    """Parents of a limb's nodes; the first name is that of the node from which it starts."""
+    limb = [nodes[0], *(f"{side}_{node}" for node in nodes[1:])]
+    return {node: parent for parent, node in itertools.pairwise(limb)}
+
+
+NODE_PARENT: Mapping[str, str] = {
+    **_chain("l", "root", "hip", "knee", "ankle", "toe"),
+    **_chain("r", "root", "hip", "knee", "ankle", "toe"),
+    "lowerback": "root",
+    "upperback": "lowerback",
+    "thorax": "upperback",
+    "neck": "thorax",
+    "head": "neck",
+    **_chain("l", "thorax", "shoulder", "elbow", "wrist", "hand"),
+    **_chain("r", "thorax", "shoulder", "elbow", "wrist", "hand"),
+}
+"""Parent of each node but the root, parents first: the 21 bones."""
+
+NODES: tuple[str, ...] = ("root", *NODE_PARENT)
+"""The paper's 22 nodes."""
+
+NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PARENT.values()))
+"""Index of the parent of each node, -1 for the root."""
+
+CHAIN_24: Mapping[str, str] = {
+    "pelvis": "root",
+    "l_hip": "lhipjoint",
+    "r_hip": "rhipjoint",
+    "spine1": "lowerback",
+    "l_knee": "lfemur",
+    "r_knee": "rfemur",
+    "spine2": "upperback",
+    "l_ankle": "ltibia",
+    "r_ankle": "rtibia",
+    "spine3": "thorax",
+    "l_foot": "ltoes",
+    "r_foot": "rtoes",
+    "neck": "thorax",
+    "l_collar": "thorax",
+    "r_collar": "thorax",
+    "head": "lowerneck",
+    "l_shoulder": "lclavicle",
+    "r_shoulder": "rclavicle",
+    "l_elbow": "lhumerus",
+    "r_elbow": "rhumerus",
+    "l_wrist": "lwrist",
+    "r_wrist": "rwrist",
+    "l_hand": "lfingers",
+    "r_hand": "rfingers",
+}
+"""The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) of each."""
+
+_NODE_OF_24 = {
+    "pelvis": "root",
+    "spine1": "lowerback",
+    "spine2": "upperback",
+    "spine3": "thorax",
+    "head": "neck",
+    "l_foot": "l_toe",
+    "r_foot": "r_toe",
+}
+
+ASF_JOINTS: Mapping[str, str] = {
+    **{
+        _NODE_OF_24.get(name, name): joint
+        for name, joint in CHAIN_24.items()
+        if name not in ("neck", "l_collar", "r_collar")
+    },
+    "head": "head",
+}
+"""HDM05 joint of each of the 22 nodes."""
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Joint names of one kind of skeleton by node, as `plain` gives them.
+
+    ``lowerback`` and ``upperback`` are not named: they are found along the chain from root to
+    thorax. The first name that is there counts. Where ``open_ended``, hands, head and toes may lack
+    an end and are then extended.
+    """
+
+    name: str
+    joints: Mapping[str, tuple[str, ...]]
+    open_ended: bool
+
+
+def _convention(name: str, left: str, right: str, middle: str, sided: str) -> Convention:
+    """Make a convention from texts such as ``hip=upleg toe=toeend,toebase``; ``@`` is the side."""
+    texts = {"": middle, "l_": sided.replace("@", left), "r_": sided.replace("@", right)}
+    entries = [(side, *entry.split("=")) for side in texts for entry in texts[side].split()]
+    joints = {f"{side}{node}": tuple(names.split(",")) for side, node, names in entries}
+    return Convention(name, joints, open_ended=True)
+
+
+CONVENTIONS: tuple[Convention, ...] = (
+    Convention(
+        "ASF (HDM05, CMU)",
+        {node: (ASF_JOINTS[node],) for node in ASF_JOINTS if not node.endswith("back")},
+        open_ended=False,
+    ),
+    _convention(
+        "Bandai-Namco BVH",
+        "l",
+        "r",
+        "root=hips thorax=neck neck=head head=headend",
+        "hip=upperleg@ knee=lowerleg@ ankle=foot@ toe=toes@end,toes@ "
+        "shoulder=upperarm@ elbow=lowerarm@ wrist=hand@ hand=hand@end",
+    ),
+    _convention(
+        "CMU BVH, MotionBuilder, Mixamo",
+        "left",
+        "right",
+        "root=hips thorax=neck neck=neck1,head head=headtopend,headend",
+        "hip=@upleg knee=@leg ankle=@foot toe=@toebaseend,@toeend,@toebase "
+        "shoulder=@arm elbow=@forearm wrist=@hand hand=@handmiddle3,@handmiddle2,@handmiddle1,"
+        "@handindex1end,@handindex1,@handend",
+    ),
+    _convention(
+        "Poser BVH",
+        "left",
+        "right",
+        "root=hips,hip thorax=neck neck=head head=headend",
+        "hip=@hip knee=@knee ankle=@ankle toe=@toe,@ankleend "
+        "shoulder=@shoulder elbow=@elbow wrist=@wrist hand=@wristend",
+    ),
+)
+"""Every kind of skeleton that is understood."""
+
+
+def plain(name: str) -> str:
+    """A joint's name without namespace (``mixamorig:``), case, spaces and underscores."""
+    return re.sub(r"[^a-z0-9]", "", re.sub(r"^(.*:|mixamorig\d*)", "", name).lower())
+
+
+MINIMUM_PART_M = 0.01
+"""No body part is shorter than this; joints nearer to each other count as one."""
+
+HEAD_OF_THIGH = 0.130 / 0.245
+"""Ratio of the head's height to the thigh's length (Drillis and Contini 1966).
+
+Skeletons that end at the base of the head need it."""
+
+HAND_OF_FOREARM = 0.108 / 0.146
+"""Ratio of the lengths of hand and forearm (Drillis and Contini 1966).
+
+Skeletons that end at the wrist need it."""
+
+TOES_OF_FOOT = 0.5
+"""Ratio of the distances from ball to toe tip and from ankle to ball of the foot (HDM05).
+
+Skeletons that end at the ball of the foot need it."""
+
+
+@dataclass(frozen=True)
+class _Bone:
+    """A vector in the bone's own axes, and a function that gives its rotations (frame, 4).
+
+    The function takes the positions and rotations of all joints in some frames.
+    """
+
+    offset: Array
+    rotations: Callable[[Array, Array], Array]
+
+    @property
+    def length(self) -> float:
+        return float(np.linalg.norm(self.offset))
+
+
+def to_nodes(motion: Motion) -> Motion:
+    """Retarget a motion to the 22-node skeleton, a rigid tree whose 21 bones are the body parts.
+
+    An `InputError` is raised where the skeleton is of no known kind, naming the joint that is
+    missing, or a part would have no length.
+    """
+    if motion.joints == NODES:
+        return motion
+    convention, joints = _recognise(motion)
+    named = [node for node in joints if node not in ("root", "thorax")]
+    bones = {node: _between(motion, joints[NODE_PARENT[node]], joints[node]) for node in named}
+    bones |= _spine(motion, joints["root"], joints["thorax"])
+    if convention.open_ended:
+        for side in ("l", "r"):
+            bones[f"{side}_toe"] = _foot(
+                motion, joints[f"{side}_ankle"], bones[f"{side}_toe"], joints[f"{side}_toe"]
+            )
+            forearm = bones[f"{side}_wrist"].length
+            bones[f"{side}_hand"] = _extended(
+                motion, bones[f"{side}_hand"], joints, f"{side}_wrist", forearm * HAND_OF_FOREARM
+            )
+        bones["head"] = _extended(
+            motion, bones["head"], joints, "neck", bones["l_knee"].length * HEAD_OF_THIGH
+        )
+    for node, parent in NODE_PARENT.items():
+        if bones[node].length < MINIMUM_PART_M:
+            ends = " to ".join(
+                motion.joints[joints[end]] for end in (parent, node) if end in joints
+            )
+            raise InputError(
+                f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} "
+                f"mm long ({ends}); every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, "
+                "mend the skeleton"
+            )
+    root_positions, rotations = FileBackedRows(), FileBackedRows()
+    for frames in in_blocks(motion.positions, motion.rotations):
+        root_positions.append(frames[0][:, joints["root"]])
+        own = [bones[node].rotations(*frames) for node in NODES[1:]]
+        rotations.append(np.stack([frames[1][:, joints["root"]], *own], axis=1))
+    return dataclasses.replace(
+        motion,
+        joints=NODES,
+        parents=NODE_PARENTS,
+        offsets=np.array([np.zeros(3), *(bones[node].offset for node in NODES[1:])]),
+        root_positions=root_positions.rows(),
+        rotations=rotations.rows(),
+    )
+
+
+def _recognise(motion: Motion) -> tuple[Convention, dict[str, int]]:
+    """The convention whose names fit, and the joint of each node it names."""
+    there = {plain(name): j for j, name in reversed(list(enumerate(motion.joints)))}
+    fewest, why = len(NODES), ""
+    for convention in CONVENTIONS:
+        found = {
+            node: next(there[name] for name in names if name in there)
+            for node, names in convention.joints.items()
+            if any(name in there for name in names)
+        }
+        missing = [node for node in convention.joints if node not in found]
+        if convention.open_ended:
+            # No end site at all: the part starts and ends in one joint, and is extended from there.
+            for node in [node for node in missing if node == "head" or node.endswith("_hand")]:
+                if NODE_PARENT[node] in found:
+                    found[node] = found[NODE_PARENT[node]]
+                missing.remove(node)
+        if not missing:
+            return convention, found
+        if len(missing) < fewest:
+            wanted = " or ".join(convention.joints[missing[0]])
+            fewest = len(missing)
+            why = f"joint {wanted!r} (node {missing[0]!r}) is missing from this {convention.name}"
+    if fewest > len(NODES) / 2:
+        raise InputError(
+            f"{motion.name}: its joints ({', '.join(motion.joints[:4])}, ...) are named as in no "
+            f"kind of skeleton that is known: {'; '.join(known.name for known in CONVENTIONS)}; "
+            "rename them after one of these"
+        )
+    raise InputError(
+        f"{motion.name}: {why} skeleton; {len(NODES)} nodes are needed, rename or add the joint"
+    )
+
+
+def _between(motion: Motion, first: int, last: int) -> _Bone:
+    """Make a rigid bone between two joints: the recording's own, or one along the chain between."""
+
+    def carried(_: Array, rotations: Array) -> Array:
+        return rotations[:, last]
+
+    if motion.parents[last] == first or last == first:
+        return _Bone(motion.offsets[last] if last != first else np.zeros(3), carried)
+
+    def chord(positions: Array, rotations: Array) -> Array:
+        apart = positions[:, last] - positions[:, first]
+        return quaternion_rotate(rotations[:, last] * [-1, -1, -1, 1], apart)
+
+    frames = in_blocks(motion.positions, motion.rotations)
+    chords = np.concatenate([chord(*some) for some in frames])
+    length = float(np.median(np.linalg.norm(chords, axis=1)))
+    if length < MINIMUM_PART_M:
+        return _Bone(np.array([0.0, 0.0, length]), carried)
+    rest = np.median(_directions(chords), axis=0)
+    rest /= max(float(np.linalg.norm(rest)), 1e-12)
+
+    def pointing(positions: Array, rotations: Array) -> Array:
+        # The smallest rotation from the rest direction to that of the chord in each frame.
+        directions = _directions(chord(positions, rotations))
+        swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
+        norms = np.linalg.norm(swing, axis=1, keepdims=True)
+        swing = np.where(norms > 1e-9, swing / np.maximum(norms, 1e-9), [1.0, 0.0, 0.0, 0.0])
+        return quaternion_multiply(rotations[:, last], swing)
+
+    return _Bone(length * rest, pointing)
+
+
+def _directions(chords: Array) -> Array:
+    return chords / np.maximum(np.linalg.norm(chords, axis=1), MINIMUM_PART_M)[:, None]
+
+
+def _spine(motion: Motion, root: int, thorax: int) -> dict[str, _Bone]:
+    """Three bones from root to thorax, whatever the number of joints between.
+
+    Three bones are taken as they are; of fewer the longest is split; of more, the joints nearest to
+    each third stay.
+    """
+    chain = [thorax]
+    while chain[0] != root:
+        if motion.parents[chain[0]] < 0:
+            raise InputError(
+                f"{motion.name}: {motion.joints[thorax]!r} does not hang on "
+                f"{motion.joints[root]!r}; mend the skeleton"
+            )
+        chain.insert(0, motion.parents[chain[0]])
+    lengths = np.linalg.norm(motion.offsets[chain[1:]], axis=1)
+    heights = np.concatenate([[0.0], np.cumsum(lengths)])
+    # Joints that coincide count once; the last of them bends the next bone. The thorax itself
+    # always stays.
+    inner = range(1, len(chain) - 1)
+    far = [k for k in inner if MINIMUM_PART_M < heights[k] < heights[-1] - MINIMUM_PART_M]
+    pairs = itertools.pairwise([0, *far])
+    distinct = [0, *(k for before, k in pairs if heights[k] - heights[before] > MINIMUM_PART_M)]
+    distinct.append(len(chain) - 1)
+
+    def off_thirds(k: int) -> float:
+        return min(abs(heights[k] / heights[-1] - third) for third in (1 / 3, 2 / 3))
+
+    while len(distinct) > 4:
+        distinct.remove(max(distinct[1:-1], key=off_thirds))
+    ends = list(itertools.pairwise(distinct))
+    parts = [(chain[a], chain[b], 1.0) for a, b in ends]
+    if len(parts) < 3:
+        longest = int(np.argmax([heights[b] - heights[a] for a, b in ends]))
+        count = 4 - len(parts)
+        parts[longest : longest + 1] = [(*parts[longest][:2], 1 / count)] * count
+    bones = [(_between(motion, a, b), fraction) for a, b, fraction in parts]
+    return {
+        node: _Bone(bone.offset * fraction, bone.rotations)
+        for node, (bone, fraction) in zip(("lowerback", "upperback", "thorax"), bones, strict=True)
+    }
+
+
+def _foot(motion: Motion, ankle: int, foot: _Bone, toe: int) -> _Bone:
+    """Lengthen the foot by `TOES_OF_FOOT` where the skeleton ends at the ball of the foot."""
+    between = motion.parents[toe]
+    ends_at_ball = between == ankle or float(np.linalg.norm(motion.offsets[toe])) < MINIMUM_PART_M
+    return _Bone(foot.offset * (1 + TOES_OF_FOOT), foot.rotations) if ends_at_ball else foot
+
+
+def _extended(
+    motion: Motion, end: _Bone, joints: Mapping[str, int], base: str, length: float
+) -> _Bone:
+    """Extend an end part without length straight on from the bone before it; return others as is.
+
+    Straight on is meant in the axes of the joint at its base: in the rest pose of a BVH these are
+    the same for both.
+    """
+    if end.length >= MINIMUM_PART_M:
+        return end
+    before = motion.offsets[joints[base]]
+    return _Bone(before * (length / max(float(np.linalg.norm(before)), 1e-12)), end.rotations)
