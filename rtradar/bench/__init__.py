@@ -12,6 +12,7 @@ from typing import Any
 
 from rtradar.bench.figure import draw
 from rtradar.bench.growth import with_channels, with_duration, with_echoes
+from rtradar.bench.kernels import measure_kernels
 from rtradar.bench.paper import Baseline, measure_baseline
 from rtradar.bench.plan import CHEAPEST, Plan, model_cases, plan_of
 from rtradar.bench.rates import measure_rates
@@ -64,7 +65,13 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
 
 
 def measure(plan: Plan) -> dict[str, Any]:
-    """All that the plan asks for, as plain values: ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth``.
+    """Measure all that the plan asks for, and give it as plain values.
+
+    Returns
+    -------
+    dict
+        With keys ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth`` and
+        ``kernels``.
 
     Raises
     ------
@@ -89,6 +96,7 @@ def measure(plan: Plan) -> dict[str, Any]:
             "channels": [],
             "echoes": [],
         },
+        "kernels": measure_kernels() if "kernels" in plan.parts else [],
     }
     with temporary_folder("rtradar-bench-") as folder:
         runner = Runner(folder)

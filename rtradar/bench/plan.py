@@ -9,8 +9,9 @@ from rtradar.radar import PRESETS, Radar
 from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import affordable_models
 
-PARTS = ("models", "growth")
-"""What may be measured alone: models with baseline and floors, or growth with the size of the problem."""
+PARTS = ("models", "growth", "kernels")
+"""Parts that may be measured alone: models with baseline and floors, growth with the size of the
+problem, and compiled kernels beside their references."""
 
 RADARS = tuple(PRESETS.built_in)
 FIDELITIES = tuple(affordable_models(12.0))

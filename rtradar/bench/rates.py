@@ -11,8 +11,8 @@ import numpy as np
 import scipy.fft
 
 from rtradar.bench.floors import Rates, direction_count
+from rtradar.kernels.prime_factor_dft import prime_factor_dft
 from rtradar.process import SPECTROGRAM_CYCLES
-from rtradar.process.slow_time_dft import slow_time_dft
 from rtradar.radar import Radar
 
 _REPEATS, _LEAST_S = 5, 0.3
@@ -80,7 +80,7 @@ def _multiply_adds() -> float:
 
 def _doppler_ffts(cycles: int, multiply_adds: float) -> float:
     """Transforms a second by the library, or by our own sums if these are fewer multiply-adds."""
-    dft = slow_time_dft(cycles)
+    dft = prime_factor_dft(cycles)
     return max(_ffts(cycles), multiply_adds / dft.multiply_adds if dft is not None else 0)
 
 

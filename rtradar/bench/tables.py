@@ -82,6 +82,19 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
             for row in growth["echoes"]
         ]
         yield table(["echoes of a chirp and receiver", "IF alone, a sample"], lines)
+    if found["kernels"]:
+        lines = [
+            [
+                f"`{row['name']}`",
+                row["does"],
+                f"{1e3 * row['kernel_s']:.3g} ms",
+                f"{1e3 * row['reference_s']:.3g} ms",
+                f"{row['ratio']:.3g}",
+                f"{row['difference']:.1g}",
+            ]
+            for row in found["kernels"]
+        ]
+        yield table(["kernel", "computes", "takes", "its reference", "ratio", "differs by"], lines)
 
 
 def _rates(rates: dict[str, Any]) -> str:

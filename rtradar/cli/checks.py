@@ -70,7 +70,9 @@ def add(commands: Subcommands) -> None:
         help="of the capture [s] (default: 3; with --quick 0.5)",
     )
     bench.add_argument(
-        "--only", metavar="PART", help="models (with the paper's method and floors), or growth"
+        "--only",
+        metavar="PART",
+        help="models (with the paper's method and floors), growth, or kernels",
     )
     bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
     bench.add_argument(

@@ -107,6 +107,8 @@ def _described(value: Any, names: Iterable[str], seen: dict[int, int]) -> _Descr
         )
     if isinstance(value, CodeType):
         return "code", _code_digest(value)
+    if isinstance(value, type) and issubclass(value, tuple) and hasattr(value, "_fields"):
+        return "named tuple", value.__qualname__, value._fields
     home = (
         value.__name__ if isinstance(value, ModuleType) else str(getattr(value, "__module__", None))
     )

@@ -15,6 +15,7 @@ import numpy as np
 from rtradar.clouds import spatial_points
 from rtradar.echoes import Echoes
 from rtradar.kernels.jit import is_on_disk
+from rtradar.kernels.tone_sum import add_tones
 from rtradar.pipeline.capture import chirps_of
 from rtradar.pipeline.cloud_maker import window_angles
 from rtradar.process import (
@@ -27,7 +28,6 @@ from rtradar.process import (
 )
 from rtradar.radar import Radar
 from rtradar.signal import Noise, receive, separate, synthesize
-from rtradar.signal.tones import add_tones
 from rtradar.system.threads import environment_of, thread_count
 
 _LONGEST_S = 120.0

@@ -34,11 +34,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import prange
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.spectra import subtract_mean
 from rtradar.radar import Radar
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
@@ -46,7 +45,7 @@ CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
 _TIME_CONSTANT_S = 1.0
 _PULSES = 2
 
-_CELLS_AT_ONCE = 1024
+_FEW_CELLS = 1024
 
 
 class ClutterRemoval:
@@ -161,25 +160,6 @@ class ClutterRemoval:
         return cycles
 
 
-@compiled(parallel=True)
-def _without_mean(cycles, out):
-    """Fill ``out (cycle, cell)`` with what is left of ``cycles`` without their mean."""
-    count, cells = cycles.shape
-    for block in prange((cells + _CELLS_AT_ONCE - 1) // _CELLS_AT_ONCE):
-        first, last = block * _CELLS_AT_ONCE, min((block + 1) * _CELLS_AT_ONCE, cells)
-        # Summed in double: the mean of equal values is that value, and nothing of them is left.
-        mean = np.zeros(last - first, dtype=np.complex128)
-        for cycle in range(count):
-            row = cycles[cycle, first:last]
-            for cell in range(last - first):
-                mean[cell] += row[cell]
-        rounded = (mean / count).astype(cycles.dtype)
-        for cycle in range(count):
-            row, left = cycles[cycle, first:last], out[cycle, first:last]
-            for cell in range(last - first):
-                left[cell] = row[cell] - rounded[cell]
-
-
 class _Mean(ClutterRemoval):
     works_by_windows = True
 
@@ -187,11 +167,11 @@ class _Mean(ClutterRemoval):
         return f"mean over {window_cycles} cycles ({window_cycles * self._radar.cycle_duration_s:.3g} s)"
 
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        if cycles.size <= len(cycles) * _CELLS_AT_ONCE:
+        if cycles.size <= len(cycles) * _FEW_CELLS:
             # Such as a window of the spectrogram: threads would be woken for longer than they work.
             return cycles - cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
         out = np.empty(cycles.shape, dtype=cycles.dtype)
-        _without_mean(
+        subtract_mean(
             np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1)
         )
         return out

@@ -9,9 +9,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 from rtradar.process.doppler_division import without_copies
-from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
 from rtradar.process.spectra import complex_kind
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
@@ -154,7 +153,7 @@ def _doppler_power(
     kind = complex_kind(channels)
     real = np.float32 if kind == np.complex64 else np.float64
     scale: NDArray[Any] = window.astype(real)
-    dft = slow_time_dft(n_cycles) if kind == np.complex64 else None
+    dft = prime_factor_dft(n_cycles) if kind == np.complex64 else None
 
     def power_of(first: int) -> NDArray[np.floating]:
         own = range(first, min(first + together, chosen.stop))
@@ -164,9 +163,11 @@ def _doppler_power(
             return total
         for channel in own:
             # One channel at a time fits the cache of a core.
-            weighted = np.empty((n_cycles, n_range), dtype=kind)
-            _weigh(channels[:, channel], scale, weighted)
-            _add_power(scipy.fft.fft(weighted, axis=0, overwrite_x=True), total)
+            weighted = np.multiply(channels[:, channel], scale[:, None], dtype=kind)
+            parts = scipy.fft.fft(weighted, axis=0, overwrite_x=True).view(real)
+            squares = np.square(parts, out=parts)
+            total += squares[:, ::2]
+            total += squares[:, 1::2]
         return total
 
     # The order of the sum is fixed, so the map does not depend on the number of threads.
@@ -174,19 +175,3 @@ def _doppler_power(
     for power in others:
         first += power
     return first
-
-
-@compiled(fastmath={"contract"})
-def _weigh(values, weights, out):
-    """Fill ``out (cycle, range)``: values times the weight of their cycle."""
-    for cycle in range(len(out)):
-        for place in range(out.shape[1]):
-            out[cycle, place] = values[cycle, place] * weights[cycle]
-
-
-@compiled(fastmath={"contract"})
-def _add_power(values, total):
-    """Add squared magnitudes to ``total (cycle, range)``."""
-    for cycle in range(len(total)):
-        for place in range(total.shape[1]):
-            total[cycle, place] += values[cycle, place].real ** 2 + values[cycle, place].imag ** 2

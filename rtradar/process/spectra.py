@@ -17,7 +17,7 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.spectra import weigh_samples
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
@@ -135,7 +135,7 @@ def range_spectrum(
 
     def transform(first: int) -> None:
         block = spectra[first : first + _CHIRPS_PER_BATCH]
-        _taper(samples[first : first + len(block)], scale, block)
+        weigh_samples(samples[first : first + len(block)], scale, block)
         # Where it stands, if SciPy can.
         done = scipy.fft.fft(block, axis=2, overwrite_x=True)
         if not np.shares_memory(done, block):
@@ -143,15 +143,6 @@ def range_spectrum(
 
     in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
     return spectra
-
-
-@compiled(fastmath={"contract"})
-def _taper(values, weights, out):
-    """Fill ``out (chirp, rx, sample)``: values times the weight of their sample."""
-    for chirp in range(len(out)):
-        for receiver in range(out.shape[1]):
-            for sample in range(out.shape[2]):
-                out[chirp, receiver, sample] = values[chirp, receiver, sample] * weights[sample]
 
 
 def _checked_if(x: ArrayLike, radar: Radar) -> NDArray[np.generic]:

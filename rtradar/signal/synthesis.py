@@ -1,9 +1,10 @@
-"""IF samples of a block of chirps: every echo a tone, added up (paper, eqs 7 to 12)."""
+"""IF samples of a block of chirps: the sum of a tone for each echo (paper, eqs 7 to 12)."""
 
 from __future__ import annotations
 
 import dataclasses
 import warnings
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, DTypeLike, NDArray
@@ -11,36 +12,39 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import ValidityWarning
+from rtradar.kernels.nufft import LEAST_SAMPLES, MOST_NODES, sum_by_nufft
+from rtradar.kernels.tone_sum import MIDDLE, Tones, add_tones, tone_tables
 from rtradar.radar import Radar
-from rtradar.signal.spreading import LEAST_SAMPLES, MOST_NODES, spread_sum
-from rtradar.signal.tones import LANES, MIDDLE, add_tones, first_powers, series
 from rtradar.system.checks import array_to_fill
 from rtradar.system.threads import in_threads, thread_count
 
 MAX_BINS_IN_CHIRP = 0.1
-"""A length belongs to the centre of its chirp; where it changes by more range bins inside one, that is no longer true."""
+"""Range bins by which a length, which belongs to the centre of its chirp, may change inside one."""
 
 MANY_ECHOES, MANY_VARYING_ECHOES = 300, 84
-"""From so many on, tones are spread over a grid for one FFT if float32 will do (`validation/other_methods/if_sum.py` times both ways): of
-amplitudes that are one number, and of those that are given at several frequencies."""
+"""Echoes from which on the NUFFT is faster, if float32 will do: with amplitudes that are one
+number, and with amplitudes at several frequencies (`validation/other_methods/if_sum.py` times both
+ways)."""
 
 _CHIRPS_A_THREAD = 16
-"""Handed out at once, or more: Python takes its time to hand out the next."""
+"""Least number of chirps of one task of a thread, for Python takes its time to hand out the next."""
 
 _MOST_POWERS = 3
-"""Of the sample number, in float32: those of more than a parabola cancel too much."""
+"""Most powers of the sample number in float32: those beyond a parabola cancel too much."""
 
 _INSTANTS = 16
-"""At so many instants of a block, or twice as many, the speed of echoes is looked at."""
+"""Instants of a block, or up to twice as many, at which the speed of echoes is checked."""
 
 
 def in_band(echoes: Echoes, radar: Radar) -> NDArray[np.bool_]:
-    """Which echoes pass the ideal IF low-pass: beat frequency in [0, sample rate), (chirp, rx, echo).
+    """Echoes that pass the ideal IF low-pass: beat frequency in [0, sample rate).
 
     Parameters
     ----------
     echoes : Echoes
+        Echoes of a block of chirps.
     radar : Radar
+        Radar whose sweep and sample rate count.
 
     Returns
     -------
@@ -62,7 +66,7 @@ def synthesize(
     dtype: DTypeLike = np.complex128,
     out: NDArray[np.complexfloating] | None = None,
 ) -> NDArray[np.complexfloating]:
-    """IF samples of a block of chirps, without noise.
+    """IF samples of a block of chirps, without noise (:eq:`if-signal` of the theory page).
 
     Parameters
     ----------
@@ -70,92 +74,84 @@ def synthesize(
         Echoes of this block. Those whose beat frequency lies outside [0, sample rate) are left out,
         see `in_band`.
     radar : Radar
-        Its waveform.
+        Radar that gives the waveform.
     times : (chirp,) array_like
-        Centres of the chirps [s], as of `Radar.chirp_times`; each length belongs to one of them.
+        Centres of the chirps [s], from `Radar.chirp_times`; each length belongs to one of them.
     dtype : complex64 or complex128
         Type of the samples. Phases are float64 in both. For complex64, samples are added up in
-        float32, to 1e-6 of the sum of the magnitudes: by `spread_sum` of many echoes and 16 samples
-        or more, with at most 6 frequencies, else where amplitudes are given at 3 frequencies at
-        most.
+        float32, to 1e-6 of the sum of the magnitudes: by the NUFFT where there are many echoes, at
+        least 16 samples, and at most 6 frequencies; else where amplitudes are given at 3
+        frequencies at most.
     out : (chirp, rx, sample) complex, optional
         Array of that type to fill, C-contiguous; otherwise a new one is made.
 
     Returns
     -------
     (chirp, rx, sample) complex
-        x[n] = sum over echoes of amplitude(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)), tau = length / c,
-        t_n = n / sample rate, f_n = f_c + s t_n; paper, eq. 9, with its neglected last term. Hidden echoes add nothing.
-        Under FDM f_c is that of each Tx, `Radar.tx_offset_hz` higher, but for amplitudes, which hardly change by so little.
+        x[n] = sum over echoes of amplitude(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)),
+        tau = length / c, t_n = n / sample rate, f_n = f_c + s t_n; paper, eq. 9, with its neglected
+        last term. Under FDM f_c is that of each Tx, `Radar.tx_offset_hz` higher, except in the
+        amplitudes, which hardly change by so little.
 
     Raises
     ------
     ValueError
-        Where times and echoes differ in their number of chirps, or ``out`` is not an array of that shape and type.
+        Where times and echoes differ in their number of chirps, or ``out`` is not an array of that
+        shape and type.
 
     Warns
     -----
     ValidityWarning
-        Where an echo moves by more than a tenth of a range bin inside one chirp, which is taken to stand still there.
-
-    Notes
-    -----
-    Equation :eq:`if-signal` of the theory page, which follows from the sweep, :eq:`chirp`.
+        Where an echo moves by more than a tenth of a range bin inside one chirp; it is synthesised
+        as if it did not move there.
     """
     times = np.asarray(times, dtype=np.float64)
     if times.shape != echoes.length.shape[:1]:
         raise ValueError(
-            f"synthesize: times has shape {times.shape}; with these echoes it must be {echoes.length.shape[:1]}"
+            f"synthesize: times has shape {times.shape}; with these echoes it must be "
+            f"{echoes.length.shape[:1]}"
         )
     _warn_of_motion_in_chirp(echoes, radar, times)
     if radar.tx_offset_hz.any():
         echoes = _on_own_carriers(echoes, radar)
-    out = array_to_fill(
-        "synthesize", out, (*echoes.length.shape[:2], radar.samples_per_chirp), dtype
-    )
-    nodes = len(echoes.frequency)
-    many = (
-        echoes.length.shape[2] >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES)
-        and nodes <= MOST_NODES
-    )
-    many &= out.dtype == np.complex64 and radar.samples_per_chirp >= LEAST_SAMPLES
-    length = np.ascontiguousarray(echoes.length)
-    waveform = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
-    if many:
-        # A slice of a block serves as it is where amplitudes are only picked.
-        spread_sum(
-            length,
-            echoes.amplitude,
-            _powers_of_sample_number(echoes.frequency, radar, 0.0),
-            *waveform,
-            out,
-        )
-    else:
-        kind = np.float32 if out.dtype == np.complex64 and nodes <= _MOST_POWERS else np.float64
-        amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
-        powers = _powers_of_sample_number(echoes.frequency, radar, MIDDLE)
-        lanes = first_powers(kind), np.arange(LANES, dtype=kind), *series(kind)
+    shape = (*echoes.length.shape[:2], radar.samples_per_chirp)
+    out = array_to_fill("synthesize", out, shape, dtype)
+    if _are_many(echoes, radar, out.dtype):
+        # The NUFFT takes a slice of a block as it is, for amplitudes are only picked from it.
+        sum_by_nufft(_tones(echoes, echoes.amplitude, radar, 0.0), out)
+        return out
+    amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
+    tones = _tones(echoes, amplitude, radar, MIDDLE)
+    in_float32 = out.dtype == np.complex64 and len(echoes.frequency) <= _MOST_POWERS
+    tables = tone_tables(np.float32 if in_float32 else np.float64)
+    at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
 
-        at_once = max(_CHIRPS_A_THREAD, -(-len(out) // (2 * thread_count())))
+    def fill(begin: int) -> None:
+        add_tones(begin, min(begin + at_once, len(out)), tones, tables, out)
 
-        def fill(begin: int) -> None:
-            add_tones(
-                begin,
-                min(begin + at_once, len(out)),
-                length,
-                amplitude,
-                powers,
-                *waveform,
-                *lanes,
-                out,
-            )
-
-        in_threads(fill, range(0, len(out), at_once))
+    in_threads(fill, range(0, len(out), at_once))
     return out
 
 
+def _are_many(echoes: Echoes, radar: Radar, dtype: np.dtype[Any]) -> bool:
+    """Whether the NUFFT is faster than the direct sum, and precise enough."""
+    nodes, count = len(echoes.frequency), echoes.length.shape[2]
+    many = count >= (MANY_ECHOES if nodes == 1 else MANY_VARYING_ECHOES)
+    possible = nodes <= MOST_NODES and radar.samples_per_chirp >= LEAST_SAMPLES
+    return many and possible and dtype == np.complex64
+
+
+def _tones(
+    echoes: Echoes, amplitude: NDArray[np.complexfloating], radar: Radar, origin: float
+) -> Tones:
+    length = np.ascontiguousarray(echoes.length)
+    powers = _powers_of_sample_number(echoes.frequency, radar, origin)
+    sweep = float(radar.start_frequency_hz), radar.slope_hz_per_s, radar.sample_rate_hz
+    return Tones(length, amplitude, powers, *sweep)
+
+
 def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
-    """A carrier that is higher by an offset turns every echo by the offset times its delay."""
+    """The same echoes, each rotated by the offset of its Tx's carrier times its delay."""
     turns = radar.tx_offset_hz[echoes.tx][:, None, None] * (echoes.length / SPEED_OF_LIGHT_MPS)
     return dataclasses.replace(echoes, amplitude=echoes.amplitude * np.exp(2j * np.pi * turns))
 
@@ -186,14 +182,13 @@ def _warn_of_motion_in_chirp(echoes: Echoes, radar: Radar, times: NDArray[np.flo
     if rate.max(initial=0.0) * bins_of_rate <= MAX_BINS_IN_CHIRP:
         return
     for chirps, length in zip((before, after), lengths, strict=True):
-        rate[~((echoes.amplitude[:, chirps, ends] != 0).any(axis=0) & _in_band(length, radar))] = (
-            0.0
-        )
+        visible = (echoes.amplitude[:, chirps, ends] != 0).any(axis=0)
+        rate[~(visible & _in_band(length, radar))] = 0.0
     bins = float(rate.max()) * bins_of_rate
     if bins > MAX_BINS_IN_CHIRP:
         warnings.warn(
-            f"an echo moves {bins:.2f} range bins inside one chirp, more than {MAX_BINS_IN_CHIRP}: it is taken to stand "
-            "still there; shorten the chirp or slow the motion",
+            f"an echo moves {bins:.2f} range bins inside one chirp, more than {MAX_BINS_IN_CHIRP}: "
+            "it is taken to stand still there; shorten the chirp or slow the motion",
             ValidityWarning,
             stacklevel=3,
         )

@@ -11,8 +11,9 @@ from typing import Any
 import pytest
 
 import rtradar.bench
+import rtradar.bench.kernel_cases
 from rtradar.antenna import Antenna
-from rtradar.bench import paper, runs
+from rtradar.bench import kernels, paper, runs
 from rtradar.bench.floors import Rates
 from rtradar.bench.growth import arrays, as_toml, with_echoes
 from rtradar.bench.paper import Baseline
@@ -86,7 +87,15 @@ def test_all_that_is_measured_is_in_the_json(
         main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
     )
     found = json.loads((tmp_path / "b.json").read_text())
-    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth"]
+    assert list(found) == [
+        "settings",
+        "machine",
+        "rates",
+        "models",
+        "paper",
+        "growth",
+        "kernels",
+    ]
     assert found["settings"]["repeats"] == 2
     assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
     rows = found["models"]
@@ -288,3 +297,16 @@ def test_echoes_are_timed_one_count_after_the_other() -> None:
     rows = with_echoes(Radar(frame_duration_s=6e-3, samples_per_chirp=16))
     assert [row["echoes"] for row in rows][:2] == [10, 21]
     assert all(row["signal_s"] > 0 and row["samples"] == 33 * 12 * 8 * 16 for row in rows)
+
+
+def test_kernels_beside_their_references(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(
+        kernels, "CASES", {"phasor.fill_phasors": kernels.CASES["phasor.fill_phasors"]}
+    )
+    assert main(["bench", "--only", "kernels", "--json", str(tmp_path / "b.json")]) == 0
+    (row,) = json.loads((tmp_path / "b.json").read_text())["kernels"]
+    assert row["difference"] < 1e-15
+    assert row["ratio"] == row["reference_s"] / row["kernel_s"]
+    assert "| `phasor.fill_phasors` | unit phasors" in capsys.readouterr().out

@@ -61,7 +61,10 @@ def test_every_model_with_every_radar_and_the_papers_on_one_core() -> None:
             ["--duration", "0.05"],
             "--duration 0.05: it holds no whole frame of radar 'paper-12ghz'; give at least 0.1 s",
         ),
-        (["--only", "floors"], "--only floors: there is no such part; allowed: models, growth"),
+        (
+            ["--only", "floors"],
+            "--only floors: there is no such part; allowed: models, growth, kernels",
+        ),
         (["--json", "nowhere/b.json"], "--json nowhere/b.json: there is no folder"),
         (["--figure", "nowhere/b.png"], "--figure nowhere/b.png: there is no folder"),
     ],

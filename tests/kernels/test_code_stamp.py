@@ -20,8 +20,8 @@ from numba.extending import is_jitted
 
 import rtradar
 from rtradar.kernels.code_stamp import UnknownCodeError, _code_digest, stamp_of
+from rtradar.kernels.gaussian_noise import add_noise
 from rtradar.kernels.jit import _CodeOnDisk, compiled
-from rtradar.signal.noise import _add
 
 ESTATE = {
     "caller": """
@@ -297,9 +297,9 @@ def test_what_has_no_stamp_is_told() -> None:
 
 @pytest.mark.parametrize("setting", ["BOUNDSCHECK", "OPT"])
 def test_settings_of_numba_go_into_it(monkeypatch: pytest.MonkeyPatch, setting: str) -> None:
-    before = stamp_of(_add)
+    before = stamp_of(add_noise)
     monkeypatch.setattr(config, setting, 1)
-    assert stamp_of(_add) != before
+    assert stamp_of(add_noise) != before
 
 
 # -- functions of the package -----------------------------------------------------------------------------------------
@@ -328,8 +328,8 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
     [
         (
             "rtradar.kernels.phasor.phasor",
-            "rtradar.signal.spreading._spread",
-            "rtradar.signal.noise._add",
+            "rtradar.kernels.nufft._spread_tones",
+            "rtradar.kernels.gaussian_noise.add_noise",
         ),
         (
             "rtradar.kernels.small_vectors.dot",
@@ -338,13 +338,13 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
         (
             "rtradar.kernels.jit.on_cache_lines",
-            "rtradar.process.slow_time_dft._add_power",
+            "rtradar.kernels.prime_factor_dft._add_power",
             "rtradar.scatter.specular_point.solver._mirror",
         ),
         (
             "rtradar.scatter.specular_point.solver._newton",
             "rtradar.scatter.specular_point.solver._mirror",
-            "rtradar.process.slow_time_dft._add_power",
+            "rtradar.kernels.prime_factor_dft._add_power",
         ),
     ],
 )

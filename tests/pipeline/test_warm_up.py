@@ -14,9 +14,9 @@ from rtradar.system.threads import THREADS_VARIABLE
 
 FIRST_USE = """
 import tempfile, rtradar as rt
-from rtradar.process.slow_time_dft import _add_power
+from rtradar.kernels.prime_factor_dft import _add_power
 from rtradar.scatter.specular_point.solver import _mirror
-from rtradar.signal.tones import add_tones
+from rtradar.kernels.tone_sum import add_tones
 motion, radar = rt.synthetic_motion("walk", seed=0, duration_s=0.15), rt.Radar.preset("paper-12ghz")
 rt.run(motion, radar, fidelity="analytic", snr_db=20, out=tempfile.mkdtemp())
 for function in add_tones, _add_power, _mirror:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.angles import add_interpolated
 from rtradar.process.angles.spectra import AngleSpectra
 from rtradar.process.angles.steering import sine_grid
 from rtradar.radar import Radar
@@ -99,7 +99,7 @@ def _laid_out(
     """Power of each cell (cell, sine) read at its own sines (cell, angle), summed by range bin."""
     total = np.zeros((radar.samples_per_chirp, sines.shape[1]))
     bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
-    _add_up(
+    add_interpolated(
         power,
         np.ascontiguousarray(sines),
         spectra.sines[0],
@@ -108,17 +108,3 @@ def _laid_out(
         total,
     )
     return total
-
-
-@compiled()
-def _add_up(power, sines, first, step, bins, total):
-    """Add power (cell, sine), read at sines (cell, angle) between points of the uniform grid, to total (bin, angle)."""
-    last = power.shape[1] - 2
-    for cell in range(len(power)):
-        for angle in range(sines.shape[1]):
-            place = (sines[cell, angle] - first) / step
-            left = min(max(math.floor(place), 0), last)
-            share = place - left
-            total[bins[cell], angle] += (1 - share) * power[cell, left] + share * power[
-                cell, left + 1
-            ]

@@ -24,7 +24,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.angles import beam_power
 from rtradar.process.angles.parabola import refine
 from rtradar.process.angles.steering import (
     Taper,
@@ -146,19 +146,11 @@ def angle_spectra(
         else:
             used, place = np.unique(bins, return_inverse=True)
             known = steering(radar, axis, used, taper)
-        given = (
-            samples,
-            still,
-            place,
-            line.channels,
-            known.weights,
-            known.runs,
-            known.starts,
-            result,
-        )
+        given = samples, still, place, line.channels, known, result
         begins = range(0, len(samples), _CELLS_A_THREAD)
         in_threads(
-            lambda begin: _power(begin, min(begin + _CELLS_A_THREAD, len(samples)), *given), begins
+            lambda first: beam_power(first, min(first + _CELLS_A_THREAD, len(samples)), *given),
+            begins,
         )
         return result
 
@@ -280,31 +272,3 @@ def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> floa
 
 
 _CELLS_A_THREAD = 64
-
-
-# By hand: for products of this size the threads of BLAS wait for each other longer than they work.
-@compiled(fastmath=True)
-def _power(begin, end, values, still, place, channels, weights, runs, starts, power):
-    """Fill power (cell, sine) of the cells from begin to end.
-
-    From values (cell, offset, channel) turned by still (cell, channel), weights by place.
-    """
-    n_sines = weights.shape[2]
-    real, imaginary = np.empty(n_sines, dtype=np.float32), np.empty(n_sines, dtype=np.float32)
-    for cell in range(begin, end):
-        for sine in range(n_sines):
-            real[sine], imaginary[sine] = 0.0, 0.0
-        for run in range(starts[place[cell]], starts[place[cell] + 1]):
-            element, offset, first, last = runs[run, 0], runs[run, 1], runs[run, 2], runs[run, 3]
-            channel = channels[element]
-            value = values[cell, offset, channel] * still[cell, channel]
-            # Counted from 0: an index that may be negative keeps the compiler from using vectors.
-            run_weights = weights[place[cell], element, first:last]
-            run_real, run_imaginary = real[first:last], imaginary[first:last]
-            for i in range(last - first):
-                run_real[i] += value.real * run_weights[i].real - value.imag * run_weights[i].imag
-                run_imaginary[i] += (
-                    value.real * run_weights[i].imag + value.imag * run_weights[i].real
-                )
-        for sine in range(n_sines):
-            power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2

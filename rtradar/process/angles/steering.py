@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.angles import Steering
 from rtradar.radar import Radar
 
 Taper = Literal["uniform", "taylor"]
@@ -193,26 +194,6 @@ def range_walk(radar: Radar) -> int:
         np.abs(line.tx_m + line.rx_m).max() for line in virtual_lines(radar) if line is not None
     ]
     return int(np.ceil(max(ways) * largest / 2 / radar.range_bin_m))
-
-
-@dataclass(frozen=True)
-class Steering:
-    """What brings the echo of a point in a range bin into phase on all elements of a line, for every sine of `sine_grid`.
-
-    Parameters
-    ----------
-    weights : (bin, element, sine) complex64
-        Phases taken back, times the taper.
-    runs : (run, 4) int64
-        Where each element is read: element, offset, first sine, sine after the last. The offset counts from 0 at
-        `range_walk` bins before the bin of the cell. Those of one bin stand behind those of the bin before.
-    starts : (bin + 1,) int64
-        Where the runs of each bin begin.
-    """
-
-    weights: NDArray[np.complex64]
-    runs: NDArray[np.int64]
-    starts: NDArray[np.int64]
 
 
 def steering(

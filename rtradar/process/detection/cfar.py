@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.cfar import ca_cfar_rows, os_cfar_rows
 from rtradar.process.detection.cfar_thresholds import (
     ca_scale,
     check_looks,
@@ -71,7 +71,7 @@ def os_cfar(
     check_quantile(quantile)
     scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
     return _by_rows(
-        _os_kernel, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train
+        os_cfar_rows, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train
     )
 
 
@@ -103,7 +103,7 @@ def ca_cfar(
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     scales = _ca_law(cells.shape, guard, train, pfa, looks, scale)
     return _by_rows(
-        _ca_kernel, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train
+        ca_cfar_rows, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train
     )
 
 
@@ -202,84 +202,3 @@ def _by_rows(
         range(0, len(cells), _ROWS_A_THREAD),
     )
     return mask
-
-
-@compiled()
-def _os_kernel(begin, end, cells, thresholds, ranks, counts, guard, reach, mask):
-    """Mask of the rows from begin to end: at least ``rank`` training cells lie below the threshold, the cell over its multiplier.
-
-    Counting needs no sorting, and stops after the first rows that settle the question: for most cells, which hold noise, as
-    few as could, and those are counted for all cells of a row side by side.
-    """
-    n_range, n_velocity = cells.shape
-    inside = max(n_velocity - 2 * reach, 0)  # cells with all their neighbours in the row
-    below_first = np.empty(inside, dtype=np.int32)
-    for i in range(begin, end):
-        top, bottom = max(i - reach, 0), min(i + reach, n_range - 1)
-        seen_first = 0
-        below_first[:] = 0
-        limits = thresholds[i, reach : reach + inside]
-        for a in range(top, bottom + 1):
-            if i - guard <= a <= i + guard or inside == 0:
-                continue
-            if seen_first > counts[i, reach] - ranks[i, reach]:
-                break
-            for shift in range(2 * reach + 1):
-                neighbours = cells[a, shift : shift + inside]
-                for j in range(inside):
-                    below_first[j] += neighbours[j] < limits[j]
-            seen_first += 2 * reach + 1
-        for j in range(n_velocity):
-            if (
-                reach <= j < reach + inside
-                and seen_first - below_first[j - reach] > counts[i, j] - ranks[i, j]
-            ):
-                mask[i, j] = False
-                continue
-            left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
-            inner_left, inner_right = max(j - guard, 0), min(j + guard, n_velocity - 1)
-            threshold = thresholds[i, j]
-            missing = ranks[i, j]  # cells below the threshold that are still wanted
-            spare = counts[i, j] - missing  # cells that may lie at or above it
-            for a in range(top, bottom + 1):
-                below = 0
-                seen = right - left + 1
-                if a < i - guard or a > i + guard:
-                    for b in range(left, right + 1):
-                        below += cells[a, b] < threshold
-                else:
-                    for b in range(left, inner_left):
-                        below += cells[a, b] < threshold
-                    for b in range(inner_right + 1, right + 1):
-                        below += cells[a, b] < threshold
-                    seen -= inner_right - inner_left + 1
-                missing -= below
-                spare -= seen - below
-                if missing <= 0 or spare < 0:
-                    break
-            mask[i, j] = missing <= 0
-
-
-@compiled()
-def _ca_kernel(begin, end, cells, sums_wanted, guard, reach, mask):
-    """Mask of the rows from begin to end: the training cells sum to less than the cell times their number over the multiplier.
-
-    Summed afresh for each cell: running sums would drown the weak cells beside a strong one in its rounding.
-    """
-    n_range, n_velocity = cells.shape
-    for i in range(begin, end):
-        top, bottom = max(i - reach, 0), min(i + reach, n_range - 1)
-        for j in range(n_velocity):
-            left, right = max(j - reach, 0), min(j + reach, n_velocity - 1)
-            inner_left, inner_right = max(j - guard, 0), min(j + guard, n_velocity - 1)
-            total = 0.0
-            for a in range(top, bottom + 1):
-                if a < i - guard or a > i + guard:
-                    for b in range(left, right + 1):
-                        total += cells[a, b]
-                else:
-                    for b in range(left, inner_left):
-                        total += cells[a, b]
-                    for b in range(inner_right + 1, right + 1):
-                        total += cells[a, b]
-            mask[i, j] = total < sums_wanted[i, j]

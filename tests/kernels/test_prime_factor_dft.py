@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
+from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 
 PRODUCTS = [
     (
@@ -33,7 +33,7 @@ def plain(spectra: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 def test_it_serves_numbers_of_cycles_with_two_small_coprime_factors_and_no_others() -> None:
     for n_cycles, pairs in PRODUCTS:
-        assert (slow_time_dft(n_cycles) is not None) == bool(pairs), n_cycles
+        assert (prime_factor_dft(n_cycles) is not None) == bool(pairs), n_cycles
 
 
 @given(
@@ -51,7 +51,7 @@ def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, 
     )
     weights = rng.uniform(0, 1, n_cycles).astype(np.float32)
     before = rng.uniform(0, 1, (n_cycles, n_range)).astype(np.float32)
-    power, dft = before.copy(), slow_time_dft(n_cycles)
+    power, dft = before.copy(), prime_factor_dft(n_cycles)
     assert dft is not None
     add_doppler_power(spectra, range(channels), weights, dft, power)
     expected = plain(spectra, weights)
@@ -62,7 +62,7 @@ def test_it_is_the_power_of_the_dft(n_cycles: int, channels: int, n_range: int, 
 @pytest.mark.parametrize("factor", range(2, 41))
 def test_it_serves_every_factor(factor: int) -> None:
     n_cycles = factor * (37 if factor != 37 else 36)  # 37 stays whole, and so does the other
-    dft = slow_time_dft(n_cycles)
+    dft = prime_factor_dft(n_cycles)
     assert dft is not None
     rng = np.random.default_rng(factor)
     spectra = rng.standard_normal((n_cycles, 1, 3, 2), dtype=np.float32).view(np.complex64)[..., 0]
@@ -74,10 +74,10 @@ def test_it_serves_every_factor(factor: int) -> None:
 
 BOUNDS = """
 import numpy as np
-from rtradar.process.slow_time_dft import add_doppler_power, slow_time_dft
+from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 for n_cycles in (2 * 37, 38 * 37, 39 * 37, 40 * 37):
     spectra, power = np.ones((n_cycles, 1, 3), dtype=np.complex64), np.zeros((n_cycles, 3), dtype=np.float32)
-    add_doppler_power(spectra, range(1), np.ones(n_cycles, dtype=np.float32), slow_time_dft(n_cycles), power)
+    add_doppler_power(spectra, range(1), np.ones(n_cycles, dtype=np.float32), prime_factor_dft(n_cycles), power)
 """
 
 
@@ -93,7 +93,7 @@ def test_the_longest_tables_have_room(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("n_cycles", [133, 666])
 def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
-    dft = slow_time_dft(n_cycles)
+    dft = prime_factor_dft(n_cycles)
     assert dft is not None
     n = np.arange(n_cycles)
     tones = np.exp(2j * np.pi * np.outer(n, n) / n_cycles).astype(np.complex64)[:, None]
@@ -107,7 +107,7 @@ def test_every_tone_stands_in_its_own_bin(n_cycles: int) -> None:
 def test_what_is_no_number_stays_in_its_range_bin() -> None:
     spectra = np.ones((133, 1, 70), dtype=np.complex64)
     spectra[7, 0, 3] = np.nan
-    power, dft = np.zeros((133, 70), dtype=np.float32), slow_time_dft(133)
+    power, dft = np.zeros((133, 70), dtype=np.float32), prime_factor_dft(133)
     assert dft is not None
     add_doppler_power(spectra, range(1), np.ones(133, dtype=np.float32), dft, power)
     assert np.isnan(power[:, 3]).all()
@@ -115,7 +115,7 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
 
 
 def test_its_multiply_adds_are_counted() -> None:
-    dft = slow_time_dft(35)
+    dft = prime_factor_dft(35)
     assert dft is not None
     # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and five of seven; of both parts.
     assert dft.multiply_adds == 2 * (7 * (2 * 2 + 2 * 2) + 5 * (3 * 3 + 3 * 3))

@@ -1,0 +1,213 @@
+"""The cases of `rtradar.bench.kernels`: a function of some five lines for each exported kernel."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from rtradar.bench.kernels import Call, filled, kernel_case
+
+# -- general ---------------------------------------------------------------------------------------
+
+
+@kernel_case("phasor.fill_phasors", "unit phasors of 100 000 phases", 1e-15)
+def _phasors() -> tuple[Call, Call]:
+    from rtradar.kernels.phasor import fill_phasors, phasor_reference
+
+    turns = np.random.default_rng(0).uniform(-1e3, 1e3, 100_000)
+    out = np.empty(len(turns), dtype=np.complex128)
+    return filled(fill_phasors, turns, out=(out,)), lambda: phasor_reference(turns)
+
+
+@kernel_case("motion.pose", "joints of a skeleton of 23, at 3000 times")
+def _pose() -> tuple[Call, Call]:
+    from rtradar.kernels.motion import pose, pose_reference
+
+    rng, joints, knots = np.random.default_rng(0), 23, np.linspace(0.0, 3.0, 91)
+    root, rotation = rng.normal(size=(4, 90, 3)), rng.normal(size=(4, 90, 4 * joints))
+    offsets, parents = rng.normal(size=(joints, 3)), np.maximum(np.arange(-1, joints - 1) // 2, -1)
+    times, which = rng.uniform(0, 3, 3000), np.arange(3000)
+    skeleton = knots, root, rotation, offsets, parents
+    out = np.empty((3000, joints, 3)), np.empty((3000, 4 * joints))
+    call = filled(pose, times, which, *skeleton, out=out)
+    return call, lambda: pose_reference(times, *skeleton)
+
+
+@kernel_case("motion.pose_ellipsoids", "centres and axes of 21 ellipsoids, at 3000 times")
+def _pose_ellipsoids() -> tuple[Call, Call]:
+    from rtradar.kernels.motion import pose_ellipsoids, pose_ellipsoids_reference
+
+    rng, parents = np.random.default_rng(0), np.maximum(np.arange(-1, 21) // 2, -1)
+    positions, quaternions = rng.normal(size=(3000, 22, 3)), rng.normal(size=(3000, 22, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
+    given = positions, quaternions, parents, rng.normal(size=(21, 3, 3))
+    out = np.empty((3000, 21, 3)), np.empty((3000, 21, 3, 3))
+    return filled(pose_ellipsoids, *given, out=out), lambda: pose_ellipsoids_reference(*given)
+
+
+# -- signal ----------------------------------------------------------------------------------------
+
+
+def _tones(nodes: int, echoes: int, chirps: int) -> Any:
+    from rtradar.kernels.tone_sum import Tones
+
+    rng, shape = np.random.default_rng(0), (chirps, 8, echoes)
+    length = np.broadcast_to(rng.uniform(0, 15, shape[1:]), shape).copy()
+    amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
+    powers = np.linalg.inv(np.vander(np.linspace(-0.5, 0.5, nodes), increasing=True))
+    return Tones(
+        length, amplitude, np.asarray(powers, dtype=np.float64), 12e9, 4e9 / 60e-6, 256 / 60e-6
+    )
+
+
+@kernel_case("tone_sum.add_tones", "IF of 48 chirps, 8 receivers, 21 echoes, 256 samples", 1e-6)
+def _tone_sum() -> tuple[Call, Call]:
+    from rtradar.kernels.tone_sum import MIDDLE, add_tones, tone_sum_reference, tone_tables
+
+    tones, out = _tones(1, 21, 48), np.empty((48, 8, 256), dtype=np.complex64)
+    call = filled(add_tones, 0, 48, tones, tone_tables(np.float32), out=(out,))
+    return call, lambda: tone_sum_reference(tones, 256, MIDDLE)
+
+
+@kernel_case("nufft.sum_by_nufft", "IF of 12 chirps, 8 receivers, 315 echoes, 256 samples", 1e-6)
+def _nufft() -> tuple[Call, Call]:
+    from rtradar.kernels.nufft import sum_by_nufft
+    from rtradar.kernels.tone_sum import tone_sum_reference
+
+    tones, out = _tones(3, 315, 12), np.empty((12, 8, 256), dtype=np.complex64)
+    call = filled(sum_by_nufft, tones, out=(out,))
+    return call, lambda: tone_sum_reference(tones, 256, 0.0)
+
+
+@kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
+def _noise() -> tuple[Call, Call]:
+    from rtradar.kernels.gaussian_noise import add_noise, noise_reference
+
+    streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])
+    out = np.empty((192, 8, 256), dtype=np.complex64)
+    given = streams, 12, np.float32(0.5)
+    call = filled(add_noise, *given, out=(out,), adds=True)
+    return call, lambda: noise_reference(*given, out.shape)
+
+
+# -- processing ------------------------------------------------------------------------------------
+
+
+def _spectra(*shape: int) -> Any:
+    parts = np.random.default_rng(0).standard_normal((*shape, 2), dtype=np.float32)
+    return parts.view(np.complex64)[..., 0]
+
+
+@kernel_case("spectra.weigh_samples", "window function of 128 chirps, 8 receivers, 256 samples", 0)
+def _weigh_samples() -> tuple[Call, Call]:
+    from rtradar.kernels.spectra import weigh_samples, weigh_samples_reference
+
+    values, weights = _spectra(128, 8, 256), np.linspace(0, 1, 256, dtype=np.float32)
+    call = filled(weigh_samples, values, weights, out=(np.empty_like(values),))
+    return call, lambda: weigh_samples_reference(values, weights)
+
+
+@kernel_case("spectra.subtract_mean", "mean of 133 cycles, 96 channels, 256 bins", 0)
+def _subtract_mean() -> tuple[Call, Call]:
+    from rtradar.kernels.spectra import subtract_mean, subtract_mean_reference
+
+    cycles = _spectra(133, 96 * 256)
+    call = filled(subtract_mean, cycles, out=(np.empty_like(cycles),))
+    return call, lambda: subtract_mean_reference(cycles)
+
+
+@kernel_case("prime_factor_dft.add_doppler_power", "133 cycles, 8 channels, 256 bins", 3e-6)
+def _doppler_power() -> tuple[Call, Call]:
+    from rtradar.kernels.prime_factor_dft import (
+        add_doppler_power,
+        doppler_power_reference,
+        prime_factor_dft,
+    )
+
+    spectra, weights = _spectra(133, 8, 256), np.linspace(0, 1, 133, dtype=np.float32)
+    out = np.empty((133, 256), dtype=np.float32)
+    given = spectra, range(8), weights, prime_factor_dft(133)
+    call = filled(add_doppler_power, *given, out=(out,), adds=True)
+    return call, lambda: doppler_power_reference(spectra, range(8), weights)
+
+
+def _map() -> Any:
+    """Power, thresholds, ranks and numbers of training cells of the CFAR cases."""
+    power = np.random.default_rng(0).exponential(size=(256, 133)).astype(np.float32)
+    i, j = (np.arange(n) for n in power.shape)
+    outer = _overlap(i, 6)[:, None] * _overlap(j, 6)
+    counts = (outer - _overlap(i, 2)[:, None] * _overlap(j, 2)).astype(np.int32)
+    return power, power / np.float32(3), np.ceil(0.75 * counts).astype(np.int32), counts
+
+
+def _overlap(i: Any, half: int) -> Any:
+    return np.minimum(i + half, i[-1]) - np.maximum(i - half, 0) + 1
+
+
+@kernel_case("cfar.os_cfar_rows", "order-statistic CFAR of a map of 256 x 133", 0)
+def _os_cfar() -> tuple[Call, Call]:
+    from rtradar.kernels.cfar import os_cfar_reference, os_cfar_rows
+
+    power, thresholds, ranks, counts = _map()
+    mask = np.empty(power.shape, dtype=np.bool_)
+    call = filled(os_cfar_rows, 0, 256, power, thresholds, ranks, counts, 2, 6, out=(mask,))
+    return call, lambda: os_cfar_reference(power, thresholds, ranks, 2, 6)
+
+
+@kernel_case("cfar.ca_cfar_rows", "cell-averaging CFAR of a map of 256 x 133", 0)
+def _ca_cfar() -> tuple[Call, Call]:
+    from rtradar.kernels.cfar import ca_cfar_reference, ca_cfar_rows
+
+    power, _, _, counts = _map()
+    given, mask = (power, power * (counts / np.float32(4)), 2, 6), np.empty((256, 133), np.bool_)
+    return filled(ca_cfar_rows, 0, 256, *given, out=(mask,)), lambda: ca_cfar_reference(*given)
+
+
+@kernel_case("angles.beam_power", "beams of 64 cells on a line of 48, 200 sines", 1e-5)
+def _beam_power() -> tuple[Call, Call]:
+    from rtradar.kernels.angles import Steering, beam_power, beam_power_reference
+
+    values, still, place = _spectra(64, 3, 96), _spectra(64, 96), np.arange(64) % 8
+    runs = [
+        (element, (element + half) % 3, 100 * half, 100 * half + 100)
+        for _ in range(8)
+        for element in range(48)
+        for half in range(2)
+    ]
+    steering = Steering(_spectra(8, 48, 200), np.array(runs), 96 * np.arange(9))
+    given, out = (values, still, place, np.arange(0, 96, 2), steering), np.empty((64, 200), "f4")
+    return filled(beam_power, 0, 64, *given, out=(out,)), lambda: beam_power_reference(*given)
+
+
+@kernel_case("angles.highest_maxima", "3 peaks of each of 1000 spectra of 200 sines", 0)
+def _maxima() -> tuple[Call, Call]:
+    from rtradar.kernels.angles import highest_maxima, highest_maxima_reference
+
+    power = np.random.default_rng(0).exponential(size=(1000, 200)).astype(np.float32) ** 4
+    limits, out = (
+        (np.float32(0.25), np.float32(12)),
+        (np.empty((1000, 3), int), np.empty(1000, int)),
+    )
+    call = filled(highest_maxima, power, *limits, out=out)
+    return call, lambda: highest_maxima_reference(power, *limits, 3)
+
+
+@kernel_case("angles.add_interpolated", "1000 spectra of 200 sines onto 200 angles", 1e-6)
+def _interpolated() -> tuple[Call, Call]:
+    from rtradar.kernels.angles import add_interpolated, add_interpolated_reference
+
+    rng, first, step = np.random.default_rng(0), -0.9, 1.8 / 199
+    power, sines = rng.exponential(size=(1000, 200)).astype("f4"), rng.uniform(-1, 1, (1000, 200))
+    given, out = (power, sines.clip(-0.9, 0.9), first, step, rng.integers(0, 256, 1000)), (256, 200)
+    call = filled(add_interpolated, *given, out=(np.empty(out),), adds=True)
+    return call, lambda: add_interpolated_reference(*given, out)
+
+
+# -- tracing ---------------------------------------------------------------------------------------
+
+
+# -- specular points and facets --------------------------------------------------------------------
+
+
+# -- rooms -----------------------------------------------------------------------------------------

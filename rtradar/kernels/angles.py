@@ -1,0 +1,151 @@
+"""Beams of a line of antennas: their power, its maxima, and maps of it."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled
+
+
+class Steering(NamedTuple):
+    """Weights that bring the echo of a point into phase on all elements of a line, for every sine.
+
+    Parameters
+    ----------
+    weights : (place, element, sine) complex64
+        Conjugate phases, times the weights of the elements; a place is a range bin.
+    runs : (run, 4) int64
+        Where each element is read: element, offset, first sine, sine after the last. The offset
+        counts range bins from the first that any element is read in. The runs of one place follow
+        those of the place before.
+    starts : (place + 1,) int64
+        Index of the first run of each place.
+    """
+
+    weights: NDArray[np.complex64]
+    runs: NDArray[np.int64]
+    starts: NDArray[np.int64]
+
+
+# By hand, because for products of this size the threads of BLAS wait longer than they work.
+@compiled(fastmath=True)
+def beam_power(begin, end, values, still, place, channels, steering, power):
+    """Fill power (cell, sine) of the cells from begin to end.
+
+    Values (cell, offset, channel), times ``still (cell, channel)``, are multiplied by the steering
+    weights of the cell's place, run by run of sines that read an element at the same offset.
+    """
+    weights, runs, starts = steering
+    n_sines = weights.shape[2]
+    real, imaginary = np.empty(n_sines, dtype=np.float32), np.empty(n_sines, dtype=np.float32)
+    for cell in range(begin, end):
+        for sine in range(n_sines):
+            real[sine], imaginary[sine] = 0.0, 0.0
+        for run in range(starts[place[cell]], starts[place[cell] + 1]):
+            element, offset, first, last = runs[run, 0], runs[run, 1], runs[run, 2], runs[run, 3]
+            channel = channels[element]
+            value = values[cell, offset, channel] * still[cell, channel]
+            # Slices counted from 0: an index that may be negative keeps the compiler from vectors.
+            run_weights = weights[place[cell], element, first:last]
+            run_real, run_imaginary = real[first:last], imaginary[first:last]
+            for i in range(last - first):
+                w = run_weights[i]
+                run_real[i] += value.real * w.real - value.imag * w.imag
+                run_imaginary[i] += value.real * w.imag + value.imag * w.real
+        for sine in range(n_sines):
+            power[cell, sine] = real[sine] ** 2 + imaginary[sine] ** 2
+
+
+def beam_power_reference(values, still, place, channels, steering):
+    """Power (cell, sine) of `beam_power`, by NumPy."""
+    weights, runs, starts = steering
+    beams = np.zeros((len(values), weights.shape[2]), dtype=np.complex128)
+    for cell, own in enumerate(place):
+        for element, offset, first, last in runs[starts[own] : starts[own + 1]]:
+            channel = channels[element]
+            value = values[cell, offset, channel] * still[cell, channel]
+            beams[cell, first:last] += value * weights[own, element, first:last]
+    return np.abs(beams) ** 2
+
+
+@compiled()
+def highest_maxima(power, below, above, index, count):
+    """Fill index (cell, peak) with the maxima of power (cell, sine), and count (cell,) of them.
+
+    The strongest comes first, and again where there are no more. A maximum counts if it is at least
+    ``below`` times the highest, and unless it is the highest, if more than half of the spectrum is
+    at least ``above`` times weaker.
+    """
+    sines, peaks = power.shape[1], index.shape[1]
+    for cell in range(len(power)):
+        own, best, found = power[cell], index[cell], 0
+        top = 0
+        for sine in range(1, sines):
+            if own[sine] > own[top]:
+                top = sine
+        highest = own[top]
+        best[:] = top
+        for sine in range(sines):
+            value = own[sine]
+            rises = sine == 0 or value > own[sine - 1]
+            falls = sine == sines - 1 or value >= own[sine + 1]
+            if not (value > 0 and value >= highest * below and rises and falls):
+                continue
+            if value < highest:
+                lower = 0
+                for other in range(sines):
+                    lower += own[other] * above <= value
+                if 2 * lower <= sines:
+                    continue
+            # Insert it among those found, the strongest first.
+            place = found
+            while place > 0 and value > own[best[place - 1]]:
+                place -= 1
+            if place < peaks:
+                for later in range(peaks - 1, place, -1):
+                    best[later] = best[later - 1]
+                best[place] = sine
+                found = min(found + 1, peaks)
+        for none in range(found, peaks):
+            best[none] = best[0]
+        count[cell] = found
+
+
+def highest_maxima_reference(power, below, above, peaks):
+    """Index and count of `highest_maxima`, by NumPy."""
+    padded = np.pad(power, ((0, 0), (1, 1)), constant_values=-1)
+    good = (power > padded[:, :-2]) & (power >= padded[:, 2:]) & (power > 0)
+    highest = power.max(axis=1, keepdims=True)
+    good &= power >= highest * below
+    lower = (power[:, None] * above <= power[:, :, None]).sum(axis=2)
+    good &= (power == highest) | (2 * lower > power.shape[1])
+    count = np.minimum(good.sum(axis=1), peaks)
+    order = np.argsort(np.where(good, -power, np.inf), axis=1, kind="stable")[:, :peaks]
+    index = np.where(np.arange(peaks) < count[:, None], order, order[:, :1])
+    return np.where(count[:, None] > 0, index, power.argmax(axis=1)[:, None]), count
+
+
+@compiled()
+def add_interpolated(power, sines, first, step, bins, total):
+    """Add power (cell, sine), read at sines (cell, angle) on its uniform grid, to (bin, angle)."""
+    last = power.shape[1] - 2
+    for cell in range(len(power)):
+        for angle in range(sines.shape[1]):
+            place = (sines[cell, angle] - first) / step
+            left = min(max(math.floor(place), 0), last)
+            part = place - left
+            read = (1 - part) * power[cell, left] + part * power[cell, left + 1]
+            total[bins[cell], angle] += read
+
+
+def add_interpolated_reference(power, sines, first, step, bins, shape):
+    """The map (bin, angle) that `add_interpolated` adds, by NumPy."""
+    total = np.zeros(shape)
+    grid = first + step * np.arange(power.shape[1])
+    read = [np.interp(own, grid, values) for own, values in zip(sines, power, strict=True)]
+    np.add.at(total, bins, read)
+    return total

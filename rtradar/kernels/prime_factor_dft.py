@@ -1,0 +1,343 @@
+"""Power over Doppler: DFTs over slow time whose number of cycles is a product of coprime factors.
+
+FFT libraries are made for small prime factors. A frame of 100 ms has 133 = 7 x 19 or 666 = 18 x 37
+cycles here, and the factors 19 and 37 take most of a library's time. By the prime-factor algorithm
+(Good 1958) such a DFT is a DFT of each length in turn, without twiddle factors between. Each is
+small enough for plain sums, over half of the terms because cosines are even and sines odd. Range
+bins lie side by side in vector lanes. Samples are weighted as they are read, and only their power
+is written, so that no spectrum is ever stored.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from math import gcd
+from typing import NamedTuple
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined, on_cache_lines
+
+_LARGEST = 40
+"""Largest factor; plain sums grow with its square."""
+
+_COLUMNS = 256
+"""Range bins that are transformed together, so that the overhead of each row pays."""
+
+_ROW = 2 * _COLUMNS
+"""A row: the real parts of these bins, then their imaginary parts."""
+
+_TOGETHER = 3
+"""Terms, and frequencies, of one inner loop: sums are read and written a third as often."""
+
+
+class PrimeFactorDft(NamedTuple):
+    """Tables of a DFT over as many cycles as there are in ``cycle_at``.
+
+    Parameters
+    ----------
+    cycle_at, bin_at : (place,) int64
+        Cycle at each place of the grid (first, second) of the factors, and Doppler bin afterwards.
+    cosines, sines : pair of (frequency, term) float32
+        Tables of each factor for the frequencies and terms from 1 to below half of it, filled up
+        with zeros to multiples of `_TOGETHER`.
+    factors : pair of int
+    """
+
+    cycle_at: NDArray[np.int64]
+    bin_at: NDArray[np.int64]
+    cosines: tuple[NDArray[np.float32], NDArray[np.float32]]
+    sines: tuple[NDArray[np.float32], NDArray[np.float32]]
+    factors: tuple[int, int]
+
+    @property
+    def multiply_adds(self) -> int:
+        """Multiply-adds of one transform: those of paired terms, real and imaginary parts."""
+        return 4 * sum(
+            len(self.cycle_at) // factor * ((factor - 1) // 2) ** 2 for factor in self.factors
+        )
+
+
+@lru_cache(maxsize=8)
+def prime_factor_dft(n_cycles: int) -> PrimeFactorDft | None:
+    """Tables for a number of cycles; None where it has no two coprime factors small enough."""
+    pairs = [(n_cycles // n, n) for n in range(2, _LARGEST + 1) if n_cycles % n == 0]
+    allowed = [pair for pair in pairs if 2 <= pair[0] < pair[1] <= _LARGEST and gcd(*pair) == 1]
+    if not allowed:
+        return None
+    first, second = min(allowed, key=sum)  # the least sum is the least work
+    i, j = np.divmod(np.arange(n_cycles), second)
+    # Cycles by Good's map and bins by the Chinese remainder theorem: the product has no mixed term.
+    cycle_at = (i * second + j * first) % n_cycles
+    bin_at = (i * second * pow(second, -1, first) + j * first * pow(first, -1, second)) % n_cycles
+    cosines, sines = zip(_tables(first), _tables(second), strict=True)
+    return PrimeFactorDft(cycle_at, bin_at, cosines, sines, (first, second))
+
+
+def _tables(factor: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    paired = np.arange(1, (factor + 1) // 2)
+    angles = 2 * np.pi * np.outer(paired, paired) / factor
+    rest = -len(paired) % _TOGETHER
+    cosines, sines = (np.pad(table, (0, rest)) for table in (np.cos(angles), np.sin(angles)))
+    return cosines.astype(np.float32), sines.astype(np.float32)
+
+
+def add_doppler_power(
+    spectra: NDArray[np.complex64],
+    channels: range,
+    weights: NDArray[np.float32],
+    dft: PrimeFactorDft,
+    power: NDArray[np.float32],
+) -> None:
+    """Add the squared magnitudes of weighted DFTs over the cycles of some channels.
+
+    Parameters
+    ----------
+    spectra : (cycle, channel, range) complex64
+        Contiguous.
+    channels : range
+        Channels to transform, in steps of one.
+    weights : (cycle,) float32
+        Window weights of the cycles.
+    dft : PrimeFactorDft
+        Tables for as many cycles.
+    power : (doppler, range) float32
+        Added to, in the order of the DFT.
+    """
+    # Numba compiles anew for an array that may be written to: this one is always read-only.
+    spectra = spectra.view()
+    spectra.flags.writeable = False
+    _add_power(spectra, channels.start, channels.stop, weights, dft, power)
+
+
+def doppler_power_reference(spectra, channels, weights):
+    """The power that `add_doppler_power` adds, by SciPy."""
+    chosen = spectra[:, channels.start : channels.stop] * weights[:, None, None]
+    return (np.abs(scipy.fft.fft(chosen, axis=0, overwrite_x=True)) ** 2).sum(axis=1)
+
+
+# Rows are `_ROW` long, a constant, and the rows of a function lie in as few arrays as possible: if
+# each were an array, every loop would first have to check whether any two of them overlap.
+
+
+class _Store(NamedTuple):
+    """Rows that one thread works on; the arrays stay the same from line to line.
+
+    ``grid`` has a row for each cycle and one of zeros, ``sums`` the power of each bin, ``even`` and
+    ``odd`` the folded terms of a line, ``alone`` the sum and the difference of the two terms that
+    have no partner, ``total`` one frequency, and the ``parts`` three frequencies.
+    """
+
+    grid: NDArray[np.float32]
+    sums: NDArray[np.float32]
+    even: NDArray[np.float32]
+    odd: NDArray[np.float32]
+    alone: NDArray[np.float32]
+    total: NDArray[np.float32]
+    cosine_parts: NDArray[np.float32]
+    sine_parts: NDArray[np.float32]
+
+
+@inlined()
+def _row(store, number):
+    return store[number * _ROW : (number + 1) * _ROW]
+
+
+@inlined()
+def _powers(store, number):
+    return store[number * _COLUMNS : (number + 1) * _COLUMNS]
+
+
+@inlined(fastmath={"contract"})
+def _read(samples, weight, out):
+    """Fill ``out (row,)`` with weighted samples: real parts, then imaginary ones."""
+    for c in range(len(samples)):
+        out[c] = samples[c].real * weight
+        out[_COLUMNS + c] = samples[c].imag * weight
+
+
+@inlined(fastmath={"contract"})
+def _fold(near, far, even, odd):
+    """Fill the sum of two rows, and -j times their difference, which belongs to the sines."""
+    for c in range(_COLUMNS):
+        near_re, near_im, far_re, far_im = near[c], near[_COLUMNS + c], far[c], far[_COLUMNS + c]
+        even[c] = near_re + far_re
+        even[_COLUMNS + c] = near_im + far_im
+        odd[c] = near_im - far_im
+        odd[_COLUMNS + c] = far_re - near_re
+
+
+@inlined(fastmath={"contract"})
+def _read_folded(near, near_weight, far, far_weight, even, odd):
+    """`_fold` of weighted samples."""
+    for c in range(len(near)):
+        near_re, near_im = near[c].real * near_weight, near[c].imag * near_weight
+        far_re, far_im = far[c].real * far_weight, far[c].imag * far_weight
+        even[c] = near_re + far_re
+        even[_COLUMNS + c] = near_im + far_im
+        odd[c] = near_im - far_im
+        odd[_COLUMNS + c] = far_re - near_re
+
+
+@inlined()
+def _put(row, out):
+    for i in range(_ROW):
+        out[i] = row[i]
+
+
+@inlined(fastmath={"contract"})
+def _add_products(table, begin, terms, out):
+    """Add to three rows ``out`` the terms times the table of three frequencies from ``begin``."""
+    a, b, c = table[begin], table[begin + 1], table[begin + 2]
+    for k in range(0, len(a), _TOGETHER):
+        rows = terms[k * _ROW : (k + _TOGETHER) * _ROW]
+        a0, a1, a2 = a[k], a[k + 1], a[k + 2]
+        b0, b1, b2 = b[k], b[k + 1], b[k + 2]
+        c0, c1, c2 = c[k], c[k + 1], c[k + 2]
+        for i in range(_ROW):
+            r0, r1, r2 = rows[i], rows[_ROW + i], rows[2 * _ROW + i]
+            out[i] = out[i] + a0 * r0 + a1 * r1 + a2 * r2
+            out[_ROW + i] = out[_ROW + i] + b0 * r0 + b1 * r1 + b2 * r2
+            out[2 * _ROW + i] = out[2 * _ROW + i] + c0 * r0 + c1 * r1 + c2 * r2
+
+
+@inlined(fastmath={"contract"})
+def _add_signed(terms, count, sign, out):
+    """Add rows to one, with signs that alternate where ``sign`` is -1."""
+    factor = sign
+    for k in range(count):
+        row = _row(terms, k)
+        for i in range(_ROW):
+            out[i] += factor * row[i]
+        factor *= sign
+
+
+@inlined(fastmath={"contract"})
+def _add_squares(row, out):
+    for c in range(_COLUMNS):
+        out[c] += row[c] * row[c] + row[_COLUMNS + c] * row[_COLUMNS + c]
+
+
+@inlined(fastmath={"contract"})
+def _unfold(one, other, low, high):
+    """Fill ``low`` with the sum of two parts, and ``high`` with their difference."""
+    for i in range(_ROW):
+        low[i], high[i] = one[i] + other[i], one[i] - other[i]
+
+
+@inlined(fastmath={"contract"})
+def _add_unfolded_squares(cosine, sine, low, high):
+    """`_unfold`, but the squared magnitudes are added."""
+    for c in range(_COLUMNS):
+        cosine_re, cosine_im = cosine[c], cosine[_COLUMNS + c]
+        sine_re, sine_im = sine[c], sine[_COLUMNS + c]
+        real, imaginary = cosine_re + sine_re, cosine_im + sine_im
+        low[c] += real * real + imaginary * imaginary
+        real, imaginary = cosine_re - sine_re, cosine_im - sine_im
+        high[c] += real * real + imaginary * imaginary
+
+
+@inlined()
+def _fold_line(spectra, channel, columns, weights, cycle_at, store, line, last):
+    """Fold the terms of one line (first place, step, factor, place of its half) into even and odd.
+
+    The first pass reads weighted samples; the ``last`` pass reads the grid.
+    """
+    first, step, factor, at_half = line
+    begin, end = columns
+    own, middle = _row(store.grid, first), _row(store.grid, at_half)
+    if not last:
+        at = cycle_at[first]
+        _read(spectra[at, channel, begin:end], weights[at], own)
+        if factor % 2 == 0:
+            at = cycle_at[at_half]
+            _read(spectra[at, channel, begin:end], weights[at], middle)
+    _unfold(own, middle, _row(store.alone, 0), _row(store.alone, 1))
+    for k in range((factor - 1) // 2):
+        even, odd = _row(store.even, k), _row(store.odd, k)
+        low, high = first + (k + 1) * step, first + (factor - k - 1) * step
+        if last:
+            _fold(_row(store.grid, low), _row(store.grid, high), even, odd)
+        else:
+            low, high = cycle_at[low], cycle_at[high]
+            near, far = spectra[low, channel, begin:end], spectra[high, channel, begin:end]
+            _read_folded(near, weights[low], far, weights[high], even, odd)
+
+
+@inlined()
+def _transform_line(cosines, sines, store, line, last):
+    """Sum the folded terms of one line to its frequencies: to the grid, or to power in the end."""
+    first, step, factor, at_half = line
+    pairs, one = (factor - 1) // 2, np.float32(1)
+    # Frequencies without a partner: 0, and half of an even factor.
+    _put(_row(store.alone, 0), store.total)
+    _add_signed(store.even, pairs, one, store.total)
+    if last:
+        _add_squares(store.total, _powers(store.sums, first))
+    else:
+        _put(store.total, _row(store.grid, first))
+    if factor % 2 == 0:
+        _put(_row(store.alone, factor // 2 % 2), store.total)
+        _add_signed(store.even, pairs, -one, store.total)
+        if last:
+            _add_squares(store.total, _powers(store.sums, at_half))
+        else:
+            _put(store.total, _row(store.grid, at_half))
+    # All others in pairs, some pairs together.
+    for group in range(0, pairs, _TOGETHER):
+        for k in range(_TOGETHER):
+            _put(_row(store.alone, (group + k + 1) % 2), _row(store.cosine_parts, k))
+        store.sine_parts[:] = 0
+        _add_products(cosines, group, store.even, store.cosine_parts)
+        _add_products(sines, group, store.odd, store.sine_parts)
+        for k in range(min(_TOGETHER, pairs - group)):
+            low, high = first + (group + k + 1) * step, first + (factor - group - k - 1) * step
+            cosine, sine = _row(store.cosine_parts, k), _row(store.sine_parts, k)
+            if last:
+                _add_unfolded_squares(
+                    cosine, sine, _powers(store.sums, low), _powers(store.sums, high)
+                )
+            else:
+                _unfold(cosine, sine, _row(store.grid, low), _row(store.grid, high))
+
+
+@compiled(fastmath={"contract"})
+def _add_power(spectra, channel_begin, channel_end, weights, dft, power):
+    cycles, _, n_range = spectra.shape
+    n_1, n_2 = dft.factors
+    terms = max(dft.cosines[0].shape[1], dft.cosines[1].shape[1])
+    store = _Store(
+        on_cache_lines((cycles + 1) * _ROW, weights),
+        on_cache_lines(cycles * _COLUMNS, weights),
+        on_cache_lines(terms * _ROW, weights),
+        on_cache_lines(terms * _ROW, weights),
+        on_cache_lines(2 * _ROW, weights),
+        on_cache_lines(_ROW, weights),
+        on_cache_lines(_TOGETHER * _ROW, weights),
+        on_cache_lines(_TOGETHER * _ROW, weights),
+    )
+    for begin in range(0, n_range, _COLUMNS):
+        columns = begin, min(begin + _COLUMNS, n_range)
+        # Lanes beyond the last range bins are 0 as well.
+        store.grid[:], store.sums[:], store.even[:], store.odd[:] = 0, 0, 0, 0
+        for channel in range(channel_begin, channel_end):
+            for last in (False, True):
+                # First along the second factor, whose places are neighbours, then the first.
+                factor, step = (n_1, n_2) if last else (n_2, 1)
+                cosines, sines = dft.cosines[0 if last else 1], dft.sines[0 if last else 1]
+                padding = slice((factor - 1) // 2 * _ROW, cosines.shape[1] * _ROW)
+                store.even[padding] = 0
+                store.odd[padding] = 0
+                for number in range(cycles // factor):
+                    first = number if last else number * n_2
+                    # A term at half of an even factor has no partner; else the row of zeros is it.
+                    at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
+                    line = first, step, factor, at_half
+                    _fold_line(spectra, channel, columns, weights, dft.cycle_at, store, line, last)
+                    _transform_line(cosines, sines, store, line, last)
+        for place in range(cycles):
+            own, out = _powers(store.sums, place), power[dft.bin_at[place], columns[0] : columns[1]]
+            for c in range(len(out)):
+                out[c] += own[c]

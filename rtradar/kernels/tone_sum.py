@@ -1,0 +1,303 @@
+"""The sum of few tones, one by one: samples side by side in vector lanes, phases in float64."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.jit import compiled, inlined, on_cache_lines
+from rtradar.kernels.phasor import phasor
+
+LANES = 32
+"""Samples that are computed side by side."""
+
+MIDDLE = 0.5
+"""Fraction of the sweep about which powers of the sample number are taken: they cancel least there."""
+
+_TOGETHER = 6
+"""Tones added in one loop, so that sums are read and written a sixth as often."""
+
+_NEXT = 2 * LANES
+"""From the lanes of one tone to those of the next."""
+
+_GRID = 4096
+"""Steps from sample to sample whose first powers are in a table, 1 / 4096 turn apart."""
+
+_TERMS = 4
+"""Terms of the series that turn these powers by the rest of a step, at most 0.024 rad in the last
+lane: the next term is 0.024^8 / 8! = 3e-18."""
+
+
+class Tones(NamedTuple):
+    """Echoes of a block of chirps, and the sweep that makes tones of them.
+
+    Parameters
+    ----------
+    length : (chirp, rx, echo) float64
+        Path lengths [m]. Echoes whose beat frequency lies outside [0, sample rate) add nothing.
+    amplitude : (node, chirp, rx, echo) complex
+        Amplitudes at some frequencies [m].
+    powers : (power, node) float64
+        Weights of these in the polynomial in the sample number over the number of samples.
+    start_frequency, slope, sample_rate : float
+        Of the sweep [Hz], [Hz/s], and of its samples [Hz].
+    """
+
+    length: NDArray[np.float64]
+    amplitude: NDArray[np.complexfloating]
+    powers: NDArray[np.float64]
+    start_frequency: float
+    slope: float
+    sample_rate: float
+
+
+class ToneTables(NamedTuple):
+    """Tables in the precision of the sum.
+
+    Parameters
+    ----------
+    first : (step, real or imaginary * lane)
+        Phasors of lane + 1/2 samples, for steps from 0 to 1 turn per sample.
+    middles : (lane,)
+        Lane + 1/2.
+    sines, cosines : (term,)
+        Coefficients of the odd and the even powers of the angle.
+    """
+
+    first: NDArray[np.floating]
+    middles: NDArray[np.floating]
+    sines: tuple[Any, ...]
+    cosines: tuple[Any, ...]
+
+
+@lru_cache(maxsize=2)
+def tone_tables(kind: type[np.floating]) -> ToneTables:
+    """Tables in float32 or float64."""
+    middles = np.arange(LANES) + 0.5
+    turns = np.outer(np.arange(_GRID + 1) / _GRID, middles)
+    first = np.hstack([np.cos(2 * np.pi * turns), np.sin(2 * np.pi * turns)]).astype(kind)
+    sines, cosines = (
+        tuple(kind((-1) ** n / math.factorial(2 * n + odd)) for n in range(_TERMS))
+        for odd in (1, 0)
+    )
+    return ToneTables(first, middles.astype(kind), sines, cosines)
+
+
+def tone_sum_reference(tones, samples, origin):
+    """The sum of `add_tones`, sample by sample; ``origin`` is where powers of the sample count from."""
+    time, fraction = np.arange(samples) / tones.sample_rate, np.arange(samples) / samples - origin
+    delay = tones.length[..., None] / SPEED_OF_LIGHT_MPS
+    beat = tones.slope * delay
+    turns = tones.start_frequency * delay + beat * time - beat * delay / 2
+    weights = tones.powers.T @ fraction ** np.arange(len(tones.powers))[:, None]
+    amplitude = np.einsum("jcre,jn->cren", tones.amplitude, weights, optimize=True)
+    received = (beat >= 0) & (beat < tones.sample_rate)
+    return np.sum(np.where(received, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2)
+
+
+class _Store(NamedTuple):
+    """Arrays that one thread works on, of the tones of one chirp at one receiver.
+
+    ``start``, ``step (tone,)`` are turns at the first sample and per sample, ``lanes`` the powers
+    of each tone, ``middle_re``, ``middle_im (pair * tone,)`` its values in the middle of each pair
+    of blocks of lanes, and ``weighted_re``, ``weighted_im`` the same times its amplitude.
+    ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real and
+    imaginary * tone)`` how much more they are at the others, ``now`` coefficients of one power.
+    ``sum_re``, ``sum_im (sample,)`` are the result.
+    """
+
+    start: NDArray[np.float64]
+    step: NDArray[np.float64]
+    lanes: NDArray[np.floating]
+    sums: NDArray[np.floating]
+    middle_re: NDArray[np.floating]
+    middle_im: NDArray[np.floating]
+    weighted_re: NDArray[np.floating]
+    weighted_im: NDArray[np.floating]
+    first: NDArray[np.float64]
+    change: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    now: NDArray[np.floating]
+    sum_re: NDArray[np.floating]
+    sum_im: NDArray[np.floating]
+
+
+@inlined(fastmath={"contract"})
+def _lanes(row, rest, tables, out):
+    """Powers of a tone side by side: those of the next step on the grid, turned by the rest [rad]."""
+    sines, cosines = tables.sines, tables.cosines
+    for lane in range(LANES):
+        angle = rest * tables.middles[lane]
+        x = angle * angle
+        sine = angle * (sines[0] + x * (sines[1] + x * (sines[2] + x * sines[3])))
+        cosine = cosines[0] + x * (cosines[1] + x * (cosines[2] + x * cosines[3]))
+        out[lane] = row[lane] * cosine - row[lane + LANES] * sine
+        out[lane + LANES] = row[lane] * sine + row[lane + LANES] * cosine
+
+
+@inlined(fastmath={"contract"})
+def _together(w, x, i):
+    """Sum of `_TOGETHER` tones: weights times what ``x`` has of each at place ``i`` of its lanes."""
+    first = w[0] * x[i] + w[1] * x[i + _NEXT] + w[2] * x[i + 2 * _NEXT]
+    return first + w[3] * x[i + 3 * _NEXT] + w[4] * x[i + 4 * _NEXT] + w[5] * x[i + 5 * _NEXT]
+
+
+@inlined(fastmath={"contract"})
+def _add_constants(pairs, store):
+    """Add tones of constant amplitude to the result, two blocks of lanes at a time.
+
+    As far before the middle of a pair as after it a power is the conjugate, so the ``sums`` of the
+    products of real and imaginary parts serve both. All sums are one array and the lanes another,
+    because each loop first checks whether its arrays overlap.
+    """
+    lanes, sums = store.lanes, store.sums
+    tones = len(store.weighted_re) // pairs
+    for pair in range(pairs):
+        sums[:] = 0.0
+        for tone in range(0, tones, _TOGETHER):
+            at = pair * tones + tone
+            re = store.weighted_re[at : at + _TOGETHER]
+            im = store.weighted_im[at : at + _TOGETHER]
+            real = re[0], re[1], re[2], re[3], re[4], re[5]
+            imaginary = im[0], im[1], im[2], im[3], im[4], im[5]
+            some = lanes[tone * _NEXT : (tone + _TOGETHER) * _NEXT]
+            for i in range(LANES):
+                sums[i] += _together(real, some, i)
+                sums[i + LANES] += _together(imaginary, some, i)
+                sums[i + 2 * LANES] += _together(real, some, i + LANES)
+                sums[i + 3 * LANES] += _together(imaginary, some, i + LANES)
+        # Slices, because the compiler must see that indices are not negative to use vectors.
+        early, late, end = 2 * pair * LANES, (2 * pair + 1) * LANES, 2 * (pair + 1) * LANES
+        early_re, early_im = store.sum_re[early:late], store.sum_im[early:late]
+        late_re, late_im = store.sum_re[late:end], store.sum_im[late:end]
+        for i in range(LANES):
+            late_re[i] += sums[i] - sums[i + 3 * LANES]
+            late_im[i] += sums[i + LANES] + sums[i + 2 * LANES]
+        for i in range(LANES):
+            early_re[i] += sums[LANES - 1 - i] + sums[4 * LANES - 1 - i]
+            early_im[i] += sums[2 * LANES - 1 - i] - sums[3 * LANES - 1 - i]
+
+
+@inlined()
+def _weigh(power, powers, store):
+    """Fill the coefficients of a power of the sample number; whether any is other than 0.
+
+    The weights of all powers but the first add up to 0 over the nodes, so constant amplitudes have
+    no part in them.
+    """
+    first, weight, now = store.first, store.weight, store.now
+    for i in range(len(first)):
+        weight[i] = first[i] if power == 0 else 0.0
+    for node in range(1, powers.shape[1]):
+        change = store.change[node - 1]
+        for i in range(len(first)):
+            weight[i] += powers[power, node] * change[i]
+    any_there = False
+    for i in range(len(first)):
+        now[i] = weight[i]
+        any_there |= weight[i] != 0
+    return any_there
+
+
+@inlined(fastmath={"contract"})
+def _take(tones, chirp, receiver, store, received):
+    """Fill start, step and amplitudes of the tones that are in the band and visible; their count."""
+    length, amplitude = tones.length[chirp, receiver], tones.amplitude[:, chirp, receiver]
+    size, count = len(store.start), 0
+    for echo in range(len(length)):
+        beat = tones.slope / SPEED_OF_LIGHT_MPS * length[echo]
+        if beat >= 0 and beat < tones.sample_rate:
+            for node in range(amplitude.shape[0]):
+                if amplitude[node, echo] != 0:
+                    received[count] = echo
+                    count += 1
+                    break
+    store.first[:] = 0.0
+    store.change[:] = 0.0
+    for i in range(count):
+        delay = length[received[i]] / SPEED_OF_LIGHT_MPS
+        store.start[i] = delay * (tones.start_frequency - 0.5 * tones.slope * delay)
+        store.step[i] = tones.slope * delay / tones.sample_rate
+        here = amplitude[0, received[i]]
+        store.first[i], store.first[size + i] = here.real, here.imag
+        for node in range(1, amplitude.shape[0]):
+            there = amplitude[node, received[i]] - here
+            store.change[node - 1, i] = there.real
+            store.change[node - 1, size + i] = there.imag
+    return count
+
+
+@compiled(fastmath={"contract"})
+def add_tones(begin, end, tones, tables, out):
+    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the tables' precision."""
+    receivers, samples = out.shape[1:]
+    nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
+    # The last pair of blocks may go beyond the last sample, and the last tones that are added
+    # together beyond the last tone: those are silent.
+    pairs = (samples + 2 * LANES - 1) // (2 * LANES)
+    size = (echoes + _TOGETHER - 1) // _TOGETHER * _TOGETHER
+    like = tables.middles
+    store = _Store(
+        np.zeros(size),
+        np.zeros(size),
+        on_cache_lines(size * _NEXT, like),
+        on_cache_lines(2 * _NEXT, like),
+        np.empty(pairs * size, dtype=like.dtype),
+        np.empty(pairs * size, dtype=like.dtype),
+        np.empty(pairs * size, dtype=like.dtype),
+        np.empty(pairs * size, dtype=like.dtype),
+        np.empty(2 * size),
+        np.empty((nodes - 1, 2 * size)),
+        np.empty(2 * size),
+        np.empty(2 * size, dtype=like.dtype),
+        np.empty(pairs * 2 * LANES, dtype=like.dtype),
+        np.empty(pairs * 2 * LANES, dtype=like.dtype),
+    )
+    received = np.empty(echoes, np.int64)
+    fraction = np.empty(samples, dtype=like.dtype)
+    for sample in range(samples):
+        fraction[sample] = sample / samples - MIDDLE
+    # Whatever a chirp does not fill is left over from the one before, and silent.
+    store.lanes[:] = 0.0
+    for chirp in range(begin, end):
+        for receiver in range(receivers):
+            count = _take(tones, chirp, receiver, store, received)
+            # Powers of each tone about a middle, and its phasor in each middle.
+            for i in range(count):
+                row = int(store.step[i] * _GRID + 0.5)
+                rest = like.dtype.type((store.step[i] - row / _GRID) * (2 * math.pi))
+                own = store.lanes[i * _NEXT : (i + 1) * _NEXT]
+                _lanes(tables.first[row], rest, tables, own)
+            for pair in range(pairs):
+                middle = (2 * pair + 1) * LANES - 0.5
+                re = store.middle_re[pair * size : (pair + 1) * size]
+                im = store.middle_im[pair * size : (pair + 1) * size]
+                for i in range(size):
+                    re[i], im[i] = phasor(store.start[i] + store.step[i] * middle)
+            store.sum_re[:] = 0.0
+            store.sum_im[:] = 0.0
+            # Horner's scheme over powers of the sample number: for each a sum of constant tones.
+            for power in range(nodes - 1, -1, -1):
+                for sample in range(samples if power < nodes - 1 else 0):
+                    store.sum_re[sample] *= fraction[sample]
+                    store.sum_im[sample] *= fraction[sample]
+                if not _weigh(power, tones.powers, store):
+                    continue
+                now_re, now_im = store.now[:size], store.now[size:]
+                for pair in range(pairs):
+                    re = store.middle_re[pair * size : (pair + 1) * size]
+                    im = store.middle_im[pair * size : (pair + 1) * size]
+                    own_re = store.weighted_re[pair * size : (pair + 1) * size]
+                    own_im = store.weighted_im[pair * size : (pair + 1) * size]
+                    for i in range(size):
+                        own_re[i] = re[i] * now_re[i] - im[i] * now_im[i]
+                        own_im[i] = re[i] * now_im[i] + im[i] * now_re[i]
+                _add_constants(pairs, store)
+            samples_there = out[chirp, receiver]
+            for sample in range(samples):
+                samples_there[sample] = complex(store.sum_re[sample], store.sum_im[sample])
