@@ -3,12 +3,11 @@
 Meshes are read by trimesh, which is imported when the first mesh is read.
 """
 
-from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import MATERIALS, Material, material, own_material
 from rtradar.scene.mesh_files import Triangles
+from rtradar.scene.objects import Furniture, Surface, Wall, room_walls
 from rtradar.scene.scene import Scene
 from rtradar.scene.slab import reflection, slab
-from rtradar.scene.walls import Surface, Wall, room_walls
 
 __all__ = [
     "MATERIALS",

@@ -1,6 +1,8 @@
 """Materials of rooms and people: complex relative permittivity over frequency.
 
-Each material names the source of its figures and the frequencies for which they are given.
+Each material names the source of its figures and the frequencies for which they are given. A new
+material is a row of ``_TABLE_3``, if the Recommendation has it, or is made by `own_material`, which
+is what a table ``[materials.NAME]`` of a scene file does.
 
 References
 ----------
@@ -35,12 +37,7 @@ P.2040-3 rounds 1e-9 / (2 pi eps_0) = 17.975 to 17.98."""
 class PowerLaw:
     """Permittivity a f^b and conductivity c f^d [S/m], f in GHz: a row of ITU-R P.2040-3, table 3.
 
-    Parameters
-    ----------
-    low_hz, high_hz : float
-        Limits of the measured band, which belong to it [Hz].
-    a, b, c, d : float
-        Constants of the Recommendation.
+    The limits of the measured band belong to it.
     """
 
     low_hz: float
@@ -54,26 +51,17 @@ class PowerLaw:
         """Complex relative permittivity, exp(+j omega t): the imaginary part is never positive."""
         ghz = frequency_hz / 1e9
         conductivity = self.c * ghz**self.d
-        return np.asarray(
-            self.a * ghz**self.b
-            - 1j * conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
-        )
+        loss = conductivity / (2 * pi * frequency_hz * VACUUM_PERMITTIVITY_FPM)
+        return np.asarray(self.a * ghz**self.b - 1j * loss)
 
 
 @dataclass(frozen=True)
 class ColeCole:
-    """Sum of Cole-Cole relaxations and an ionic conductivity.
+    """Sum of Cole-Cole relaxations and an ionic ``conductivity`` [S/m].
 
-    Parameters
-    ----------
-    low_hz, high_hz : float
-        Limits of the band, which belong to it [Hz].
-    infinite : float
-        Relative permittivity far above all relaxations.
-    terms : tuple of (float, float, float)
-        Step of permittivity, relaxation time [s] and broadening alpha of each relaxation.
-    conductivity : float
-        Ionic conductivity [S/m].
+    The relative permittivity is ``infinite`` far above all relaxations; each of ``terms`` has its
+    step of permittivity, its relaxation time [s] and its broadening alpha. The limits of the band
+    belong to it.
     """
 
     low_hz: float
@@ -103,6 +91,9 @@ class Conductor:
         return np.full(frequency_hz.shape, complex(0.0, -inf))
 
 
+Band = PowerLaw | ColeCole | Conductor
+
+
 @dataclass(frozen=True, kw_only=True)
 class Material:
     """Material of a wall, a piece of furniture or a person.
@@ -119,7 +110,7 @@ class Material:
 
     name: str
     source: str
-    bands: tuple[PowerLaw | ColeCole | Conductor, ...]
+    bands: tuple[Band, ...]
 
     @property
     def conducts(self) -> bool:
@@ -142,7 +133,7 @@ class Material:
         (...) bool
         """
         frequency = np.asarray(frequency_hz, dtype=np.float64)
-        inside = [(frequency >= band.low_hz) & (frequency <= band.high_hz) for band in self.bands]
+        inside = [_inside(band, frequency) for band in self.bands]
         return np.asarray(np.any(inside, axis=0) & np.isfinite(frequency) & (frequency > 0))
 
     def eta(self, frequency_hz: ArrayLike) -> NDArray[np.complex128]:
@@ -171,7 +162,7 @@ class Material:
             self._refuse(float(frequency[~held].flat[0]))
         eta = np.empty(frequency.shape, dtype=np.complex128)
         for band in reversed(self.bands):
-            inside = (frequency >= band.low_hz) & (frequency <= band.high_hz)
+            inside = _inside(band, frequency)
             eta[inside] = band.eta(frequency[inside])
         return eta
 
@@ -179,13 +170,16 @@ class Material:
         limits = " and ".join(
             f"{band.low_hz / 1e9:g} to {band.high_hz / 1e9:g} GHz" for band in self.bands
         )
-        others = ", ".join(
-            sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz))
-        )
+        others = sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz))
         raise InputError(
             f"material '{self.name}' at {frequency_hz / 1e9:g} GHz: {self.source} gives it for "
-            f"{limits}; known there: {others or 'none'}; or give one of your own, with its source"
+            f"{limits}; known there: {', '.join(others) or 'none'}; or give one of your own, with "
+            "its source"
         )
+
+
+def _inside(band: Band, frequency_hz: NDArray[np.float64]) -> NDArray[np.bool_]:
+    return np.asarray((frequency_hz >= band.low_hz) & (frequency_hz <= band.high_hz))
 
 
 ITU = "ITU-R P.2040-3"
@@ -216,29 +210,37 @@ _TABLE_3: dict[str, tuple[tuple[float, float, float, float, float, float], ...]]
 _SKIN = ColeCole(1e9, 100e9, 4.0, ((32.0, 7.234e-12, 0.0), (1100.0, 32.481e-9, 0.20)), 0.0002)
 
 
-def _known() -> dict[str, Material]:
-    found = [
-        Material(
-            name=name,
-            source=ITU,
-            bands=tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows),
-        )
-        for name, rows in _TABLE_3.items()
-    ]
-    found.append(Material(name="skin", source="dry skin of Gabriel et al. 1996", bands=(_SKIN,)))
-    found.append(
-        Material(
-            name="perfect-conductor",
-            source="the limit of infinite conductivity",
-            bands=(Conductor(),),
-        )
-    )
-    return {material.name: material for material in found}
+_OTHERS = (
+    Material(name="skin", source="dry skin of Gabriel et al. 1996", bands=(_SKIN,)),
+    Material(
+        name="perfect-conductor",
+        source="the limit of infinite conductivity",
+        bands=(Conductor(),),
+    ),
+)
 
 
-MATERIALS: Mapping[str, Material] = MappingProxyType(_known())
+def _of_table_3(name: str) -> Material:
+    rows = _TABLE_3[name]
+    laws = tuple(PowerLaw(low * 1e9, high * 1e9, *rest) for low, high, *rest in rows)
+    return Material(name=name, source=ITU, bands=laws)
+
+
+MATERIALS: Mapping[str, Material] = MappingProxyType(
+    {known.name: known for known in (*map(_of_table_3, _TABLE_3), *_OTHERS)}
+)
 """Materials by their names. ``metal`` is that of the Recommendation, with 1e7 S/m; the body of the
 paper is a ``perfect-conductor``."""
+
+OWN_LIMITS: Mapping[str, tuple[float, float]] = {
+    "low_hz": (1e6, 1e12),
+    "high_hz": (1e6, 1e12),
+    "a": (0.0, 1e4),
+    "b": (-10.0, 10.0),
+    "c": (0.0, 1e9),
+    "d": (-10.0, 10.0),
+}
+"""Least and largest value of each number of a material of one's own."""
 
 
 def material(name: str) -> Material:
@@ -306,17 +308,10 @@ def own_material(
             "figures"
         )
     check_text(where, "source", source)
-    low = check_number(where, "low_hz", low_hz, 1e6, 1e12)
-    high = check_number(where, "high_hz", high_hz, low, 1e12)
-    constants = [
-        check_number(where, key, value, least, most)
-        for key, value, least, most in (
-            ("a", a, 0.0, 1e4),
-            ("b", b, -10.0, 10.0),
-            ("c", c, 0.0, 1e9),
-            ("d", d, -10.0, 10.0),
-        )
-    ]
+    low = check_number(where, "low_hz", low_hz, *OWN_LIMITS["low_hz"])
+    high = check_number(where, "high_hz", high_hz, low, OWN_LIMITS["high_hz"][1])
+    given = {"a": a, "b": b, "c": c, "d": d}
+    constants = [check_number(where, key, given[key], *OWN_LIMITS[key]) for key in given]
     law = PowerLaw(low, high, *constants)
     # A power law is monotonic, so its ends suffice.
     ends = law.eta(np.array([low, high]))

@@ -31,10 +31,13 @@ _STL_HEADER_BYTES, _STL_FACE_BYTES = 84, 50
 _TO_ASCII = bytes(range(128)).ljust(256, b"?")
 _MOST_PLY_HEADER = 65_536
 _MOST_GLB_HEADER = 16_000_000
+
 _NUMBERS_A_FACE = 12
 """Three corners with position, normal, texture and index each: a glb without shared vertices."""
+
 _FARTHEST = 1e9
 """Largest coordinate in units of the file: a kilometre in micrometres."""
+
 _MOST_INWARD = 100
 """Largest number of parts of a mesh that are wound the other way round than the whole."""
 
@@ -63,17 +66,7 @@ class Triangles:
         return self.vertices[self.faces]
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell whether points lie inside a closed mesh.
-
-        Parameters
-        ----------
-        points : (..., 3) float64
-            Points, world [m].
-
-        Returns
-        -------
-        (...) bool
-        """
+        """Tell whether points (..., 3) [m] lie inside a closed mesh."""
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = np.asarray(self.closed & ((points >= low) & (points <= high)).all(axis=-1))
         corners = self.corners
@@ -82,18 +75,7 @@ class Triangles:
         return inside
 
     def distance_m(self, point: NDArray[np.float64]) -> float:
-        """Compute the distance from a point to the surface.
-
-        Parameters
-        ----------
-        point : (3,) float64
-            Point, world [m].
-
-        Returns
-        -------
-        float
-            Distance [m]; 0 inside a closed mesh.
-        """
+        """Compute the distance [m] from a point (3,) to the surface; 0 inside a closed mesh."""
         from trimesh import triangles  # slow to import
 
         find: Any = triangles.closest_point  # has no types
@@ -191,28 +173,17 @@ def _check_glb_header(where: str, content: bytes) -> None:
 def _in_ascii(content: bytes, ending: str) -> bytes:
     """Replace every byte of the text that is not ASCII by ``?``, and remove a byte order mark.
 
-    Only names and comments hold such bytes. They are not used, but trimesh would have to know their
-    encoding.
+    Such bytes are in names and comments, which are not used; trimesh would ask for their encoding.
     """
     content = content.removeprefix(codecs.BOM_UTF8)
-    if ending == ".obj":
-        text = len(content)
-    elif ending == ".stl":
-        (count,) = (
-            struct.unpack_from("<I", content, _STL_HEADER_BYTES - 4)
-            if len(content) >= _STL_HEADER_BYTES
-            else (0,)
-        )
+    text = len(content) if ending != ".glb" else 0  # the text of a glb is JSON, which is UTF-8
+    if ending == ".stl":
+        head = content[_STL_HEADER_BYTES - 4 : _STL_HEADER_BYTES].ljust(4, b"\0")
         # The size tells a binary file from one of text; both may begin with "solid".
-        text = 0 if len(content) == _STL_HEADER_BYTES + _STL_FACE_BYTES * count else len(content)
-    elif ending == ".ply":
-        text = (
-            len(content)
-            if re.match(rb"ply\s+format\s+ascii", content)
-            else content.find(b"end_header")
-        )
-    else:  # the text of a glb is JSON, which is UTF-8
-        text = 0
+        if text == _STL_HEADER_BYTES + _STL_FACE_BYTES * struct.unpack("<I", head)[0]:
+            text = 0
+    elif ending == ".ply" and not re.match(rb"ply\s+format\s+ascii", content):
+        text = content.find(b"end_header")
     return content[:text].translate(_TO_ASCII) + content[text:] if text > 0 else content
 
 
@@ -229,7 +200,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
                 process=False,
                 skip_materials=True,
             )
-            pieces = _pieces(where, loaded)
+            parts = _parts(where, loaded)
     except InputError:
         raise
     except ImportError as error:  # trimesh looks for some packages only where a file needs them
@@ -240,18 +211,15 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
     except Exception as error:  # what trimesh raises at broken files is of any type
         reason = shown(str(error))[1:-1] or type(error).__name__
         raise InputError(f"{where} is broken or is no {ending[1:]} file: {reason}") from None
-    if not pieces:
+    if not parts:
         raise InputError(f"{where} has no triangles")
-    starts = np.cumsum([0, *(len(vertices) for vertices, _ in pieces)])
-    return (
-        np.concatenate([vertices for vertices, _ in pieces]),
-        np.concatenate(
-            [faces + start for (_, faces), start in zip(pieces, starts[:-1], strict=True)]
-        ),
-    )
+    places, corners = zip(*parts, strict=True)
+    starts = np.cumsum([0, *map(len, places[:-1])])
+    shifted = [faces + start for faces, start in zip(corners, starts, strict=True)]
+    return np.concatenate(places), np.concatenate(shifted)
 
 
-def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
+def _parts(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[np.int64]]]:
     """Give the vertices and faces of every instance of every mesh in a scene of trimesh."""
     placed = [(name, *loaded.graph[name]) for name in loaded.graph.nodes_geometry]
     meshes = [(loaded.geometry[geometry], matrix) for _, matrix, geometry in placed]
@@ -259,14 +227,14 @@ def _pieces(where: str, loaded: Any) -> list[tuple[NDArray[np.float64], NDArray[
     count = sum(len(mesh.faces) for mesh, _ in solid)
     if count > MOST_FACES:
         raise InputError(f"{where} has {count} triangles; {MOST_FACES} are allowed")
-    pieces = []
+    parts = []
     for mesh, matrix in solid:
         vertices = np.asarray(mesh.vertices, dtype=np.float64)
         faces = np.asarray(mesh.faces, dtype=np.int64)
         # A reflection reverses the winding of the faces.
         faces = faces[:, ::-1] if np.linalg.det(matrix[:3, :3]) < 0 else faces
-        pieces.append((vertices @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3], faces))
-    return pieces
+        parts.append((vertices @ np.asarray(matrix)[:3, :3].T + np.asarray(matrix)[:3, 3], faces))
+    return parts
 
 
 def checked_triangles(
@@ -280,12 +248,7 @@ def checked_triangles(
     """
     import trimesh  # slow to import
 
-    if (
-        vertices.ndim != 2
-        or vertices.shape[1] != 3
-        or faces.ndim != 2
-        or (len(faces) and faces.shape[1] != 3)
-    ):
+    if vertices.shape[1:] != (3,) or faces.ndim != 2 or (len(faces) and faces.shape[1] != 3):
         raise InputError(
             f"{where}: vertices {vertices.shape} and faces {faces.shape}; they must be (vertex, 3) "
             "and (face, 3)"
@@ -317,10 +280,8 @@ def checked_triangles(
     if closed:
         faces = _outward(where, mesh)
     used, faces = np.unique(faces, return_inverse=True)
-    places, faces = (
-        np.ascontiguousarray(places[used]),
-        np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64),
-    )
+    places = np.ascontiguousarray(places[used])
+    faces = np.ascontiguousarray(faces.reshape(-1, 3), dtype=np.int64)
     places.setflags(write=False)
     faces.setflags(write=False)
     return Triangles(places, faces, closed)
@@ -332,19 +293,18 @@ def _outward(where: str, mesh: Any) -> NDArray[np.int64]:
 
     faces, corners = np.array(mesh.faces), np.asarray(mesh.triangles - mesh.vertices.mean(axis=0))
     label: Any = graph.connected_component_labels  # has no types
-    piece = label(mesh.face_adjacency, node_count=len(faces))
-    volume = np.bincount(
-        piece, np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-    )
+    part = label(mesh.face_adjacency, node_count=len(faces))
+    volumes = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
+    volume = np.bincount(part, volumes)
     if volume.sum() < 0:
         faces, corners, volume = faces[:, ::-1], corners[:, ::-1], -volume
     inward = np.flatnonzero(volume < 0)
     if len(inward) > _MOST_INWARD:
         raise InputError(
-            f"{where}: {len(inward)} of its pieces are inside out; make their normals consistent"
+            f"{where}: {len(inward)} of its parts are inside out; make their normals consistent"
         )
     for number in inward:
-        own = piece == number
+        own = part == number
         if _winding(corners[~own] - corners[own][0, 0]) < 0.5:
             faces[own] = faces[own, ::-1]
     return faces

@@ -3,7 +3,8 @@
 Every part is an instance of one unit sphere of triangles, which its ``to_world`` moves, rotates and
 stretches: a new pose costs 21 matrices and the small upper tree of the ray tracer, where new
 vertices cost a full rebuild. Mitsuba's own ``sphere`` is not used, because it is silently wrong
-under a stretch that is not uniform, nor its ``ellipsoids``, which cull back faces.
+under a stretch that is not uniform, nor its ``ellipsoids``, which cull back faces. Everywhere here
+``mi`` is the module of Mitsuba with its variant set.
 """
 
 from __future__ import annotations
@@ -21,16 +22,7 @@ def _part_key(part: int) -> str:
 def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> Any:
     """Make a Mitsuba mesh, of which only the hits of rays are used.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    vertices, faces : (vertex, 3) float64, (face, 3) int
-        Vertices near the origin, because they are rounded to float32, and faces.
-
-    Returns
-    -------
-    mitsuba.Mesh
+    The vertices (vertex, 3) should lie near the origin, because they are rounded to float32.
     """
     mesh = mi.Mesh(
         "triangles", len(vertices), len(faces), has_vertex_normals=False, has_vertex_texcoords=False
@@ -45,45 +37,22 @@ def triangle_mesh(mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.inte
 def build_body_scene(
     mi: Any, vertices: NDArray[np.float64], faces: NDArray[np.integer], n_parts: int
 ) -> Any:
-    """Build a Mitsuba scene of ``n_parts`` instances of one closed triangle mesh.
-
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    vertices, faces : (vertex, 3) float64, (face, 3) int
-        Unit sphere of triangles.
-    n_parts : int
-        Number of instances.
-
-    Returns
-    -------
-    mitsuba.Scene
-    """
+    """Build a Mitsuba scene of ``n_parts`` instances of one closed triangle mesh, a unit sphere."""
     mesh = triangle_mesh(mi, vertices, faces)
-    description: dict[str, Any] = {
-        "type": "scene",
-        "shapes": {"type": "shapegroup", "unit_sphere": mesh},
-    }
-    for part in range(n_parts):
-        description[_part_key(part)] = {
-            "type": "instance",
-            "group": {"type": "ref", "id": "shapes"},
+    instance = {"type": "instance", "group": {"type": "ref", "id": "shapes"}}
+    return mi.load_dict(
+        {
+            "type": "scene",
+            "shapes": {"type": "shapegroup", "unit_sphere": mesh},
+            **{_part_key(part): dict(instance) for part in range(n_parts)},
         }
-    return mi.load_dict(description)
+    )
 
 
 def pose_body_scene(mi: Any, parameters: Any, matrices: NDArray[np.float64]) -> None:
-    """Move the instances.
+    """Move the instances of a scene that `build_body_scene` made, by its parameters.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    parameters : mitsuba.SceneParameters
-        Parameters of a scene that `build_body_scene` made.
-    matrices : (part, 4, 4) float64
-        Transformations from the unit sphere to the scene.
+    The ``matrices (part, 4, 4)`` transform the unit sphere to the scene.
     """
     for part, matrix in enumerate(matrices):
         parameters[f"{_part_key(part)}.to_world"] = mi.Transform4f(matrix)

@@ -2,20 +2,56 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from importlib import resources
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scene.furniture import Furniture
-from rtradar.scene.materials import Material
-from rtradar.scene.scene_file import scene_fields, scene_path
-from rtradar.scene.walls import Wall
-from rtradar.system.checks import Vector, check_number, check_vector, shown
-from rtradar.system.toml_tables import read_toml
+from rtradar.scene.materials import MATERIALS, Material, own_material
+from rtradar.scene.mesh_files import MESH_ENDINGS
+from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
+from rtradar.system.checks import (
+    Vector,
+    check_number,
+    check_text,
+    check_vector,
+    inside,
+    printable,
+    shown,
+)
+from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
+
+Piece = TypeVar("Piece", Wall, Furniture)
+
+KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "top": ((), ("name", "description")),
+    "[radar]": (("position_m",), ()),
+    "[person]": ((), ("position_m", "heading_deg")),
+    "[room]": (("size_m", "corner_m"), ()),
+    "a side of a room": (("material", "thickness_m"), ("roughness_m",)),
+    "[[walls]]": (
+        ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m"),
+        ("roughness_m",),
+    ),
+    "[[furniture]]": (
+        ("name", "mesh", "material", "position_m"),
+        ("yaw_deg", "scale", "metres_per_unit", "sheet"),
+    ),
+    "[materials.NAME]": (("source", "low_hz", "high_hz", "a"), ("b", "c", "d")),
+}
+"""Keys of each table of a scene file: those that must be given, and the others."""
+
+PERSON_LIMITS: Mapping[str, tuple[float, float]] = {
+    "position_m": (-100.0, 100.0),
+    "heading_deg": (-360.0, 360.0),
+}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,9 +109,11 @@ class Scene:
         if self.radar_position_m is not None:
             position = check_vector(where, "radar position_m", self.radar_position_m, 3)
             object.__setattr__(self, "radar_position_m", position)
-        place = check_vector(where, "person position_m", self.person_position_m, 2, 100.0)
+        most = PERSON_LIMITS["position_m"][1]
+        place = check_vector(where, "person position_m", self.person_position_m, 2, most)
         object.__setattr__(self, "person_position_m", place)
-        heading = check_number(where, "person heading_deg", self.heading_deg, -360.0, 360.0)
+        limits = PERSON_LIMITS["heading_deg"]
+        heading = check_number(where, "person heading_deg", self.heading_deg, *limits)
         object.__setattr__(self, "heading_deg", heading)
 
     @classmethod
@@ -97,15 +135,7 @@ class Scene:
             Where there is no such scene, the file is not TOML, or anything in it has no meaning;
             the message names the file, the table and key, the value, and what is allowed.
         """
-        path = scene_path(source)
-        table = read_toml(path, "scene", "give a TOML file or the name of a scene")
-        try:
-            scene = cls(**scene_fields(table, path))
-            for piece in scene.furniture:
-                piece.triangles()  # refuses a mesh that cannot be used
-        except InputError as error:
-            raise InputError(f"scene file '{path}': {error}") from None
-        return scene
+        return load_scene(source)
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -134,9 +164,8 @@ class Scene:
             Where a material is not known over the sweep of the radar, or the radar is inside a wall
             or nearer than 0.3 m to furniture.
         """
-        placed = radar
-        if self.radar_position_m is not None:
-            placed = replace(radar, position_m=self.radar_position_m)
+        place = self.radar_position_m
+        placed = radar if place is None else replace(radar, position_m=place)
         start = placed.start_frequency_hz
         sweep = np.array([start, placed.centre_frequency_hz, start + placed.bandwidth_hz])
         antennas = np.concatenate([placed.tx, placed.rx])
@@ -165,3 +194,138 @@ class Scene:
                     "are needed"
                 )
         return placed
+
+
+def scenes_folder() -> Path:
+    """Find the scenes of rtradar: inside the installed package, or at the top of a checkout."""
+    installed = Path(str(resources.files("rtradar"))) / "scenes"
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "scenes"
+
+
+def load_scene(source: str | Path) -> Scene:
+    """Load a scene by its name under ``scenes/``, or from a TOML file (`Scene.load`)."""
+    path = Path(source) if Path(source).suffix == ".toml" else _named(str(source))
+    table = read_toml(path, "scene", "give a TOML file or the name of a scene")
+    try:
+        scene = Scene(**_fields(table, path))
+        for piece in scene.furniture:
+            piece.triangles()  # refuses a mesh that cannot be used
+    except InputError as error:
+        raise InputError(f"scene file '{path}': {error}") from None
+    return scene
+
+
+def _named(name: str) -> Path:
+    known = {file.stem: file for file in sorted(scenes_folder().glob("*.toml"))}
+    if name not in known:
+        raise InputError(
+            f"scene {shown(name)} is unknown; allowed: {', '.join(known)}, or the path of a TOML "
+            "file"
+        )
+    return known[name]
+
+
+def _fields(table: Table, path: Path) -> dict[str, Any]:
+    """Turn the table of the file at ``path`` into the fields of a `Scene`."""
+    texts = KEYS["top"][1]
+    tables = ("radar", "person", "materials", "room", "walls", "furniture")
+    check_keys("", table, (), (*texts, *tables))
+    for key in texts:
+        if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
+            raise InputError(f"{key} = {shown(table[key])}; it must be a string of one line")
+    materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
+    room = _room(table["room"], materials) if "room" in table else ()
+    fields: dict[str, Any] = {
+        "name": printable(path.stem),
+        **{key: table[key] for key in texts if key in table},
+        "walls": (*room, *_pieces("walls", Wall, table, materials, path.parent)),
+        "furniture": _pieces("furniture", Furniture, table, materials, path.parent),
+    }
+    if "radar" in table:
+        radar = table_at("radar", table)
+        check_keys("[radar] ", radar, *KEYS["[radar]"])
+        fields["radar_position_m"] = radar["position_m"]
+    if "person" in table:
+        person = table_at("person", table)
+        check_keys("[person] ", person, *KEYS["[person]"])
+        for key, value in person.items():
+            fields["person_position_m" if key == "position_m" else key] = value
+    return fields
+
+
+def _own_materials(table: Table) -> dict[str, Material]:
+    found = {}
+    for name in table:
+        check_text("[materials]", "a name", name)
+        constants = table_at(name, table, "materials.")
+        check_keys(f"[materials.{name}] ", constants, *KEYS["[materials.NAME]"])
+        found[name] = own_material(name, **constants)
+    return found
+
+
+def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
+    if not isinstance(table, dict):
+        raise InputError(f"room = {shown(table)}; it must be a table: [room]")
+    check_keys("[room] ", table, KEYS["[room]"][0], ("walls", *ROOM_SIDES))
+    surfaces = {}
+    for side in ROOM_SIDES:
+        key = side if side in table or side in ("floor", "ceiling") else "walls"
+        if key not in table:
+            wanted = (
+                f"[room.{side}]" if key == side else f"[room.{side}], or [room.walls] for all four"
+            )
+            raise InputError(f"[room]: {wanted} is missing; it needs material and thickness_m")
+        surface = table_at(key, table, "room.")
+        check_keys(f"[room.{key}] ", surface, *KEYS["a side of a room"])
+        chosen = _material(f"[room.{key}] ", surface["material"], materials)
+        surfaces[side] = Surface(**{**surface, "material": chosen})
+    return room_walls(table["size_m"], table["corner_m"], surfaces)
+
+
+def _pieces(
+    key: str, kind: type[Piece], table: Table, materials: Mapping[str, Material], folder: Path
+) -> tuple[Piece, ...]:
+    found = []
+    for where, entry in tables_at(key, table):
+        check_keys(where, entry, *KEYS[f"[[{key}]]"])
+        own = {"mesh": _mesh(where, entry["mesh"], folder)} if "mesh" in entry else {}
+        chosen = _material(where, entry["material"], materials)
+        with _prefixed(where):
+            found.append(kind(**{**entry, **own, "material": chosen}))
+    return tuple(found)
+
+
+def _mesh(where: str, value: object, folder: Path) -> str | Path:
+    """Check a mesh; a file must lie in the folder of the scene file or below.
+
+    A scene may come from a stranger, and must not open files anywhere else.
+    """
+    text = check_text(where.strip(), "mesh", value)
+    if not Path(text).suffix:
+        return text
+    if Path(text).suffix.lower() not in MESH_ENDINGS:
+        raise InputError(f"{where}mesh = {shown(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
+    if inside(folder, text) is None:
+        raise InputError(
+            f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside "
+            "it or below"
+        )
+    return folder / text
+
+
+def _material(where: str, value: object, materials: Mapping[str, Material]) -> Material:
+    if not isinstance(value, str) or value not in materials:
+        allowed = ", ".join(sorted(materials))
+        raise InputError(
+            f"{where}material = {shown(value)} is unknown; allowed: {allowed}, or a table "
+            "[materials.NAME] of your own"
+        )
+    return materials[value]
+
+
+@contextmanager
+def _prefixed(where: str) -> Iterator[None]:
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{where}{error}") from None

@@ -49,9 +49,7 @@ def reflection(
     Equation :eq:`half-space` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    return np.where(
-        conducts, _perfect(polarization), _interface(eta, cosine, _inner(eta, cosine), polarization)
-    )
+    return np.where(conducts, _perfect(polarization), _face(eta, cosine, polarization)[0])
 
 
 def slab(
@@ -97,16 +95,10 @@ def slab(
     Equation :eq:`slab` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    thickness, frequency = (
-        np.asarray(thickness_m, dtype=np.float64),
-        np.asarray(frequency_hz, dtype=np.float64),
-    )
-    for key, values in (("thickness_m", thickness), ("frequency_hz", frequency)):
-        if not np.all((values > 0) & np.isfinite(values)):
+    for key, values in (("thickness_m", thickness_m), ("frequency_hz", frequency_hz)):
+        if not np.all((np.asarray(values) > 0) & np.isfinite(values)):
             raise InputError(f"slab: {key} must be positive and finite")
-    inner = _inner(eta, cosine)
-    face = _interface(eta, cosine, inner, polarization)
-    through = np.exp(-2j * pi * frequency / SPEED_OF_LIGHT_MPS * thickness * inner)
+    face, through = _waves(eta, cosine, thickness_m, frequency_hz, polarization)
     loop = 1 - (face * through) ** 2
     # At exactly grazing incidence a lossless slab of whole half waves has 0 / 0: it is transparent,
     # as at other angles.
@@ -114,8 +106,9 @@ def slab(
     loop = np.where(window, 1.0, loop)
     reflected = np.where(window, 0.0, face * (1 - through**2) / loop)
     transmitted = np.where(window, through, (1 - face**2) * through / loop)
-    return np.where(conducts, _perfect(polarization), reflected), np.where(
-        conducts, 0.0, transmitted
+    return (
+        np.where(conducts, _perfect(polarization), reflected),
+        np.where(conducts, 0.0, transmitted),
     )
 
 
@@ -131,48 +124,22 @@ def slab_passes(
 ) -> NDArray[np.complex128]:
     """Compute the field that leaves a slab after some passes, a term of the series of `slab`.
 
-    Parameters
-    ----------
-    eta, thickness_m, frequency_hz, cos_incidence, polarization
-        Slab and wave, as `slab` takes them.
-    passes : int
-        Number of passes, 0 or more: even numbers leave by the face that the wave meets, odd ones by
-        the other.
-    rest : bool
-        Whether the terms of two passes more, four more, and so on, are added.
-
-    Returns
-    -------
-    (...) complex128
-        Field over the incident one, between points opposite each other on the faces: ``r``, then
-        ``(1 - r^2) (-r)^(passes - 1) q^passes``.
-
-    Raises
-    ------
-    InputError
-        Where a value has no meaning.
-
-    Notes
-    -----
-    Equation :eq:`passes` of the theory page.
+    It is the field over the incident one, between points opposite each other on the faces: ``r``,
+    then ``(1 - r^2) (-r)^(passes - 1) q^passes`` (:eq:`passes`). Even numbers of passes leave by
+    the face that the wave meets, odd ones by the other. With ``rest`` the terms of two passes more,
+    four more, and so on, are added. The other arguments are those of `slab`.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
-    inner = _inner(eta, cosine)
-    face = _interface(eta, cosine, inner, polarization)
-    k = 2 * pi * np.asarray(frequency_hz, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    through = np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner)
-    if passes == 0:
-        term = face + (
-            slab_passes(eta, thickness_m, frequency_hz, cosine, polarization, 2, rest=True)
-            if rest
-            else 0 * through
-        )
-        return np.where(conducts, _perfect(polarization), term)
-    term = (1 - face**2) * (-face) ** (passes - 1) * through**passes
+    face, through = _waves(eta, cosine, thickness_m, frequency_hz, polarization)
+    # The reflection at the face itself is followed by the series that begins with two passes.
+    number = passes or 2
+    term = (1 - face**2) * (-face) ** (number - 1) * through**number
     if rest:
         loop = 1 - (face * through) ** 2
         # Exactly grazing, nothing enters.
         term = np.where(loop == 0, 0.0, term / np.where(loop == 0, 1.0, loop))
+    if passes == 0:
+        return np.where(conducts, _perfect(polarization), face + (term if rest else 0 * term))
     return np.where(conducts, 0.0, term)
 
 
@@ -197,22 +164,32 @@ def _checked(
     return values, np.minimum(cosine, 1.0), conducts
 
 
-def _inner(eta: NDArray[np.complex128], cosine: NDArray[np.float64]) -> NDArray[np.complex128]:
-    """Normal wave number inside relative to that in air, sqrt(eta - sin^2), the decaying root."""
+def _face(
+    eta: NDArray[np.complex128], cosine: NDArray[np.float64], polarization: Polarization
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Reflection at a face, and the normal wave number behind it relative to that of free space.
+
+    The latter is sqrt(eta - sin^2), the decaying root; ``cosine`` is that outside.
+    """
     root = np.sqrt((eta - 1) + cosine**2)
-    return np.where(root.imag > 0, -root, root)
-
-
-def _interface(
-    eta: NDArray[np.complex128],
-    cosine: NDArray[np.float64],
-    inner: NDArray[np.complex128],
-    polarization: Polarization,
-) -> NDArray[np.complex128]:
+    inner = np.where(root.imag > 0, -root, root)
     outer = cosine if polarization == "te" else eta * cosine
     total = outer + inner
     # Both are 0 only for air at grazing incidence, which reflects nothing.
-    return np.where(total == 0, 0.0, (outer - inner) / np.where(total == 0, 1.0, total))
+    return np.where(total == 0, 0.0, (outer - inner) / np.where(total == 0, 1.0, total)), inner
+
+
+def _waves(
+    eta: NDArray[np.complex128],
+    cosine: NDArray[np.float64],
+    thickness_m: ArrayLike,
+    frequency_hz: ArrayLike,
+    polarization: Polarization,
+) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
+    """Reflection at the front face, and the factor of one pass through the slab."""
+    face, inner = _face(eta, cosine, polarization)
+    k = 2 * pi * np.asarray(frequency_hz, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    return face, np.exp(-1j * k * np.asarray(thickness_m, dtype=np.float64) * inner)
 
 
 def _perfect(polarization: Polarization) -> float:

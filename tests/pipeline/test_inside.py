@@ -16,7 +16,7 @@ from rtradar.pipeline.rooms.inside_walls import Inside
 from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene_file import scenes_folder
+from rtradar.scene.scene import scenes_folder
 
 RADAR = rt.Radar(
     name="small",

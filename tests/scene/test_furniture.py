@@ -10,8 +10,8 @@ import pytest
 import trimesh
 
 from rtradar.errors import InputError
-from rtradar.scene.furniture import Furniture
 from rtradar.scene.materials import material
+from rtradar.scene.objects import Furniture
 
 
 def piece(**changes: Any) -> Furniture:

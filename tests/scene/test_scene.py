@@ -14,7 +14,7 @@ import rtradar
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene_file import scenes_folder
+from rtradar.scene.scene import scenes_folder
 
 
 def refusal(source: str | Path) -> str:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.scene import Scene
-from rtradar.scene.scene_file import scenes_folder
+from rtradar.scene.scene import scenes_folder
 
 ROOM = """
 [room]

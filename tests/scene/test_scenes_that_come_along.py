@@ -7,8 +7,8 @@ import pytest
 
 from rtradar.radar import Radar
 from rtradar.scene import Scene
-from rtradar.scene.scene_file import scenes_folder
-from rtradar.scene.walls import ROOM_SIDES
+from rtradar.scene.objects import ROOM_SIDES
+from rtradar.scene.scene import scenes_folder
 
 NAMES = sorted(file.stem for file in scenes_folder().glob("*.toml"))
 ROOMS = [name for name in NAMES if Scene.load(name).walls]

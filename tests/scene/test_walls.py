@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.scene.materials import material
-from rtradar.scene.walls import ROOM_SIDES, Surface, Wall, room_walls
+from rtradar.scene.objects import ROOM_SIDES, Surface, Wall, room_walls
 
 CONCRETE = material("concrete")
 

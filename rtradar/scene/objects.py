@@ -1,0 +1,349 @@
+"""Walls, rectangular slabs of one material of which six make a room, and furniture: meshes.
+
+A mesh of one's own is a file of `MESH_ENDINGS` that `Furniture` names with its length unit: closed,
+or of metal where ``sheet`` says that it is a thin sheet.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.errors import InputError
+from rtradar.scene.materials import Material
+from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
+from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
+
+ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
+"""Sides at the least x, largest x, least y, largest y, z = 0 and the top."""
+
+Limits = Mapping[str, tuple[float, float]]
+
+SURFACE_LIMITS: Limits = {"thickness_m": (1e-4, 10.0), "roughness_m": (0.0, 0.1)}
+ROOM_LIMITS: Limits = {"size_m": (0.1, 100.0), "corner_m": (-100.0, 100.0)}
+FURNITURE_LIMITS: Limits = {
+    "yaw_deg": (-360.0, 360.0),
+    "scale": (1e-3, 1e3),
+    "metres_per_unit": (1e-6, 1e3),
+}
+"""Least and largest value of each key that is a number; other lengths may be up to 1 km."""
+
+SMALLEST_M, LARGEST_M = 1e-3, 100.0
+"""Limits of the size of furniture along its longest axis [m]."""
+
+_SHORTEST_M = 0.01
+"""Least length of a wall's edge [m]."""
+
+_SQUARE = 1e-6
+"""Largest cosine between the edges of a rectangle: 1 um of skew a metre."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wall:
+    """A rectangular slab, given by its front face and its thickness.
+
+    The front is the side to which ``edge_u_m x edge_v_m`` points: in a room the inside. The slab
+    lies behind the front face, so that the rectangle is what one measures in the room.
+
+    Parameters
+    ----------
+    name : str
+        Name that reports show.
+    corner_m : tuple of float
+        One corner of the front face, world [m].
+    edge_u_m, edge_v_m : tuple of float
+        Vectors from that corner to its two neighbours [m], at right angles.
+    material : Material
+        Material of the whole slab.
+    thickness_m : float
+        Distance between the two faces [m].
+    roughness_m : float
+        Root mean square of the height of the faces about their planes [m].
+
+    Raises
+    ------
+    InputError
+        Where a value has no physical meaning; the message names the wall, the field and what is
+        allowed.
+    """
+
+    name: str
+    corner_m: Vector
+    edge_u_m: Vector
+    edge_v_m: Vector
+    material: Material
+    thickness_m: float
+    roughness_m: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_text("wall", "name", self.name)
+        where = f"wall '{self.name}'"
+        for key in ("corner_m", "edge_u_m", "edge_v_m"):
+            object.__setattr__(self, key, check_vector(where, key, getattr(self, key), 3))
+        for key in ("edge_u_m", "edge_v_m"):
+            if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
+                raise InputError(
+                    f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} "
+                    "m long or more"
+                )
+        u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
+        if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
+            raise InputError(
+                f"{where}: edge_u_m = {shown(self.edge_u_m)} and edge_v_m = {shown(self.edge_v_m)} "
+                "are not at right angles; a wall is a rectangle"
+            )
+        _check(self, where, SURFACE_LIMITS)
+
+    @cached_property
+    def normal(self) -> NDArray[np.float64]:
+        """Unit normal of the front, away from the slab, (3,)."""
+        normal = np.cross(self.edge_u_m, self.edge_v_m)
+        return np.asarray(normal / np.linalg.norm(normal))
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """Corners of the front face, anticlockwise seen from the front, (4, 3) [m]."""
+        corner, u, v = map(np.array, (self.corner_m, self.edge_u_m, self.edge_v_m))
+        return np.stack([corner, corner + u, corner + u + v, corner + v])
+
+    @property
+    def area_m2(self) -> float:
+        """Area of one face [m^2]."""
+        return float(np.linalg.norm(self.edge_u_m) * np.linalg.norm(self.edge_v_m))
+
+    def depth_m(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Compute the depth of points behind the front face.
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            Points, world [m].
+
+        Returns
+        -------
+        (...) float64
+            Depth [m], from 0 to `thickness_m` inside the slab; NaN beside the rectangle.
+        """
+        away = np.asarray(points, dtype=np.float64) - np.array(self.corner_m)
+        inside = np.ones(away.shape[:-1], dtype=bool)
+        for edge in (np.array(self.edge_u_m), np.array(self.edge_v_m)):
+            fraction = away @ edge / (edge @ edge)
+            inside &= (fraction >= 0) & (fraction <= 1)
+        return np.where(inside, -(away @ self.normal), np.nan)
+
+    def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Tell whether points lie inside the slab.
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            Points, world [m].
+
+        Returns
+        -------
+        (...) bool
+        """
+        depth = self.depth_m(points)
+        return np.asarray((depth >= 0) & (depth <= self.thickness_m))
+
+
+@dataclass(frozen=True, kw_only=True)
+class Surface:
+    """Material and thickness of one side of a room.
+
+    Parameters
+    ----------
+    material : Material
+        Material of the whole slab.
+    thickness_m : float
+        Thickness [m].
+    roughness_m : float
+        Root mean square of the height of the faces about their planes [m].
+    """
+
+    material: Material
+    thickness_m: float
+    roughness_m: float = 0.0
+
+
+def room_walls(
+    size_m: Vector, corner_m: tuple[float, float], surfaces: Mapping[str, Surface]
+) -> tuple[Wall, ...]:
+    """Make the six walls of a box, their fronts inward; its floor is z = 0.
+
+    Parameters
+    ----------
+    size_m : tuple of float
+        Inner size along x, y and z [m].
+    corner_m : tuple of float
+        Least x and least y inside [m].
+    surfaces : mapping of str to Surface
+        Surface of each of `ROOM_SIDES`.
+
+    Returns
+    -------
+    tuple of Wall
+        Walls with the names and the order of `ROOM_SIDES`.
+
+    Raises
+    ------
+    InputError
+        Where a size is not positive, or a surface has a value without meaning.
+    """
+    x, y = check_vector("room", "corner_m", corner_m, 2, ROOM_LIMITS["corner_m"][1])
+    least, most = ROOM_LIMITS["size_m"]
+    lengths = check_vector("room", "size_m", size_m, 3, most)
+    if min(lengths) < least:
+        raise InputError(
+            f"room: size_m = {shown(size_m)}; each must be from {least:g} to {most:g} m"
+        )
+    a, b, h = lengths
+    faces: dict[str, tuple[Vector, Vector, Vector]] = {
+        "near": ((x, y, 0.0), (0.0, b, 0.0), (0.0, 0.0, h)),
+        "far": ((x + a, y + b, 0.0), (0.0, -b, 0.0), (0.0, 0.0, h)),
+        "right": ((x + a, y, 0.0), (-a, 0.0, 0.0), (0.0, 0.0, h)),
+        "left": ((x, y + b, 0.0), (a, 0.0, 0.0), (0.0, 0.0, h)),
+        "floor": ((x, y, 0.0), (a, 0.0, 0.0), (0.0, b, 0.0)),
+        "ceiling": ((x, y + b, h), (a, 0.0, 0.0), (0.0, -b, 0.0)),
+    }
+    return tuple(
+        Wall(name=side, corner_m=corner, edge_u_m=u, edge_v_m=v, **vars(surfaces[side]))
+        for side, (corner, u, v) in faces.items()
+    )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Furniture:
+    """A mesh in a scene.
+
+    Parameters
+    ----------
+    name : str
+        Name that reports show.
+    mesh : str or Path
+        Name of a mesh that comes with rtradar, or a file: ``.ply``, ``.obj``, ``.stl`` or ``.glb``.
+    material : Material
+        Material of the surface.
+    position_m : tuple of float
+        Position of the mesh's own origin, world [m].
+    yaw_deg : float
+        Rotation about the vertical through that origin, anticlockwise seen from above [deg].
+    scale : float
+        Factor by which the mesh is enlarged.
+    metres_per_unit : float, optional
+        Unit of a file [m]: 1 for metres, 0.001 for millimetres. Meshes by name are in metres, and
+        take none.
+    sheet : bool
+        Whether the mesh of a file is a thin sheet. A mesh that is not closed must be one, and must
+        be of metal.
+
+    Raises
+    ------
+    InputError
+        Where a value has no meaning. The mesh itself is read and checked by `triangles`.
+    """
+
+    name: str
+    mesh: str | Path
+    material: Material
+    position_m: Vector
+    yaw_deg: float = 0.0
+    scale: float = 1.0
+    metres_per_unit: float | None = None
+    sheet: bool = False
+
+    def __post_init__(self) -> None:
+        check_text("furniture", "name", self.name)
+        where = f"furniture '{self.name}'"
+        position = check_vector(where, "position_m", self.position_m, 3)
+        object.__setattr__(self, "position_m", position)
+        _check(self, where, FURNITURE_LIMITS)
+        if not isinstance(self.sheet, bool):
+            raise InputError(f"{where}: sheet = {shown(self.sheet)}; it must be true or false")
+        if self._built_in:
+            if self.mesh not in mesh_names():
+                raise InputError(
+                    f"{where}: mesh = {shown(self.mesh)} is unknown; allowed: "
+                    f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
+                )
+            if self.metres_per_unit is not None or self.sheet:
+                raise InputError(
+                    f"{where}: metres_per_unit and sheet belong to a file of one's own; "
+                    f"'{self.mesh}' has both settled"
+                )
+        elif self.metres_per_unit is None:
+            raise InputError(
+                f"{where}: metres_per_unit is missing; say how long a unit of '{self.mesh}' is: "
+                "1 for m, 0.001 for mm"
+            )
+
+    @property
+    def _built_in(self) -> bool:
+        return isinstance(self.mesh, str) and not Path(self.mesh).suffix
+
+    @property
+    def path(self) -> Path:
+        """File of the mesh."""
+        return meshes_folder() / f"{self.mesh}.ply" if self._built_in else Path(self.mesh)
+
+    def triangles(self) -> Triangles:
+        """Read the mesh, and move it to its position in the scene.
+
+        Returns
+        -------
+        Triangles
+            Mesh in world coordinates [m].
+
+        Raises
+        ------
+        InputError
+            Where the file cannot be read or used, the mesh is open without being a sheet, or has an
+            impossible size.
+        """
+        where = f"furniture '{self.name}'"
+        read = read_mesh(self.path)
+        if not (read.closed or self.sheet or self._built_in):
+            raise InputError(
+                f"{where}: mesh '{self.mesh}' is not closed; close its holes, or say sheet = true "
+                "if it is a thin sheet"
+            )
+        if read.closed and self.sheet:
+            raise InputError(
+                f"{where}: mesh '{self.mesh}' is closed, so it is no thin sheet; leave sheet out"
+            )
+        if not read.closed and not self.material.conducts:
+            raise InputError(
+                f"{where}: material '{self.material.name}' of a thin sheet; allowed: metal, "
+                "perfect-conductor"
+            )
+        vertices = read.vertices * (self.scale * (self.metres_per_unit or 1.0))
+        size = float(np.ptp(vertices, axis=0).max())
+        if not SMALLEST_M <= size <= LARGEST_M:
+            raise InputError(
+                f"{where}: its mesh measures {size:.3g} m; allowed are {SMALLEST_M:g} to "
+                f"{LARGEST_M:g} m: see to metres_per_unit and scale"
+            )
+        cosine, sine = np.cos(np.radians(self.yaw_deg)), np.sin(np.radians(self.yaw_deg))
+        rotation = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+        vertices = vertices @ rotation.T + np.array(self.position_m)
+        vertices.setflags(write=False)
+        return Triangles(vertices, read.faces, read.closed)
+
+
+def _check(thing: Any, where: str, limits: Limits) -> None:
+    """Check the material of a wall or a piece of furniture, and its numbers."""
+    if not isinstance(thing.material, Material):
+        raise InputError(
+            f"{where}: material = {shown(thing.material)}; it must be a Material, as "
+            "material('concrete') gives"
+        )
+    for key, (least, most) in limits.items():
+        value = getattr(thing, key)
+        if value is not None or key != "metres_per_unit":
+            object.__setattr__(thing, key, check_number(where, key, value, least, most))
