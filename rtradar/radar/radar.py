@@ -217,7 +217,7 @@ class Radar:
 
     @property
     def slope_hz_per_s(self) -> float:
-        """Sweep rate [Hz/s]."""
+        """Sweep rate [Hz/s] (:eq:`chirp`)."""
         return self.bandwidth_hz / self.chirp_duration_s
 
     @property

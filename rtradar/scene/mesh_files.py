@@ -66,7 +66,17 @@ class Triangles:
         return self.vertices[self.faces]
 
     def holds(self, points: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Tell whether points (..., 3) [m] lie inside a closed mesh."""
+        """Tell whether points lie inside a closed mesh.
+
+        Parameters
+        ----------
+        points : (..., 3) float64
+            Points, world [m].
+
+        Returns
+        -------
+        (...) bool
+        """
         low, high = self.vertices.min(axis=0), self.vertices.max(axis=0)
         inside = np.asarray(self.closed & ((points >= low) & (points <= high)).all(axis=-1))
         corners = self.corners
@@ -75,7 +85,18 @@ class Triangles:
         return inside
 
     def distance_m(self, point: NDArray[np.float64]) -> float:
-        """Compute the distance [m] from a point (3,) to the surface; 0 inside a closed mesh."""
+        """Compute the distance from a point to the surface.
+
+        Parameters
+        ----------
+        point : (3,) float64
+            Point, world [m].
+
+        Returns
+        -------
+        float
+            Distance [m]; 0 inside a closed mesh.
+        """
         from trimesh import triangles  # slow to import
 
         find: Any = triangles.closest_point  # has no types
