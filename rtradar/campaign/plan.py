@@ -36,11 +36,11 @@ _LATER = (
     "tx_antenna",
     "rx_antenna",
 )
-"""Fields of a radar that came later: not told where they are the default, so that the names of samples made before stay."""
+"""Radar fields added later, left out at their defaults, so that ids of older samples stay."""
 
 
 class _Interval(NamedTuple):
-    """An interval of a recording: the recording's part of the parameters, what was drawn, and the recording unless synthetic."""
+    """Interval of a recording: parameters of the recording, drawn values, motion if recorded."""
 
     label: str
     parameters: dict[str, Any]
@@ -54,7 +54,7 @@ def recipes(spec: Spec) -> list[Recipe]:
     Raises
     ------
     InputError
-        Where a recording cannot be read or is too short, two samples are the same, or there are too many.
+        If a recording cannot be read or is too short, two samples are equal, or there are too many.
     """
     intervals = [*(interval for actor in spec.actors for interval in _takes(spec, actor))]
     # Reading takes a second for a long recording.
@@ -90,7 +90,8 @@ def recipes(spec: Spec) -> list[Recipe]:
     if twice:
         told = next(recipe.parameters for recipe in found if recipe.identity == twice[0])
         raise InputError(
-            f"recording '{told['recording']}' from {told['start_s']:g} s stands there twice; leave one out"
+            f"recording '{told['recording']}' from {told['start_s']:g} s stands there twice; "
+            "leave one out"
         )
     return sorted(found, key=lambda recipe: recipe.identity)
 
@@ -185,7 +186,7 @@ def _radar_parameters(radar: Radar) -> dict[str, Any]:
 
 
 def _draw(spec: Spec, seed: int) -> dict[str, float]:
-    """One value of every range; each from its own place in the stream, so that a range does not move the others."""
+    """Draw one value from every range, each independent of the other ranges."""
     places = np.random.default_rng(stream(seed, 0)).random(len(DRAWN))
     # Four decimals say it all, and read the same everywhere.
     return {

@@ -1,4 +1,4 @@
-"""What makes one sample: its recipe, what it is called, and the making."""
+"""One sample: its recipe, its id and its making."""
 
 from __future__ import annotations
 
@@ -25,12 +25,10 @@ from rtradar.system.files import open_regular
 from rtradar.system.seeds import stream
 
 SPATIAL_POINTS = 3000
-"""Most points kept of the spatial cloud, as many as the RDT cloud has; of more a uniform sample."""
+"""Largest number of points of the spatial cloud, a uniform sample if there are more."""
 
 _ID_DIGITS = 20  # 80 bits: two of a million samples share an id once in 2e12 collections
-_SPATIAL_STREAM = (
-    2  # apart from the random streams of noise and of the RDT cloud, which have the same seed
-)
+_SPATIAL_STREAM = 2  # differs from the random streams of noise and RDT cloud with the same seed
 
 
 @dataclass(frozen=True)
@@ -57,7 +55,7 @@ class Recipe:
 
     @cached_property
     def identity(self) -> str:
-        """What the sample is called: a hash of the label, the parameters and the format of the file."""
+        """Id of the sample: a hash of the label, the parameters and the format of the file."""
         content = {"format": FORMAT, "label": self.label, "parameters": self.parameters}
         text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
         return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
@@ -73,7 +71,7 @@ class Recipe:
         return float(self.parameters["duration_s"])
 
     def packed(self) -> Recipe:
-        """The same with no more of the recording than its interval needs, to be sent to where it is made."""
+        """Return a copy whose motion is cut to the interval, small enough to send to a worker."""
         if self.motion is None:
             return self
         start_s = self.parameters["start_s"]
@@ -87,7 +85,7 @@ class Recipe:
 
 
 class Made(NamedTuple):
-    """A sample, the spatial cloud (m, 3) [m] of the same capture, and what both took: ``work_s``, without warming up."""
+    """Sample, spatial cloud (m, 3) [m] of the same capture, and time ``work_s`` without warm-up."""
 
     sample: Sample
     spatial: NDArray[np.float64]
@@ -105,7 +103,7 @@ def make(recipe: Recipe) -> Made:
     began = time.perf_counter()
     told = recipe.parameters
     if recipe.motion is None:
-        # The actor moves from the beginning of the take, as long as the take is: a walk's way depends on it.
+        # The whole take is made, because the path of a walk depends on its length.
         keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
         actor = {key: told[key] for key in keys}
         motion = synthetic_motion(
@@ -150,7 +148,7 @@ def make(recipe: Recipe) -> Made:
 
 
 def scene_digest(scene: Scene) -> str:
-    """Hash of all that a scene is, the content of its own mesh files included."""
+    """Hash of a scene, including the content of its mesh files."""
 
     def content(value: object) -> str:
         return digest([value]) if isinstance(value, Path) else str(value)

@@ -1,4 +1,4 @@
-"""Samples made on a cluster: what a worker does, and who hands out the work."""
+"""Making of samples on a cluster: the task of a worker and the distribution of tasks."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ if TYPE_CHECKING:
     from distributed import Client
 
 _QUEUED = 2
-"""Samples for each worker that are with the scheduler: one at work, one to begin with next. The others wait here."""
+"""Samples submitted for each worker: one in progress and the next one. The others wait here."""
 
 _AT_LEAST = 8
-"""Samples with the scheduler in any case: workers may come later."""
+"""Smallest number of submitted samples, because workers may join later."""
 
 _one_at_a_time = threading.Lock()
 
 
 class Outcome(NamedTuple):
-    """What came of one sample: ``work_s`` and ``size`` in bytes where it was made, ``trouble`` in one line where not."""
+    """Outcome of one sample: ``work_s`` [s] and ``size`` [bytes], or ``trouble`` in one line."""
 
     identity: str
     work_s: float
@@ -39,14 +39,14 @@ class Outcome(NamedTuple):
 def work(
     client: Client, missing: Sequence[Recipe], folder: Path, made: Callable[[Recipe], Made]
 ) -> list[Outcome]:
-    """Make and store samples on a cluster, in whatever order.
+    """Make and store samples on a cluster, in any order.
 
     Raises
     ------
     InputError
-        Where the folder cannot be written.
+        If the folder cannot be written.
     CampaignError
-        Where a sample's workers died again and again, or the scheduler was lost.
+        If workers died repeatedly at the same sample, or the scheduler was lost.
     """
     from distributed import CancelledError, KilledWorker, as_completed
     from distributed.comm.core import CommClosedError
@@ -70,12 +70,14 @@ def work(
                 futures.update(submit(1))
         except KilledWorker as error:
             raise CampaignError(
-                f"{error.allowed_failures + 1} workers died one after the other at the same sample, for want of memory perhaps; "
+                f"{error.allowed_failures + 1} workers died one after the other at the same sample, "
+                "for want of memory perhaps; "
                 f"{_kept(done, missing)}, with fewer --workers"
             ) from None
         except ImportError as error:
             raise CampaignError(
-                f"a worker cannot load what it needs ({error}); install rtradar with its extra 'campaign' there, the same version"
+                f"a worker cannot load what it needs ({error}); "
+                "install rtradar with its extra 'campaign' there, the same version"
             ) from None
         except (CancelledError, CommClosedError, TimeoutError, OSError):
             raise CampaignError(f"the scheduler was lost; {_kept(done, missing)}") from None
@@ -85,7 +87,7 @@ def work(
 
 
 def make_and_store(recipe: Recipe, folder: str, made: Callable[[Recipe], Made]) -> Outcome:
-    """Make one sample where this runs, and store it: what a worker does."""
+    """Make and store one sample, as a worker does."""
     told = recipe.parameters.get("version")
     if told != __version__:
         return Outcome(
@@ -94,11 +96,11 @@ def make_and_store(recipe: Recipe, folder: str, made: Callable[[Recipe], Made]) 
             0,
             f"this worker has rtradar {__version__}, not {told}: install the same everywhere",
         )
-    # Two at a time in one process would share Mitsuba, and what it says of the other's warnings.
+    # Two at a time in one process would share Mitsuba and record each other's warnings.
     with _one_at_a_time:
         try:
             sample, spatial, work_s = made(recipe)
-        except (InputError, OSError) as error:  # such as a mesh file that this machine has not
+        except (InputError, OSError) as error:  # such as a mesh file that this machine lacks
             return Outcome(recipe.identity, 0.0, 0, str(error))
     return Outcome(
         recipe.identity, work_s, write_sample(Path(folder), recipe.identity, sample, spatial)
@@ -106,4 +108,7 @@ def make_and_store(recipe: Recipe, folder: str, made: Callable[[Recipe], Made]) 
 
 
 def _kept(done: Sequence[Outcome], missing: Sequence[Recipe]) -> str:
-    return f"{len(done)} of {len(missing)} samples were made and are kept: run the same command again for the others"
+    return (
+        f"{len(done)} of {len(missing)} samples were made and are kept: "
+        "run the same command again for the others"
+    )

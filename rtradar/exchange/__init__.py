@@ -1,4 +1,4 @@
-"""What a run left, for other tools and back: IF samples for MATLAB, xarray and int16 readers, clouds for viewers."""
+"""Exchange of IF samples (MATLAB, xarray, int16) and point clouds with other tools."""
 
 from rtradar.exchange.clouds import CloudTable
 from rtradar.exchange.export import CLOUD_FORMATS, IF_FORMATS, export, read_cloud, read_if

@@ -16,28 +16,29 @@ from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_arrays, read_bytes
 
 _EXTRA_UNITS = {"velocity": "m/s", "power": "m2", "time": "s"}
-"""What a spatial cloud tells of its points beside their places."""
+"""Columns of a spatial cloud beside the coordinates, with their units."""
 
 _PLY_TYPES = {
     "char": "i1", "uchar": "u1", "short": "<i2", "ushort": "<u2", "int": "<i4", "uint": "<u4", "float": "<f4", "double": "<f8",
 }  # fmt: skip
 _MEANING = re.compile(r"\b(\w{1,64}) = (\w{1,64}) \[([ -\\^-~]{0,64})\]", re.ASCII)
-"""Of one column; bounded, for to look for longer words in a hostile comment takes the square of its length."""
+"""Meaning of one column. Bounded, as a search in a hostile comment takes quadratic time."""
 _MOST_HEADER_BYTES = 65536
 _MOST_BYTES = 1_000_000_000
 
 
 @dataclass(frozen=True)
 class CloudTable:
-    """Points, and what is known of each.
+    """Table of points with coordinates and further columns.
 
     Parameters
     ----------
     names : tuple of str
-        Of the columns: three coordinates, then the rest.
+        Names of the columns: three coordinates, then the others.
     units : tuple of str
-        Theirs; empty where a file does not tell.
+        Units of the columns, empty if a file does not state them.
     values : (point, column) float64
+        Values of all points.
     """
 
     names: tuple[str, ...]
@@ -45,7 +46,7 @@ class CloudTable:
     values: NDArray[np.float64]
 
     def _fields(self) -> tuple[str, ...]:
-        """Names in files for viewers, which look for x, y and z."""
+        """Names of the columns in files for viewers, which expect x, y and z."""
         return ("x", "y", "z", *self.names[3:])
 
     def _meaning(self) -> str:
@@ -72,7 +73,8 @@ def write_ply(path: Path, cloud: CloudTable) -> dict[str, Any]:
     """Write a binary little-endian PLY, all columns as double; a comment says what they are."""
     properties = "".join(f"property double {field}\n" for field in cloud._fields())
     header = (
-        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {cloud._meaning()}\nelement vertex {len(cloud.values)}\n"
+        f"ply\nformat binary_little_endian 1.0\ncomment rtradar: {cloud._meaning()}\n"
+        f"element vertex {len(cloud.values)}\n"
         f"{properties}end_header\n"
     )
     with atomic_file(path) as file:
@@ -82,12 +84,14 @@ def write_ply(path: Path, cloud: CloudTable) -> dict[str, Any]:
 
 
 def write_pcd(path: Path, cloud: CloudTable) -> dict[str, Any]:
-    """Write a binary PCD, all columns as float32, for the point types of PCL know no double: 24 bits of each number stay."""
+    """Write a binary PCD with float32 columns, because the point types of PCL have no double."""
     count = len(cloud._fields())
     header = (
         f"# .PCD v0.7 - Point Cloud Data file format\n# rtradar: {cloud._meaning()}\nVERSION 0.7\n"
-        f"FIELDS {' '.join(cloud._fields())}\nSIZE {' '.join('4' * count)}\nTYPE {' '.join('F' * count)}\n"
-        f"COUNT {' '.join('1' * count)}\nWIDTH {len(cloud.values)}\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\n"
+        f"FIELDS {' '.join(cloud._fields())}\n"
+        f"SIZE {' '.join('4' * count)}\nTYPE {' '.join('F' * count)}\n"
+        f"COUNT {' '.join('1' * count)}\nWIDTH {len(cloud.values)}\nHEIGHT 1\n"
+        "VIEWPOINT 0 0 0 1 0 0 0\n"
         f"POINTS {len(cloud.values)}\nDATA binary\n"
     )
     with atomic_file(path) as file:
@@ -97,7 +101,7 @@ def write_pcd(path: Path, cloud: CloudTable) -> dict[str, Any]:
 
 
 def read_npz(path: Path) -> CloudTable:
-    """A cloud of a run or a collection; errors of many kinds where it is none."""
+    """Read a cloud of a run or a data set; errors of many types if the file is none."""
     arrays = read_arrays(path)
     points = np.asarray(arrays["points"], dtype=np.float64)
     known = [
@@ -117,7 +121,7 @@ def read_npz(path: Path) -> CloudTable:
 
 
 def read_ply(path: Path) -> CloudTable:
-    """The vertices of a binary little-endian PLY; errors of many kinds where it is none."""
+    """Read the vertices of a binary little-endian PLY; errors of many types if it is none."""
     data = read_bytes(path, _MOST_BYTES)
     head, end, body = data.partition(b"end_header\n")
     lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
@@ -132,7 +136,7 @@ def read_ply(path: Path) -> CloudTable:
 
 
 def read_pcd(path: Path) -> CloudTable:
-    """A binary PCD of one number a field; errors of many kinds where it is none."""
+    """Read a binary PCD with one number per field; errors of many types if it is none."""
     data = read_bytes(path, _MOST_BYTES)
     head, end, body = data.partition(b"DATA binary\n")
     lines = [line.split() for line in head[:_MOST_HEADER_BYTES].decode("ascii").splitlines()]
@@ -151,26 +155,26 @@ def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) 
     kind = np.dtype(fields)
     if count < 0 or len(body) < count * kind.itemsize:
         raise ValueError(
-            f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; it is cut off"
+            f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; "
+            "it is cut off"
         )
     rows = np.frombuffer(body, dtype=kind, count=count)
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
     meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
     names, units = zip(*(meant.get(field, (field, "")) for field in order), strict=True)
-    with np.errstate(
-        invalid="ignore"
-    ):  # a signalling NaN, which is a NaN afterwards and told of as such
+    with np.errstate(invalid="ignore"):  # signalling NaNs become NaNs, which `checked` reports
         return CloudTable(
             names, units, np.column_stack([rows[field].astype(np.float64) for field in order])
         )
 
 
 def checked(cloud: CloudTable, path: Path) -> CloudTable:
-    """The same, if every value is finite, but for a coordinate of a spatial cloud that its radar has not measured.
+    """Return the cloud if every value is finite, except for a coordinate that is not measured.
 
     Raises
     ------
     InputError
+        If any other value is NaN or infinite.
     """
     places, rest = cloud.values[:, :3], cloud.values[:, 3:]
     whole = np.isfinite(places).all() or (

@@ -71,7 +71,8 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     source : path
         Folder of a run that kept its IF samples, or a cloud: .npz, .ply or .pcd.
     out : path
-        For IF samples .mat, .nc or .bin; for a cloud .npz, .ply or .pcd. Replaced as a whole, or not at all.
+        Output file, which is replaced if it exists: .mat, .nc or .bin for IF samples, .npz, .ply or
+        .pcd for a cloud.
 
     Returns
     -------
@@ -87,7 +88,8 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     suffix = target.suffix.lower()
     if suffix not in IF_FORMATS and suffix not in CLOUD_FORMATS:
         raise InputError(
-            f"'{target}': no format has the suffix '{target.suffix}'; allowed: {', '.join(IF_FORMATS)} for IF samples, "
+            f"'{target}': no format has the suffix '{target.suffix}'; "
+            f"allowed: {', '.join(IF_FORMATS)} for IF samples, "
             f"{', '.join(CLOUD_FORMATS)} for clouds"
         )
     if os.path.isdir(origin):

@@ -28,14 +28,16 @@ _WHAT = "IF samples of rtradar: sample = scale * (I + 1j Q)"
 
 
 def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
-    """Write (chirp, tx, rx, sample, IQ) as little-endian int16, and beside it a JSON file of the same name.
+    """Write (chirp, tx, rx, sample, IQ) as little-endian int16 with a JSON file beside it.
 
-    The largest part of any sample becomes 32767. Rounding moves each part by at most half of ``scale``.
+    The largest real or imaginary part becomes 32767, and rounding errors are at most half of
+    ``scale``.
 
     Raises
     ------
     InputError
-        Where a file cannot be written, the JSON file is there and of something else, or a sample is not finite.
+        If a file cannot be written, a foreign file has the name of the JSON file, or a sample is
+        not finite.
     """
     beside = path.with_suffix(".json")
     for file in (path, beside):
@@ -43,14 +45,16 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
             raise InputError(f"cannot write '{file}': a directory; give another file (--out)")
     if os.path.lexists(beside) and not _ours(beside):
         raise InputError(
-            f"'{beside}' is there, and something else; it would be replaced: give another file (--out)"
+            f"'{beside}' is there, and something else; it would be replaced: "
+            "give another file (--out)"
         )
     peak = 0.0
     for _, block in recording.blocks("finding the peak"):
         largest = float(np.abs(block.view(np.float32)).max())
         if not np.isfinite(largest):
             raise InputError(
-                f"{recording.name}: a sample is not finite, and has no place in 16 bits; run it again"
+                f"{recording.name}: a sample is not finite, and has no place in 16 bits; "
+                "run it again"
             )
         peak = max(peak, largest)
     scale = peak / _LARGEST if peak else 1.0

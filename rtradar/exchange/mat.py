@@ -1,6 +1,6 @@
 """IF samples as a MATLAB file, version 7.3: HDF5, so of any size, that MATLAB and Octave load.
 
-MATLAB counts axes the other way round: what it shows as (chirp, tx, rx, sample) stands in the file as (sample, rx, tx, chirp).
+MATLAB reverses the axes: (chirp, tx, rx, sample) is stored as (sample, rx, tx, chirp).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ _COMPLEX = np.dtype([("real", "<f4"), ("imag", "<f4")])
 
 
 def write_mat(path: Path, recording: IfRecording) -> dict[str, Any]:
-    """Write ``if_samples (chirp, tx, rx, sample)``, complex single, with what belongs to its axes and the struct ``radar``.
+    """Write ``if_samples (chirp, tx, rx, sample)``, complex single, its axes and a struct ``radar``.
 
     Raises
     ------

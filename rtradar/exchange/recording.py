@@ -1,4 +1,4 @@
-"""The IF samples that a run kept, in the order that other tools expect: chirp, Tx, Rx, sample."""
+"""IF samples kept by a run, in the order that other tools expect: chirp, Tx, Rx, sample."""
 
 from __future__ import annotations
 
@@ -23,26 +23,27 @@ from rtradar.system.files import read_json
 from rtradar.system.output_folder import check_whole
 
 IF_AXES = ("chirp", "tx", "rx", "sample")
-"""Axes of a cube: the chirps of each Tx by themselves (a TDM cycle gives one of each), then Tx, Rx and fast time."""
+"""Axes of a cube: chirps of each Tx (one in each TDM cycle), Tx, Rx and fast time."""
 
 IF_UNIT = "m"
-"""Of the samples: the square of one is a cross-section, spread out by distance."""
+"""Unit of the samples, whose square is a cross-section with spreading loss."""
 
 _MOST_BYTES, _MOST_CHUNK_BYTES = 2**42, 2**34
-"""Of an array, hours at the paper's rate, and of what is unpacked at once; nothing need lie behind what a file claims."""
+"""Limits of an array (hours at the paper's rate) and of a chunk; a file may claim any size."""
 
 _MOST_TEXT_BYTES = 1_000_000
 
 
 @dataclass(frozen=True)
 class IfCube:
-    """IF samples read back, and the radar they are of.
+    """IF samples with their radar.
 
     Parameters
     ----------
     samples : (chirp, tx, rx, sample) complex64
-        Of a line's Tx the Rx of that line, as `rtradar.Radar.rx_of_tx` says.
+        Samples; the Rx of each Tx are those of `rtradar.Radar.rx_of_tx`.
     radar : Radar
+        Radar that received them.
     """
 
     samples: NDArray[np.complex64]
@@ -51,16 +52,16 @@ class IfCube:
 
 @dataclass(frozen=True)
 class IfRecording:
-    """The samples of a run, still on the disk.
+    """IF samples of a run on the disk.
 
     Parameters
     ----------
     radar : Radar
-        Where it stood in the scene.
+        Radar at its position in the scene.
     stored : array-like
-        (chirp, rx, sample) complex64, all Tx in turn.
+        Samples (chirp, rx, sample) complex64, with the chirps of all Tx in turn.
     name : str
-        For progress bars.
+        Name in progress bars.
     """
 
     radar: Radar
@@ -69,17 +70,17 @@ class IfRecording:
 
     @property
     def shape(self) -> tuple[int, int, int, int]:
-        """Length of the chirp, tx, rx and sample axes; a TDM cycle that is not whole is left out."""
+        """Length of the chirp, tx, rx and sample axes, without an incomplete TDM cycle."""
         tx = self.radar.n_tx
         return (self.stored.shape[0] // tx, tx, *self.stored.shape[1:])
 
     @property
     def step(self) -> int:
-        """Chirps of each Tx in one block: what lies together on the disk."""
+        """Number of chirps of each Tx in a block that is stored together."""
         return min(max(1, self.stored.chunks[0] // self.radar.n_tx), self.shape[0])
 
     def blocks(self, doing: str) -> Iterator[tuple[int, NDArray[np.complex64]]]:
-        """First chirp and samples (chirp, tx, rx, sample) of one stretch after the other, with a bar on a terminal."""
+        """Yield first chirp and samples (chirp, tx, rx, sample) of each block, with a bar."""
         chirps, tx, rx, samples = self.shape
         for first in tqdm(
             range(0, chirps, self.step), desc=f"{self.name}, {doing}", unit="block", disable=None
@@ -88,33 +89,35 @@ class IfRecording:
             yield first, self.read(first * tx, last * tx).reshape(last - first, tx, rx, samples)
 
     def read(self, first: int, last: int) -> NDArray[np.complex64]:
-        """Chirps of all Tx in turn from one to before another, (chirp, rx, sample).
+        """Read the chirps ``first`` to ``last - 1`` of all Tx in turn, (chirp, rx, sample).
 
         Raises
         ------
         InputError
-            Where they are damaged, or more than there is memory.
+            If the samples are damaged or exceed the memory.
         """
         try:
             return np.asarray(self.stored[first:last], dtype=np.complex64)
         except MemoryError:
             size = f"{(last - first) * math.prod(self.stored.shape[1:]) * 8 / 1e9:.3g} GB"
             raise InputError(
-                f"{self.name}: {size} of IF samples at once, more than there is memory; take a shorter run"
+                f"{self.name}: {size} of IF samples at once, more than there is memory; "
+                "take a shorter run"
             ) from None
         except Exception as error:  # zarr and its codecs fail in many ways on damaged chunks
             raise InputError(
-                f"{self.name}: IF samples {first} to {last} cannot be read ({_short(error)}); run it again"
+                f"{self.name}: IF samples {first} to {last} cannot be read ({_short(error)}); "
+                "run it again"
             ) from None
 
 
 def open_recording(folder: Path) -> IfRecording:
-    """Samples and radar of a run's folder.
+    """Open the samples of a run's folder.
 
     Raises
     ------
     InputError
-        Where there are no samples, or the summary beside them does not fit.
+        If there are no samples, or the summary does not fit them.
     """
     import zarr  # slow to import
 
@@ -132,12 +135,14 @@ def open_recording(folder: Path) -> IfRecording:
         ) from None
     if not summary["parameters"].get("save_if", True):
         raise InputError(
-            f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, which kept none; "
+            f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, "
+            "which kept none; "
             "run it again with --save-if, into another folder to keep both"
         )
     if radar.multiplexing == "ddm":
         raise InputError(
-            f"'{folder}' holds the sum of all Tx, as Doppler division receives it, which has no tx axis; "
+            f"'{folder}' holds the sum of all Tx, as Doppler division receives it, "
+            "which has no tx axis; "
             "export a run under tdm or fdm"
         )
     try:
@@ -155,7 +160,8 @@ def open_recording(folder: Path) -> IfRecording:
     )
     if not fits or kind != np.complex64:
         raise InputError(
-            f"'{folder / 'if.zarr'}' holds {kind} {shape}; the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
+            f"'{folder / 'if.zarr'}' holds {kind} {shape}; "
+            f"the radar of its summary gives complex64 (chirp, {radar.n_rx}, "
             f"{radar.samples_per_chirp}), at least {radar.n_tx} chirps; run it again"
         )
     chunk_bytes = math.prod(stored.chunks) * kind.itemsize
@@ -165,18 +171,19 @@ def open_recording(folder: Path) -> IfRecording:
         or largest > 2 * chunk_bytes + _MOST_TEXT_BYTES
     ):
         raise InputError(
-            f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, as no run writes; run it again"
+            f"'{folder / 'if.zarr'}' claims {stored.nbytes:.2g} bytes in chunks {stored.chunks}, "
+            "as no run writes; run it again"
         )
     return IfRecording(radar, stored, printable(folder.resolve().name))
 
 
 def _largest_file(store: Path) -> int:
-    """Bytes of the largest file of an array in a folder, of which zarr reads all at once.
+    """Return the size of the largest file of an array [bytes]; zarr reads a file all at once.
 
     Raises
     ------
     ValueError
-        Where something in it is neither a file nor a folder, or its description is too large to be one.
+        If an entry is neither a file nor a folder, or the description of the array is too large.
     """
     largest = 0
     for folder, folders, names in os.walk(store):
@@ -195,15 +202,16 @@ def _largest_file(store: Path) -> int:
 
 @dataclass(frozen=True)
 class Quantity:
-    """What goes with the samples, under the same name in every format.
+    """Quantity that accompanies the samples under the same name in every format.
 
     Parameters
     ----------
     axes : tuple of str
-        Of the values.
-    values : array
-        float64.
+        Axes of the values.
+    values : array of float64
+        Values.
     unit, meaning : str
+        Unit and description.
     """
 
     axes: tuple[str, ...]
@@ -213,7 +221,7 @@ class Quantity:
 
 
 def quantities(radar: Radar, chirps: int) -> dict[str, Quantity]:
-    """Times and places that belong to the axes of a cube of so many chirps of each Tx."""
+    """Return times and positions along the axes of a cube with ``chirps`` chirps of each Tx."""
     samples = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
     return {
         "chirp_time": Quantity(
@@ -236,7 +244,7 @@ def quantities(radar: Radar, chirps: int) -> dict[str, Quantity]:
 
 
 def scalars(radar: Radar) -> dict[str, float]:
-    """Numbers of the waveform, units in their names."""
+    """Return the parameters of the waveform, with units in their names."""
     return {
         "start_frequency_hz": radar.start_frequency_hz,
         "bandwidth_hz": radar.bandwidth_hz,
@@ -249,17 +257,17 @@ def scalars(radar: Radar) -> dict[str, float]:
 
 
 def radar_text(radar: Radar) -> str:
-    """All of a radar as JSON."""
+    """Return a radar as JSON."""
     return json.dumps(dataclasses.asdict(radar))
 
 
 def radar_of(text: str) -> Radar:
-    """The radar that `radar_text` wrote.
+    """Parse a radar from the text of `radar_text`.
 
     Raises
     ------
     ValueError, TypeError
-        Where the text is of none; an InputError is a ValueError.
+        If the text describes no radar; an InputError is a ValueError.
     """
     return Radar(**json.loads(text))
 
