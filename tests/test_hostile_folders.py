@@ -266,7 +266,7 @@ def test_sweeping_takes_only_what_an_interrupted_writer_leaves(tmp_path: Path) -
 
 
 def test_trainings_of_somebody_else_are_not_taken_up(tmp_path: Path) -> None:
-    from rtradar.classify.store import check_plan
+    from rtradar.classify.study import check_plan
     from rtradar.errors import InputError
 
     (tmp_path / "training-01").mkdir()

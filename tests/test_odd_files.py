@@ -215,8 +215,9 @@ def test_a_given_path_that_no_file_has(
 def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What commands read: a run, a scene with meshes, a data set, clouds and trainings."""
     pytest.importorskip("torch")
+    from rtradar.classify.outcomes import HISTORY, Outcome, save_outcome
     from rtradar.classify.recipes import RECIPES
-    from rtradar.classify.store import HISTORY, Outcome, save_outcome, write_plan
+    from rtradar.classify.study import write_plan
     from rtradar.clouds import Sample
     from rtradar.clouds.dataset_store import write_index, write_sample
 
@@ -342,7 +343,7 @@ def test_a_file_of_a_folder_that_is_something_else(
 @pytest.mark.parametrize("kind", ODD)
 def test_a_checkpoint_that_is_something_else(tmp_path: Path, kind: str) -> None:
     pytest.importorskip("torch")
-    from rtradar.classify.store import load_checkpoint
+    from rtradar.classify.training import load_checkpoint
 
     ODD[kind](tmp_path / "odd.pt")
     with guarded(), pytest.raises(rt.InputError, match=r"odd\.pt") as caught:

@@ -17,7 +17,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import rtradar
-from rtradar.campaign.spec_file import read_spec
+from rtradar.campaign.spec import read_spec
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.dataset_store import write_index, write_sample
 from rtradar.errors import InputError
@@ -146,7 +146,7 @@ def test_a_pickle_in_a_cloud_is_not_run(tmp_path: Path) -> None:
 
 def test_a_pickle_for_a_checkpoint_is_not_run(tmp_path: Path) -> None:
     pytest.importorskip("torch")
-    from rtradar.classify.store import load_checkpoint
+    from rtradar.classify.training import load_checkpoint
 
     harm, plain, zipped = tmp_path / "harm", tmp_path / "plain.pt", tmp_path / "zipped.pt"
     data = pickle.dumps(Harm(harm))

@@ -19,7 +19,7 @@ import rtradar as rt
 from rtradar.body import Body, Ellipsoids
 from rtradar.body.meshes import ellipsoid_meshes
 from rtradar.motion import place
-from rtradar.report.figures.field_units import VELOCITY_LABEL, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, field_unit
 
 MOMENT_S = 1.3
 LOW, HIGH = -65.0, -5.0  # colours of the maps [dBsm]

@@ -1,62 +1,67 @@
-"""Building of a data set: only missing and damaged samples are made, on Dask."""
+"""Building of a data set on Dask: only samples that are missing or damaged are made."""
 
 from __future__ import annotations
 
+import itertools
 import math
+import threading
 import time
 from collections import Counter, defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tqdm import tqdm
 
+from rtradar import __version__
 from rtradar.campaign.cluster import dask_client
-from rtradar.campaign.plan import counts, recipes
-from rtradar.campaign.sample import Recipe, make
-from rtradar.campaign.spec_file import read_spec
-from rtradar.campaign.work import Outcome, work
-from rtradar.clouds.dataset_store import is_whole, sample_path, sweep, write_index
-from rtradar.errors import InputError
+from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan_samples
+from rtradar.campaign.spec import read_spec
+from rtradar.clouds.dataset_store import is_whole, sample_path, sweep, write_index, write_sample
+from rtradar.errors import CampaignError, InputError
 from rtradar.system.files import unfinished
 from rtradar.system.output_folder import alone_in
 
+if TYPE_CHECKING:
+    from distributed import Client
+
 _MAX_SHOWN = 8  # values of each property in a report
+_QUEUED = 2  # submitted samples for each worker: one in progress and the next; others wait here
+_AT_LEAST = 8  # smallest number of submitted samples, because workers may join later
+_one_at_a_time = threading.Lock()
+
+
+class Outcome(NamedTuple):
+    """Outcome of one sample: ``work_s`` [s] and ``size`` [bytes], or ``trouble`` in one line."""
+
+    identity: str
+    work_s: float
+    size: int
+    trouble: str = ""
 
 
 @dataclass(frozen=True)
 class Store:
-    """Samples of a data set that exist and that are missing.
-
-    Parameters
-    ----------
-    folder : path
-        Folder of the data set.
-    missing : tuple of Recipe
-        Recipes of the samples that are missing or damaged.
-    whole, damaged : int
-        Number of complete and of damaged samples.
-    """
+    """State of a data set's folder: plans of missing or damaged samples, and counts of samples."""
 
     folder: Path
-    missing: tuple[Recipe, ...]
+    missing: tuple[SamplePlan, ...]
     whole: int
     damaged: int
 
     @classmethod
-    def look(cls, found: Sequence[Recipe], folder: Path) -> Store:
+    def look(cls, plans: Sequence[SamplePlan], folder: Path) -> Store:
         """Check every sample that exists."""
         missing, damaged = [], 0
-        for recipe in tqdm(
-            found, desc="looking for samples", unit="sample", disable=None, leave=False
-        ):
-            path = sample_path(folder, recipe.identity)
+        bar = {"desc": "looking for samples", "unit": "sample", "leave": False}
+        for plan in tqdm(plans, disable=None, **bar):
+            path = sample_path(folder, plan.identity)
             if not is_whole(path):
-                missing.append(recipe)
+                missing.append(plan)
                 damaged += path.exists()
-        return cls(folder, tuple(missing), len(found) - len(missing), damaged)
+        return cls(folder, tuple(missing), len(plans) - len(missing), damaged)
 
 
 def build_dataset(
@@ -72,7 +77,7 @@ def build_dataset(
     Parameters
     ----------
     spec : path
-        TOML file, whose keys are listed in `rtradar.campaign.spec`.
+        TOML file, whose keys are on the page on data sets.
     out : path
         Folder of the data set, which workers on other machines must see under the same name.
     plan_only : bool
@@ -98,7 +103,7 @@ def build_dataset(
     CampaignError
         If workers or their scheduler were lost.
     """
-    found = recipes(read_spec(spec))
+    plans = plan_samples(read_spec(spec))
     folder = out.resolve()
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -108,93 +113,163 @@ def build_dataset(
         ) from None
     with alone_in(folder):
         sweep(folder)
-        store = Store.look(found, folder)
-        write_index(folder, [recipe.identity for recipe in found])
-        report: dict[str, Any] = {
-            "samples": len(found),
-            "by": counts(found),
-            "whole": store.whole,
-            "damaged": store.damaged,
-        }
+        store = Store.look(plans, folder)
+        write_index(folder, [plan.identity for plan in plans])
         began = time.perf_counter()
-        done: list[Outcome] = []
-        count = 0
-        if store.missing:
-            # Partial files of local workers are removed, even if this process is terminated. The
-            # workers of another scheduler may still be writing.
-            leftovers = unfinished(lambda: sweep(folder)) if scheduler is None else nullcontext()
-            try:
-                with leftovers, dask_client(workers, scheduler) as client:
-                    count = len(client.scheduler_info(n_workers=-1)["workers"])
-                    chosen = (
-                        _first_of_each_kind(store.missing, count) if plan_only else store.missing
-                    )
-                    done = work(client, chosen, folder, made=make)
-            except BaseException:
-                if scheduler is None:
-                    sweep(folder)
-                raise
-            sweep(folder)
-    troubles = [outcome for outcome in done if outcome.trouble]
+        done, n_workers = _make_missing(store, plan_only, workers, scheduler)
+        wall_s = time.perf_counter() - began
     good = [outcome for outcome in done if not outcome.trouble]
-    if troubles:
+    if len(good) < len(done):
+        first = next(outcome for outcome in done if outcome.trouble)
+        values = next(plan.parameters for plan in plans if plan.identity == first.identity)
+        where = f"{values['recording']} from {values['start_s']:g} s"
         raise InputError(
-            f"{len(troubles)} of {len(found)} samples cannot be made, "
-            f"the other {store.whole + len(good)} are there; "
-            f"the first of them, {_told(found, troubles[0])}"
+            f"{len(done) - len(good)} of {len(plans)} samples cannot be made, "
+            f"the other {store.whole + len(good)} are there; the first of them, {first.identity} "
+            f"({where}, {values['radar']}, {values['scene']}): {first.trouble}"
         )
-    left = len(store.missing) - len(good)
-    report |= {
+    report = {
+        "samples": len(plans),
+        "by": counts(plans),
+        "whole": store.whole,
+        "damaged": store.damaged,
         "made": len(good),
-        "missing": left,
+        "missing": len(store.missing) - len(good),
         "bytes": sum(outcome.size for outcome in good),
         "work_s": sum(outcome.work_s for outcome in good) / max(len(good), 1),
-        "wall_s": time.perf_counter() - began,
-        "workers": count,
+        "wall_s": wall_s,
+        "workers": n_workers,
     }
-    if plan_only:
-        report |= _estimate(store.missing, good, count)
-    return report
+    return report | (_estimate(store.missing, good, n_workers) if plan_only else {})
 
 
-def _told(found: Sequence[Recipe], outcome: Outcome) -> str:
-    told = next(recipe.parameters for recipe in found if recipe.identity == outcome.identity)
-    where = f"{told['recording']} from {told['start_s']:g} s, {told['radar']}, {told['scene']}"
-    return f"{outcome.identity} ({where}): {outcome.trouble}"
+def _make_missing(
+    store: Store, plan_only: bool, workers: int | None, scheduler: str | None
+) -> tuple[list[Outcome], int]:
+    """Make the missing samples, or a few of each kind; return outcomes and number of workers."""
+    if not store.missing:
+        return [], 0
+    # Partial files of local workers are removed, even if this process is terminated. The workers of
+    # another scheduler may still be writing.
+    local = scheduler is None
+    leftovers = unfinished(lambda: sweep(store.folder)) if local else nullcontext()
+    try:
+        with leftovers, dask_client(workers, scheduler) as client:
+            count = len(client.scheduler_info(n_workers=-1)["workers"])
+            chosen = _first_of_each_kind(store.missing, count) if plan_only else store.missing
+            done = work(client, chosen, store.folder, make_sample)
+    except BaseException:
+        if local:
+            sweep(store.folder)
+        raise
+    sweep(store.folder)
+    return done, count
 
 
-def _first_of_each_kind(missing: Sequence[Recipe], workers: int) -> list[Recipe]:
+def work(
+    client: Client, missing: Sequence[SamplePlan], folder: Path, made: Callable[[SamplePlan], Made]
+) -> list[Outcome]:
+    """Make and store samples on a cluster, in any order.
+
+    InputError if the folder cannot be written; CampaignError if workers died repeatedly at the same
+    sample, or the scheduler was lost.
+    """
+    from distributed import CancelledError, KilledWorker, as_completed
+    from distributed.comm.core import CommClosedError
+
+    waiting = iter(missing)
+
+    def submit(number: int) -> list[Any]:
+        return [
+            client.submit(make_and_store, plan.packed(), str(folder), made, pure=False)
+            for plan in itertools.islice(waiting, number)
+        ]
+
+    done: list[Outcome] = []
+    with tqdm(total=len(missing), desc="samples", unit="sample", disable=None) as bar:
+        try:
+            at_once = max(_AT_LEAST, _QUEUED * len(client.scheduler_info(n_workers=-1)["workers"]))
+            futures = as_completed(submit(at_once), loop=client.loop)
+            for future in futures:
+                done.append(future.result())
+                bar.update()
+                futures.update(submit(1))
+        except KilledWorker as error:
+            raise CampaignError(
+                f"{error.allowed_failures + 1} workers died one after the other at the same "
+                f"sample, for want of memory perhaps; {_kept(done, missing)}, with fewer --workers"
+            ) from None
+        except ImportError as error:
+            raise CampaignError(
+                f"a worker cannot load what it needs ({error}); "
+                "install rtradar with its extra 'campaign' there, the same version"
+            ) from None
+        except (CancelledError, CommClosedError, TimeoutError, OSError):
+            raise CampaignError(f"the scheduler was lost; {_kept(done, missing)}") from None
+        except InputError as error:
+            raise InputError(f"{error}; {_kept(done, missing)}") from None
+    return done
+
+
+def make_and_store(plan: SamplePlan, folder: str, made: Callable[[SamplePlan], Made]) -> Outcome:
+    """Make and store one sample, as a worker does."""
+    wanted = plan.parameters.get("version")
+    if wanted != __version__:
+        trouble = (
+            f"this worker has rtradar {__version__}, not {wanted}: install the same everywhere"
+        )
+        return Outcome(plan.identity, 0.0, 0, trouble)
+    # Two at a time in one process would share Mitsuba and record each other's warnings.
+    with _one_at_a_time:
+        try:
+            sample, spatial, work_s = made(plan)
+        except (InputError, OSError) as error:  # such as a mesh file that this machine lacks
+            return Outcome(plan.identity, 0.0, 0, str(error))
+    size = write_sample(Path(folder), plan.identity, sample, spatial)
+    return Outcome(plan.identity, work_s, size)
+
+
+def _kept(done: Sequence[Outcome], missing: Sequence[SamplePlan]) -> str:
+    return (
+        f"{len(done)} of {len(missing)} samples were made and are kept: "
+        "run the same command again for the others"
+    )
+
+
+def _first_of_each_kind(missing: Sequence[SamplePlan], workers: int) -> list[SamplePlan]:
     """Choose enough samples of each kind to keep all workers busy, twice: the first are slow."""
-    most = 2 * math.ceil(workers / len({recipe.kind for recipe in missing}))
+    most = 2 * math.ceil(workers / len({plan.kind for plan in missing}))
     seen: Counter[tuple[str, str, str]] = Counter()
     chosen = []
-    for recipe in missing:
-        seen[recipe.kind] += 1
-        if seen[recipe.kind] <= most:
-            chosen.append(recipe)
+    for plan in missing:
+        seen[plan.kind] += 1
+        if seen[plan.kind] <= most:
+            chosen.append(plan)
     return chosen
 
 
-def _estimate(missing: Sequence[Recipe], good: Sequence[Outcome], workers: int) -> dict[str, float]:
+def _estimate(
+    missing: Sequence[SamplePlan], good: Sequence[Outcome], workers: int
+) -> dict[str, float]:
     """Estimate time and bytes of the missing samples from the fastest sample of each kind."""
     measured = {outcome.identity: outcome for outcome in good}
     rates: defaultdict[tuple[str, str, str], list[float]] = defaultdict(list)
-    for recipe in missing:
-        if recipe.identity in measured:
-            rates[recipe.kind].append(measured[recipe.identity].work_s / recipe.interval_s)
-    left = [recipe for recipe in missing if recipe.identity not in measured]
-    seconds = sum(recipe.interval_s * min(rates[recipe.kind]) for recipe in left)
+    for plan in missing:
+        if plan.identity in measured:
+            rates[plan.kind].append(measured[plan.identity].work_s / plan.interval_s)
+    left = [plan for plan in missing if plan.identity not in measured]
+    seconds = sum(plan.interval_s * min(rates[plan.kind]) for plan in left)
     size = sum(outcome.size for outcome in good) / max(len(good), 1)
     return {"estimated_s": seconds / max(workers, 1), "estimated_bytes": size * len(left)}
 
 
 def in_words(report: Mapping[str, Any]) -> str:
-    """Describe the report of `rtradar.campaign.build_dataset` in a few lines of text.
+    """Describe the report of `build_dataset` in a few lines of text.
 
     Parameters
     ----------
     report : mapping
-        Result of `rtradar.campaign.build_dataset`.
+        Result of `build_dataset`.
 
     Returns
     -------

@@ -1,4 +1,4 @@
-"""Where samples are made: a Dask cluster on this machine, or one that is there already."""
+"""Dask clusters on which samples are made: one on this machine, or an existing one."""
 
 from __future__ import annotations
 
@@ -20,26 +20,16 @@ from rtradar.system.threads import environment_of, thread_limit
 if TYPE_CHECKING:
     from distributed import Client
 
-_PATIENCE_S = 30
-"""How long a scheduler may take to answer, and its first worker to come."""
+_PATIENCE_S = 30  # time within which a scheduler must answer, and its first worker join
 
 
 @contextmanager
 def dask_client(workers: int | None = None, scheduler: str | None = None) -> Iterator[Client]:
-    """A client of a cluster with at least one worker.
+    """Yield a client of a cluster with at least one worker.
 
-    Parameters
-    ----------
-    workers : int, optional
-        Processes on this machine, of one task each, that share its cores (or have as many threads each as `RTRADAR_THREADS`
-        says); as many as there are cores if left out.
-    scheduler : str, optional
-        Address of a scheduler that is there already, such as ``tcp://host:8786``; its workers are taken as they are.
-
-    Raises
-    ------
-    InputError
-        Where Dask is not installed, or there is no scheduler or no worker.
+    ``workers`` processes on this machine share its cores, or have as many threads each as
+    `RTRADAR_THREADS` says; by default there are as many as cores. ``scheduler`` is the address of
+    an existing one, such as ``tcp://host:8786``. InputError if Dask or any worker is missing.
     """
     try:
         import dask
@@ -50,13 +40,10 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
             f"data sets are built on Dask ({error}); "
             "install the extra 'campaign' of rtradar, in a checkout: pip install -e '.[campaign]'"
         ) from None
-    # What goes wrong is said in one line, and once. Loggers of Dask and of what it talks through have levels of their own.
-    for name in [
-        name
-        for name in logging.root.manager.loggerDict
-        if name.split(".")[0] in ("asyncio", "distributed", "tornado")
-    ]:
-        logging.getLogger(name).setLevel(logging.CRITICAL)
+    # Errors are reported once and in one line. Loggers of Dask have levels of their own.
+    for name in logging.root.manager.loggerDict:
+        if name.split(".")[0] in ("asyncio", "distributed", "tornado"):
+            logging.getLogger(name).setLevel(logging.CRITICAL)
     if scheduler is not None:
         try:
             client = Client(scheduler, timeout=_PATIENCE_S, set_as_default=False)
@@ -78,23 +65,25 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
     count = workers or CPU_COUNT
     environment = environment_of(thread_limit() or max(1, CPU_COUNT // count))
     settings = {
-        # A process that is forked inherits locks of Dr.Jit's threads, but not the threads.
+        # A forked process would inherit the locks of Dr.Jit's threads, but not the threads.
         "distributed.worker.multiprocessing-method": "spawn",
-        "distributed.nanny.pre-spawn-environ": environment,  # linear algebra looks as it is loaded
+        "distributed.nanny.pre-spawn-environ": environment,  # read as linear algebra is loaded
         "distributed.nanny.environ": environment,
     }
     with (
         _place_for_kernels(environment),
-        _environment_kept(),  # Dask puts what it starts workers with into that of this process
-        _silent_tracker(),
+        _kept_environment(),  # which Dask changes to that of its workers
         dask.config.set(settings),
     ):
-        with _deaf_children():
+        # Python's process that removes semaphores of a killed build starts with this, silently.
+        silent = (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker")
+        os.environ["PYTHONWARNINGS"] = ",".join(filter(None, silent))
+        with _interrupts_blocked():
             local = LocalCluster(
                 n_workers=count,
                 threads_per_worker=1,
                 processes=True,
-                memory_limit=0,  # a worker that is held for want of memory would never say so
+                memory_limit=0,  # a worker paused for lack of memory would never report it
                 dashboard_address="127.0.0.1:0",
                 silence_logs=logging.CRITICAL,
             )
@@ -103,15 +92,16 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
 
 
 @contextmanager
-def _deaf_children() -> Iterator[None]:
-    """Have processes that are started meanwhile, and by threads that are, not hear Ctrl-C, which a terminal tells all.
+def _interrupts_blocked() -> Iterator[None]:
+    """Block Ctrl-C, which a terminal sends to all, in processes and threads that are started here.
 
-    This process ends its workers itself. One that is still loading its modules as Ctrl-C comes would say where it was.
+    This process ends its workers itself. A worker that is interrupted while it loads its modules
+    would print a traceback.
     """
     if sys.platform == "win32":
         yield
         return
-    resource_tracker.ensure_running()  # it would let the thread that starts it hear again
+    resource_tracker.ensure_running()  # it would unblock the signal in the thread that starts it
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -121,7 +111,7 @@ def _deaf_children() -> Iterator[None]:
 
 @contextmanager
 def _place_for_kernels(environment: dict[str, str]) -> Iterator[None]:
-    """Where Dr.Jit can keep no kernels, have workers share a folder meanwhile; otherwise each of them would tell."""
+    """Give workers a temporary folder for Dr.Jit's kernels, if it cannot write to its own."""
     home = os.environ.get("HOME")
     folder = os.environ.get("DRJIT_CACHE_DIR") or (home and os.path.join(home, ".drjit"))
     with ExitStack() as stack:
@@ -140,17 +130,8 @@ def _can_be_written(folder: str) -> bool:
 
 
 @contextmanager
-def _silent_tracker() -> Iterator[None]:
-    """Have semaphores that a killed build leaves taken away without a word: Python's process for that starts with this."""
-    os.environ["PYTHONWARNINGS"] = ",".join(
-        filter(None, (os.environ.get("PYTHONWARNINGS"), "ignore:resource_tracker"))
-    )
-    yield
-
-
-@contextmanager
-def _environment_kept() -> Iterator[None]:
-    """Let the environment of this process be afterwards what it was."""
+def _kept_environment() -> Iterator[None]:
+    """Restore the environment of this process afterwards."""
     before = dict(os.environ)
     try:
         yield

@@ -1,65 +1,31 @@
-"""Specification of a data set, and the keys of its TOML file.
+"""Specification of a data set, and its reader from TOML; errors are one line that names the key.
 
-::
-
-    seed = 0                          # of all random numbers
-    pfa = 1e-6                        # of OS-CFAR
-    clutter_removal = "none"
-    folder = "."                      # of the recordings, relative to this file; ${NAME} is the
-                                      # value of an environment variable
-
-    [windows]                         # which intervals of each recording
-    start_s = 0.0
-    duration_s = 2.0                  # to the end where it is left out
-    hop_s = 1.0                       # one interval every hop up to end_s; only one without it
-    end_s = 9.0                       # the end of the recording where it is left out
-
-    [each]                            # every combination of these is a sample
-    radar = ["paper-12ghz"]           # presets or TOML files
-    scene = ["free-space"]            # names or TOML files
-    fidelity = ["specular"]
-    heading_deg = [0.0]
-    snr_db = [20.0]
-    person_position_m = [[0.0, 0.0]]  # where the scene says, where it is left out
-    radar_position_m = [[-4.0, 1.0, 1.0]]
-
-    [drawn]                           # every interval draws one value from each range
-    heading_deg = [-30.0, 30.0]       # not beside [each] heading_deg; snr_db likewise
-    snr_db = [15.0, 25.0]
-    offset_x_m = [-0.3, 0.3]          # added to the place of the person
-    offset_y_m = [-0.3, 0.3]
-    tempo = [0.8, 1.25]               # this and the following: of synthetic actors
-    amplitude = [0.8, 1.1]
-    build = [0.8, 1.25]
-    height_m = [1.55, 1.95]
-
-    [[synthetic]]
-    label = "walk"                    # kick, punch, jumping_jack
-    count = 100                       # of takes, or seeds = [0, 1, 2]
-    subjects = 20                     # take k is of subject k modulo 20, who is the same person in
-                                      # all activities
-
-    [[recordings]]
-    file = "07_05.amc"
-    skeleton = "07.asf"
-    label = "walk"
-    subject = "CMU_07"
-    licence = "CMU mocap terms"
-    start_s = 0.5                     # these four, where given, in place of those of [windows]
+The page on data sets, ``docs/data-sets.md``, lists the keys and has an example.
 """
 
 from __future__ import annotations
 
+import dataclasses
+import itertools
 import math
+import os
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rtradar.errors import InputError
+from rtradar.motion import ACTIVITIES
+from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions
 from rtradar.radar import Radar
+from rtradar.scatter import MODELS
+from rtradar.scatter.common.body_material import BODY_MATERIALS
 from rtradar.scene import Scene
-from rtradar.system.checks import check_number
+from rtradar.settings import RunSettings
+from rtradar.system.checks import check_number, check_text, check_vector, inside, shown
+from rtradar.system.seeds import check_seed
+from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "heading_deg": ((0.0, 0.0), -360.0, 360.0),
@@ -76,51 +42,45 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 MOST_SAMPLES = 1_000_000
 """Largest number of samples of a data set, whose plan takes 2 GB of memory and half an hour."""
 
-
-def check_samples(intervals: int, settings: int) -> None:
-    """Refuse a data set of more samples than `MOST_SAMPLES` before it takes memory.
-
-    Parameters
-    ----------
-    intervals : int
-        Number of intervals of recordings and of synthetic takes.
-    settings : int
-        Number of combinations of the values under ``[each]``, all made for every interval.
-
-    Raises
-    ------
-    InputError
-        If there are too many samples. The message gives both numbers and a remedy.
-    """
-    if intervals * settings > MOST_SAMPLES:
-        raise InputError(
-            f"these are {intervals * settings} samples, "
-            f"{intervals} intervals under {settings} combinations of [each]; "
-            f"{MOST_SAMPLES} are allowed: split the file, each part into a folder of its own, "
-            "as rtradar train takes several"
-        )
-
-
-WINDOW_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
+INTERVAL_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
 """Keys of the intervals in files."""
 
+_NAMED = {
+    "clutter_removal": CLUTTER_REMOVALS,
+    "detector": DETECTORS,
+    "body_material": BODY_MATERIALS,
+}
+_WINDOWS = ("range_window", "doppler_window")
+_SWITCHES = ("keep_all", "spreading")
+RUN_KEYS = ("pfa", *_NAMED, *_WINDOWS, "order", *_SWITCHES)
+"""Settings of a run that a file may give for all samples."""
+
+_TOP = ("seed", *RUN_KEYS, "folder", "windows", "each", "drawn", "synthetic", "recordings")
+_EACH: Mapping[str, list[Any]] = {
+    "radar": ["paper-12ghz"],
+    "scene": ["free-space"],
+    "fidelity": ["specular"],
+    "heading_deg": [None],
+    "snr_db": [None],
+    "person_position_m": [None],
+    "radar_position_m": [None],
+}
+"""Keys of ``[each]`` with their defaults; None means drawn at random or given by the scene."""
+
+_SYNTHETIC = ("label",), ("count", "seeds", "subjects")
+_RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *INTERVAL_KEYS)
+_MOST = 1_000_000
+_MOST_ORDER = 3
+_VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 _SLACK_S = 1e-6  # by which rounding may shorten a recording
 
 
 @dataclass(frozen=True)
-class Windows:
+class Intervals:
     """Intervals of ``duration_s`` from ``start_s`` on, one every ``hop_s``, all before ``end_s``.
 
-    Parameters
-    ----------
-    start_s : float
-        Start of the first interval [s].
-    duration_s : float, optional
-        Length of an interval [s]; None for one to the end.
-    hop_s : float, optional
-        Time from one interval to the next [s]; None for a single interval.
-    end_s : float, optional
-        Time before which all intervals end [s]; None for the end of the recording.
+    Without ``duration_s`` there is one interval to the end, without ``hop_s`` a single one, and
+    without ``end_s`` the recording ends them.
     """
 
     start_s: float = 0.0
@@ -129,33 +89,24 @@ class Windows:
     end_s: float | None = None
 
     @classmethod
-    def read(cls, where: str, table: Mapping[str, Any]) -> Windows:
-        """Read the intervals from a table whose keys are known.
-
-        Raises
-        ------
-        InputError
-            If a value is invalid, or values contradict each other.
-        """
+    def read(cls, where: str, table: Mapping[str, Any]) -> Intervals:
+        """Read the intervals from a table whose keys are known; InputError for invalid values."""
         least = {"start_s": 0.0, "duration_s": 1e-3, "hop_s": 1e-3, "end_s": 1e-3}
-        windows = cls(
-            **{
-                key: check_number(where, key, table[key], least[key], 1e5)
-                for key in WINDOW_KEYS
-                if key in table
-            }
-        )
-        if windows.hop_s is not None and windows.duration_s is None:
+        given = {
+            key: check_number(where, key, table[key], least[key], 1e5)
+            for key in INTERVAL_KEYS
+            if key in table
+        }
+        found = cls(**given)
+        if found.hop_s is not None and found.duration_s is None:
             raise InputError(f"{where}: hop_s needs duration_s; give both")
-        if (
-            windows.end_s is not None
-            and windows.end_s < windows.start_s + (windows.duration_s or 1e-3) - _SLACK_S
-        ):
+        needed = found.start_s + (found.duration_s or 1e-3) - _SLACK_S
+        if found.end_s is not None and found.end_s < needed:
             raise InputError(
-                f"{where}: end_s = {windows.end_s:g} leaves no room for one interval "
-                f"from {windows.start_s:g} s on"
+                f"{where}: end_s = {found.end_s:g} leaves no room for one interval "
+                f"from {found.start_s:g} s on"
             )
-        return windows
+        return found
 
     @property
     def needed_s(self) -> float | None:
@@ -174,10 +125,7 @@ class Windows:
     def of(self, name: str, length_s: float) -> list[tuple[float, float]]:
         """Return start and duration [s] of each interval of a recording of this length [s].
 
-        Raises
-        ------
-        InputError
-            If the recording is too short for one interval.
+        InputError if the recording is too short for one.
         """
         end = length_s if self.end_s is None else self.end_s
         needed = self.start_s + (self.duration_s or 1e-3)
@@ -189,14 +137,11 @@ class Windows:
             )
         if self.duration_s is None:
             return [(self.start_s, round(end - self.start_s, 6))]
-        starts = (
-            self.start_s + number * (self.hop_s or 0.0) for number in range(self.count(length_s))
-        )
-        return [(round(start, 6), self.duration_s) for start in starts]
+        hop_s, count = self.hop_s or 0.0, self.count(length_s)
+        return [(round(self.start_s + k * hop_s, 6), self.duration_s) for k in range(count)]
 
 
-@dataclass(frozen=True)
-class Actor:
+class Actor(NamedTuple):
     """Takes of synthetic actors, by the seeds of the takes and the numbers of the subjects."""
 
     label: str
@@ -204,8 +149,7 @@ class Actor:
     subjects: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Recorded:
+class Recorded(NamedTuple):
     """One recording: ``name`` as in the file, ``path`` and ``skeleton`` as absolute paths."""
 
     name: str
@@ -214,11 +158,10 @@ class Recorded:
     label: str
     subject: str
     licence: str
-    windows: Windows
+    intervals: Intervals
 
 
-@dataclass(frozen=True)
-class Setting:
+class Combination(NamedTuple):
     """One combination of the values under ``[each]``; None means drawn at random."""
 
     radar: Radar
@@ -228,15 +171,258 @@ class Setting:
     snr_db: float | None
 
 
-@dataclass(frozen=True)
-class Spec:
-    """Specification of a data set, see the keys in this module's docstring."""
+class Spec(NamedTuple):
+    """Specification of a data set, see the keys in this module's docstring.
 
-    seed: int
-    pfa: float
-    clutter_removal: str
-    windows: Windows
-    settings: tuple[Setting, ...]
+    ``run`` has the seed and what the file gives of `RUN_KEYS`; each sample completes it.
+    """
+
+    run: RunSettings
+    intervals: Intervals
+    combinations: tuple[Combination, ...]
     drawn: Mapping[str, tuple[float, float]]
     actors: tuple[Actor, ...]
     recordings: tuple[Recorded, ...]
+
+
+def check_samples(intervals: int, combinations: int) -> None:
+    """Refuse a data set of more samples than `MOST_SAMPLES` before it takes memory."""
+    if intervals * combinations > MOST_SAMPLES:
+        raise InputError(
+            f"these are {intervals * combinations} samples, "
+            f"{intervals} intervals under {combinations} combinations of [each]; "
+            f"{MOST_SAMPLES} are allowed: split the file, each part into a folder of its own, "
+            "as rtradar train takes several"
+        )
+
+
+def read_spec(path: Path) -> Spec:
+    """Read the specification of a data set from a TOML file.
+
+    InputError, in one line with the file and the key, if the file cannot be read, a key is unknown,
+    a value is invalid, or a file that it names is missing.
+    """
+    table = read_toml(path, "data set", "give a TOML file")
+    try:
+        # The path is absolute, because other processes read the meshes of scenes.
+        return _spec(table, path.resolve().parent)
+    except InputError as error:
+        raise InputError(f"data set file '{path}': {error}") from None
+
+
+def _spec(table: Table, folder: Path) -> Spec:
+    check_keys("", table, (), _TOP)
+    drawn_table, each = table_at("drawn", table), table_at("each", table)
+    check_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
+    check_keys("[each] ", each, (), tuple(_EACH))
+    for key in drawn_table:
+        if key in each:
+            raise InputError(f"{key} stands under [each] and under [drawn]; give it once")
+    interval_table = table_at("windows", table)
+    check_keys("[windows] ", interval_table, (), INTERVAL_KEYS)
+    intervals = Intervals.read("[windows]", interval_table)
+    actors = _actors(table)
+    beside = _folder(table, folder)
+    recordings = tuple(
+        _recorded(where, one, interval_table, beside)
+        for where, one in tables_at("recordings", table)
+    )
+    if not actors and not recordings:
+        raise InputError("there is neither [[synthetic]] nor [[recordings]]; give one of them")
+    if actors and intervals.needed_s is None:
+        raise InputError(
+            "[windows] duration_s is missing; synthetic actors have no end of their own"
+        )
+    lists = {key: _several(each, key, usual) for key, usual in _EACH.items()}
+    takes = sum(len(actor.seeds) for actor in actors)
+    count = takes * intervals.count(intervals.needed_s)
+    count += sum(recorded.intervals.count() for recorded in recordings)
+    check_samples(count, math.prod(map(len, lists.values())))  # before combinations are made
+    drawn = {
+        key: _range(key, drawn_table.get(key, usual), least, most)
+        for key, (usual, least, most) in DRAWN.items()
+    }
+    run = _run_settings(table)
+    return Spec(run, intervals, _combinations(lists, folder), drawn, actors, recordings)
+
+
+def _run_settings(table: Table) -> RunSettings:
+    given = {key: table[key] for key in RUN_KEYS if key in table}
+    for key, allowed in _NAMED.items():
+        value = given.get(key)
+        if key in given and not (isinstance(value, str) and value in allowed):
+            raise InputError(f"{key} = {shown(value)}; allowed: {', '.join(allowed)}")
+    for key in _SWITCHES:
+        if not isinstance(given.get(key, True), bool):
+            raise InputError(f"{key} = {shown(given[key])}; allowed: true, false")
+    for key in _WINDOWS:
+        value = given.get(key, "hann")
+        if not isinstance(value[0] if isinstance(value, list) and value else value, str):
+            raise InputError(
+                f"{key} = {shown(value)}; it must be a name, or a list of a name and a number"
+            )
+    if "pfa" in given:
+        given["pfa"] = check_number("data set", "pfa", given["pfa"], 1e-15, 0.5)
+    if "order" in given:
+        _whole("", "order", given["order"], _MOST_ORDER)
+    run = RunSettings(seed=check_seed("", table.get("seed", 0)), **given)
+    windows = WindowFunctions(run.range_window, run.doppler_window)
+    return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
+
+
+def _folder(table: Table, beside: Path) -> Path:
+    """Folder of the recordings, below the file's own or below that of an environment variable."""
+    named = check_text("data set", "folder", table.get("folder", "."))
+    allowed, below = beside, named
+    if variable := _VARIABLE.match(named):
+        if not os.environ.get(variable[1]):
+            raise InputError(
+                f"folder = {shown(named)}: the environment has no such variable; "
+                "set it to the folder of recordings"
+            )
+        allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
+    there = inside(allowed, below)
+    if there is None:
+        raise InputError(
+            f"folder = {shown(named)} leaves the folder of the file; "
+            "put recordings below it, or name a variable of the "
+            'environment that holds their folder: "${RECORDINGS}"'
+        )
+    if not there.is_dir():
+        raise InputError(f"folder = {shown(named)}: there is no such folder")
+    return there
+
+
+def _combinations(each: Mapping[str, list[Any]], folder: Path) -> tuple[Combination, ...]:
+    radars = [_loaded("radar", value, folder, Radar.load) for value in each["radar"]]
+    scenes = [_loaded("scene", value, folder, Scene.load) for value in each["scene"]]
+    models = [check_text("[each]", "fidelity", value) for value in each["fidelity"]]
+    for model in models:
+        if model not in MODELS:
+            raise InputError(
+                f"[each] fidelity = {shown(model)} is unknown; allowed: {', '.join(MODELS)}"
+            )
+
+    def number(key: str, value: object) -> float | None:
+        return None if value is None else check_number("[each]", key, value, *DRAWN[key][1:])
+
+    def place(key: str, value: object, size: int) -> dict[str, Any]:
+        return {} if value is None else {key: check_vector("[each]", key, value, size, 100.0)}
+
+    numbers = [[number(key, one) for one in each[key]] for key in ("heading_deg", "snr_db")]
+    sizes = {"person_position_m": 2, "radar_position_m": 3}
+    places = [[place(key, one, size) for one in each[key]] for key, size in sizes.items()]
+    placed = [
+        dataclasses.replace(scene, **person, **radar)
+        for scene, person, radar in itertools.product(scenes, *places)
+    ]
+    values = itertools.product(radars, placed, models, *numbers)
+    return tuple(itertools.starmap(Combination, values))
+
+
+def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
+    values = each.get(key, usual)
+    if not isinstance(values, list) or not values:
+        raise InputError(f"[each] {key} = {shown(values)}; it must be a list, not empty")
+    different = {
+        tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
+        for value in values
+    }
+    if len(different) < len(values):
+        raise InputError(f"[each] {key} = {shown(values)}; a value stands there twice")
+    return values
+
+
+def _comparable(value: object) -> object:
+    """Return numbers and texts unchanged; tables and lists, refused later, become their repr."""
+    return value if isinstance(value, int | float | str | None) else repr(value)
+
+
+def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
+    source = check_text("[each]", key, value)
+    if source.endswith(".toml") and inside(folder, source) is None:
+        raise InputError(
+            f"[each] {key} = {shown(source)} leaves the folder of the file; "
+            "put it beside it or below"
+        )
+    try:
+        return load(folder / source if source.endswith(".toml") else source)
+    except InputError as error:
+        raise InputError(f"[each] {key}: {error}") from None
+
+
+def _actors(table: Table) -> tuple[Actor, ...]:
+    found: dict[str, Actor] = {}
+    for where, one in tables_at("synthetic", table):
+        check_keys(where, one, *_SYNTHETIC)
+        label = check_text(where.strip(), "label", one["label"])
+        if label not in ACTIVITIES:
+            raise InputError(
+                f"{where}label = {shown(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+            )
+        if ("count" in one) == ("seeds" in one):
+            raise InputError(f"{where}: give count or seeds, one of them")
+        seeds = _numbers(where, "seeds" if "seeds" in one else "count", one)
+        subjects = _numbers(where, "subjects", {"subjects": 10, **one})
+        if label in found:
+            raise InputError(
+                f"[[synthetic]] label = '{label}' stands there twice; give its takes together"
+            )
+        found[label] = Actor(label, seeds, subjects)
+    return tuple(found.values())
+
+
+def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
+    """Return a list of whole numbers as it is, or for a count all numbers below it."""
+    value = table[key]
+    if isinstance(value, list) and value and len(set(map(str, value))) == len(value):
+        return tuple(_whole(where, key, number) for number in value)
+    if isinstance(value, list):
+        raise InputError(
+            f"{where}{key} = {shown(value)}; "
+            "it must be a list of different whole numbers, not empty"
+        )
+    count = _whole(where, key, value)
+    if count == 0:
+        raise InputError(f"{where}{key} = 0; it must be at least 1")
+    return tuple(range(count))
+
+
+def _recorded(where: str, table: Table, intervals: Table, folder: Path) -> Recorded:
+    check_keys(where, table, *_RECORDING)
+    place = where.strip()
+    texts = {key: check_text(place, key, table[key]) for key in _RECORDING[0]}
+    skeleton = check_text(place, "skeleton", table["skeleton"]) if "skeleton" in table else None
+    for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
+        if name is not None and inside(folder, name) is None:
+            raise InputError(
+                f"{where}{key} = {shown(name)} leaves the folder of recordings; "
+                "name files in it or below"
+            )
+        if name is not None and not (folder / name).is_file():
+            raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")
+    own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
+    return Recorded(
+        name=(name := texts.pop("file")),
+        path=folder / name,
+        skeleton=None if skeleton is None else folder / skeleton,
+        intervals=Intervals.read(place, {**intervals, **own}),
+        **texts,
+    )
+
+
+def _range(key: str, value: object, least: float, most: float) -> tuple[float, float]:
+    if not isinstance(value, list | tuple) or len(value) != 2:
+        raise InputError(f"[drawn] {key} = {shown(value)}; it must be a range: [least, most]")
+    low, high = (check_number("[drawn]", key, end, least, most) for end in value)
+    if low > high:
+        raise InputError(f"[drawn] {key} = {shown(value)}; the least must come first")
+    return low, high
+
+
+def _whole(where: str, key: str, value: object, most: int = _MOST) -> int:
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
+        raise InputError(
+            f"{where}{key} = {shown(value)}; it must be a whole number from 0 to {most}"
+        )
+    return value

@@ -23,32 +23,13 @@ if missing := [
 
 if TYPE_CHECKING:
     from rtradar.classify.baselines import judge_baselines
+    from rtradar.classify.outcomes import Outcome
     from rtradar.classify.pointnet import PointNet
     from rtradar.classify.prepare import stack_clouds
     from rtradar.classify.recipes import LEAN, PAPER, Recipe
     from rtradar.classify.splits import Split, make_splits
-    from rtradar.classify.store import Outcome
     from rtradar.classify.study import Study, load_network, load_study, train_study
     from rtradar.classify.training import Examples, predict, train_network
-
-_HOME = {
-    "LEAN": "recipes",
-    "PAPER": "recipes",
-    "Examples": "training",
-    "Outcome": "store",
-    "PointNet": "pointnet",
-    "Recipe": "recipes",
-    "Split": "splits",
-    "Study": "study",
-    "judge_baselines": "baselines",
-    "load_network": "study",
-    "load_study": "study",
-    "make_splits": "splits",
-    "predict": "training",
-    "stack_clouds": "prepare",
-    "train_network": "training",
-    "train_study": "study",
-}
 
 __all__ = [
     "LEAN",
@@ -68,10 +49,21 @@ __all__ = [
     "train_network",
     "train_study",
 ]
+_NAMES = {
+    "baselines": ("judge_baselines",),
+    "outcomes": ("Outcome",),
+    "pointnet": ("PointNet",),
+    "prepare": ("stack_clouds",),
+    "recipes": ("LEAN", "PAPER", "Recipe"),
+    "splits": ("Split", "make_splits"),
+    "study": ("Study", "load_network", "load_study", "train_study"),
+    "training": ("Examples", "predict", "train_network"),
+}
+_HOME = {name: module for module, names in _NAMES.items() for name in names}
 
 
 def __getattr__(name: str) -> Any:
-    """Load only what is used: recipes and splits do not need torch."""
-    if name in _HOME:
+    """Load the module that defines a name when it is used, as recipes and splits need no torch."""
+    if name in __all__:
         return getattr(import_module(f"rtradar.classify.{_HOME[name]}"), name)
     raise AttributeError(f"module 'rtradar.classify' has no attribute '{name}'")

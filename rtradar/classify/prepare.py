@@ -8,8 +8,8 @@ a motion say nothing of its kind, and velocity from zero. The paper normalises c
 neither how nor in what units.
 
 Augmented clouds resemble those of other recordings: ``physical`` shifts and stretches them as
-`Variation` says. ``turned`` is the augmentation of the paper's own program, a rotation by a random
-angle in the plane of time and velocity, and jitter; no motion gives such clouds.
+`Variation` says. ``rotation`` is the augmentation of the paper's own program, a rotation by a
+random angle in the plane of time and velocity, and jitter; no motion gives such clouds.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ import torch
 from torch import Tensor
 
 from rtradar.classify.recipes import Augmentation, Scaling
-from rtradar.clouds.collection import Collection
+from rtradar.clouds.dataset_store import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import stream
 
@@ -100,9 +100,9 @@ def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
     return torch.from_numpy(stacked)
 
 
-def drawn(stacked: Tensor, n_points: int, *, redraw: bool) -> Tensor:
+def sampled(stacked: Tensor, n_points: int, *, resample: bool) -> Tensor:
     """Take ``n_points`` of every cloud: the first ones, or others at every call."""
-    if not redraw:
+    if not resample:
         return stacked[:, :n_points]
     order = torch.rand(stacked.shape[:2]).argsort(dim=1)[:, :n_points]
     return stacked.gather(1, order[..., None].expand(-1, -1, 3))
@@ -120,7 +120,7 @@ def scaled(points: Tensor, scaling: Scaling) -> Tensor:
 
 def for_training(points: Tensor, augmentation: Augmentation, scaling: Scaling) -> Tensor:
     """Augment and scale clouds with torch's random generator."""
-    if augmentation == "turned":
+    if augmentation == "rotation":
         return _rotated(scaled(points, scaling))
     if augmentation == "none":
         return scaled(points, scaling)

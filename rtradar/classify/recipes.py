@@ -4,20 +4,26 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from rtradar.errors import InputError
 
-Schedule = Literal["halving", "one-cycle"]
+Schedule = Literal["step", "one-cycle"]
 Scaling = Literal["unit-sphere", "physical"]
-Augmentation = Literal["none", "turned", "physical"]
+Augmentation = Literal["none", "rotation", "physical"]
 Precision = Literal["float32", "bfloat16"]
 
-SCHEDULES: tuple[Schedule, ...] = ("halving", "one-cycle")
-SCALINGS: tuple[Scaling, ...] = ("unit-sphere", "physical")
-AUGMENTATIONS: tuple[Augmentation, ...] = ("none", "turned", "physical")
-PRECISIONS: tuple[Precision, ...] = ("float32", "bfloat16")
+_CHOICES = {
+    "schedule": get_args(Schedule),
+    "scaling": get_args(Scaling),
+    "augmentation": get_args(Augmentation),
+    "precision": get_args(Precision),
+}
+_FILE_KEYS = {"resample": "redraw", "step_epochs": "halve_every"}
+_FILE_VALUES = {"step": "halving", "rotation": "turned"}
+"""Names and values in the files of studies, where they differ from those of `Recipe`."""
 
 
 @dataclass(frozen=True)
@@ -36,15 +42,15 @@ class Recipe:
     epochs : int
         Number of passes over the training clouds, at least 1.
     rate : float
-        Learning rate: the initial one of ``halving``, the peak of ``one-cycle``.
-    schedule : {"halving", "one-cycle"}
-        Schedule of the learning rate. ``halving`` is a step schedule that halves the rate every
-        ``halve_every`` epochs. ``one-cycle`` rises linearly over the first tenth of all batches and
-        falls to 0 along a cosine.
-    halve_every : int
-        Number of epochs between two steps of ``halving``.
+        Learning rate: the initial one of ``step``, the peak of ``one-cycle``.
+    schedule : {"step", "one-cycle"}
+        Schedule of the learning rate. ``step`` halves the rate every ``step_epochs`` epochs.
+        ``one-cycle`` rises linearly over the first tenth of all batches and falls to 0 along a
+        cosine.
+    step_epochs : int
+        Number of epochs between two steps of ``step``.
     stop_below : float
-        Rate below which ``halving`` ends early, because further epochs have no visible effect; 0
+        Rate below which ``step`` ends early, because further epochs have no visible effect; 0
         disables this.
     weight_decay : float
         Decoupled weight decay of AdamW; 0 gives Adam.
@@ -54,9 +60,9 @@ class Recipe:
         Fraction of the last hidden layer that is dropped at random, at least 0 and below 1.
     scaling : {"unit-sphere", "physical"}
         Normalisation of time, range and velocity, see `rtradar.classify.prepare`.
-    redraw : bool
+    resample : bool
         Whether the points of a cloud are resampled in every epoch; otherwise they stay the same.
-    augmentation : {"none", "turned", "physical"}
+    augmentation : {"none", "rotation", "physical"}
         Augmentation of training clouds, see `rtradar.classify.prepare`.
     precision : {"float32", "bfloat16"}
         Precision of the search for the maximum over the points during training. Values, gradients
@@ -80,20 +86,20 @@ class Recipe:
     batch: int = 3
     epochs: int = 200
     rate: float = 1e-4
-    schedule: Schedule = "halving"
-    halve_every: int = 10
+    schedule: Schedule = "step"
+    step_epochs: int = 10
     stop_below: float = 1e-6
     weight_decay: float = 0.0
     input_transform: bool = True
     feature_transform: bool = True
     dropout: float = 0.3
     scaling: Scaling = "physical"
-    redraw: bool = False
+    resample: bool = False
     augmentation: Augmentation = "none"
     precision: Precision = "float32"
 
     def __post_init__(self) -> None:
-        for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("halve_every", 1)):
+        for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("step_epochs", 1)):
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int) or value < least:
                 raise InputError(
@@ -112,16 +118,13 @@ class Recipe:
             raise InputError(
                 f"recipe: dropout = {self.dropout!r}; it must be at least 0 and below 1"
             )
-        for field, allowed in (
-            ("schedule", SCHEDULES),
-            ("scaling", SCALINGS),
-            ("augmentation", AUGMENTATIONS),
-            ("precision", PRECISIONS),
-        ):
-            if getattr(self, field) not in allowed:
+        words = {old: new for new, old in _FILE_VALUES.items()}
+        for field, allowed in _CHOICES.items():
+            value = words.get(getattr(self, field), getattr(self, field))
+            object.__setattr__(self, field, value)
+            if value not in allowed:
                 raise InputError(
-                    f"recipe: {field} = {getattr(self, field)!r}; "
-                    f"it must be one of {', '.join(allowed)}"
+                    f"recipe: {field} = {value!r}; it must be one of {', '.join(allowed)}"
                 )
 
     @property
@@ -129,10 +132,8 @@ class Recipe:
         """Number of epochs that are run: all, or those with a rate of at least ``stop_below``."""
         if self.schedule == "one-cycle":
             return self.epochs
-        return next(
-            (epoch for epoch in range(1, self.epochs) if self._stepped(epoch) < self.stop_below),
-            self.epochs,
-        )
+        epochs = range(1, self.epochs)
+        return next((e for e in epochs if self._stepped(e) < self.stop_below), self.epochs)
 
     def rate_at(self, epoch: int, progress: float) -> float:
         """Return the learning rate of a batch.
@@ -148,18 +149,16 @@ class Recipe:
         -------
         float
         """
-        if self.schedule == "halving":
+        if self.schedule == "step":
             return self._stepped(epoch)
         done = (epoch + progress) / self.epochs
         warm = 0.1
-        return self.rate * (
-            max(done, 1e-3) / warm
-            if done < warm
-            else (1 + math.cos(math.pi * (done - warm) / (1 - warm))) / 2
-        )
+        if done < warm:
+            return self.rate * max(done, 1e-3) / warm
+        return self.rate * (1 + math.cos(math.pi * (done - warm) / (1 - warm))) / 2
 
     def _stepped(self, epoch: int) -> float:
-        return self.rate * 0.5 ** (epoch // self.halve_every)
+        return self.rate * 0.5 ** (epoch // self.step_epochs)
 
     def changed(self, **fields: Any) -> Recipe:
         """Return a copy with other values; fields given as None keep theirs.
@@ -178,8 +177,25 @@ class Recipe:
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """Return the fields by name as plain values."""
-        return dataclasses.asdict(self)
+        """Return the fields as plain values, with the names and words of the files of studies."""
+        fields = dataclasses.asdict(self).items()
+        return {_FILE_KEYS.get(key, key): _FILE_VALUES.get(value, value) for key, value in fields}
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Recipe:
+        """Make the recipe that `as_dict` described.
+
+        Parameters
+        ----------
+        content : mapping
+            Plain values.
+
+        Returns
+        -------
+        Recipe
+        """
+        names = {old: new for new, old in _FILE_KEYS.items()}
+        return cls(**{names.get(key, key): value for key, value in content.items()})
 
 
 PAPER = Recipe("paper")
@@ -194,7 +210,7 @@ LEAN = Recipe(
     weight_decay=1e-2,
     input_transform=False,
     feature_transform=False,
-    redraw=True,
+    resample=True,
     augmentation="physical",
 )
 """Our baseline: larger batches at a higher rate, resampled points, augmented clouds, no T-Nets.

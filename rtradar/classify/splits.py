@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds.collection import Collection
+from rtradar.clouds.dataset_store import Collection
 from rtradar.errors import InputError
 from rtradar.system.seeds import word
 

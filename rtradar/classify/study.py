@@ -1,10 +1,16 @@
-"""Studies: all trainings of one recipe on the splits of one data set, in one folder."""
+"""Studies: all trainings of one recipe on the splits of one data set, in one folder.
+
+The folder has a plan, and a folder for each training with its checkpoint and its outcome. Every
+file is written beside its place and then renamed, so that it is either complete or absent.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import json
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,42 +21,36 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from rtradar.classify.outcomes import Outcome, load_outcome, outcome_of, save_outcome
 from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
 from rtradar.classify.splits import chosen, make_splits, values_of
-from rtradar.classify.store import (
-    PLAN,
-    Outcome,
-    check_plan,
+from rtradar.classify.training import (
+    Examples,
+    check_points,
     load_checkpoint,
-    load_outcome,
-    outcome_of,
-    read_plan,
-    save_outcome,
-    write_plan,
+    predict,
+    train_network,
 )
-from rtradar.classify.training import Examples, check_points, predict, train_network
-from rtradar.clouds.collection import Collection
+from rtradar.clouds.dataset_store import Collection
 from rtradar.errors import InputError
-from rtradar.system.files import remove_parts
+from rtradar.system.files import atomic_file, read_json, remove_parts
 
+PLAN = "plan.json"
+"""Name of the file that states what is trained in a folder."""
+
+_PLAN_KEYS = (
+    "data", "clouds", "fingerprint", "classes", "recipe", "split", "folds", "seed", "trainings",
+)  # fmt: skip
+_MAX_NAMES = 10_000  # of classes and of trainings
 _CHECKPOINT, _OUTCOME = "checkpoint.pt", "outcome.json"
 _MADE = (
-    "recording_digest",
-    "radar",
-    "radar_parameters",
-    "scene",
-    "scene_digest",
-    "fidelity",
-    "snr_db",
-    "heading_deg",
-    "person_position_m",
-    "radar_position_m",
-    "pfa",
-    "clutter_removal",
+    "recording_digest", "radar", "radar_parameters", "scene", "scene_digest", "fidelity", "snr_db",
+    "heading_deg", "person_position_m", "radar_position_m", "pfa", "clutter_removal",
+    "detector", "range_window", "doppler_window", "body_material", "order", "keep_all", "spreading",
     "version",
-)
+)  # fmt: skip
 """Provenance entries by which clouds of the same intervals may differ, if the data set has them."""
 
 
@@ -80,12 +80,86 @@ class Study:
         return f"{self.plan['recipe']['name']}, {self.plan['recipe']['points']} points"
 
 
+def check_plan(out: Path, plan: dict[str, Any]) -> None:
+    """Raise InputError if the folder holds another plan; only ``data`` may differ."""
+    path = out / PLAN
+    try:
+        if not os.path.lexists(path):
+            if found := sorted(out.glob("training-*")):
+                raise InputError(
+                    f"'{out}' holds '{found[0].name}', but no {PLAN} of rtradar; "
+                    "give another folder (--out)"
+                )
+            return
+    except OSError as error:  # such as a name that is too long
+        raise _unwritable(out, error) from None
+    try:
+        there = read_json(path)
+        free = {"data"} | ({"made"} - there.keys())
+        other = next(
+            (name for name, value in plan.items() if name not in free and there.get(name) != value),
+            None,
+        )
+    except (OSError, ValueError, AttributeError):
+        raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
+    if other is not None:
+        was, now = _difference(there.get(other), plan[other])
+        raise InputError(
+            f"'{out}' holds other trainings ({other}: {was}, not {now}); "
+            "give another folder (--out)"
+        )
+
+
+def write_plan(out: Path, plan: dict[str, Any]) -> None:
+    """Write the plan into the folder, which is made if it does not exist."""
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise _unwritable(out, error) from None
+    with atomic_file(out / PLAN) as file:
+        file.write((json.dumps(plan, indent=1) + "\n").encode())
+
+
+def read_plan(folder: Path) -> dict[str, Any]:
+    """Read the plan of a folder; InputError if it is missing or damaged."""
+    try:
+        plan = read_json(folder / PLAN)
+        Recipe.from_dict(plan["recipe"])
+        for name in ("data", "classes", "trainings"):
+            known = len(plan[name]) <= _MAX_NAMES and all(
+                isinstance(one, str) for one in plan[name]
+            )
+            if not known or (name != "data" and not plan[name]):
+                raise ValueError
+        return {name: plan[name] for name in _PLAN_KEYS} | {"made": plan.get("made")}
+    except OSError as error:
+        raise InputError(
+            f"'{folder}' holds no trainings ({PLAN}: {error.strerror}); "
+            "make them with: rtradar train"
+        ) from None
+    except (ValueError, KeyError, TypeError):
+        raise InputError(f"'{folder / PLAN}' is damaged; train into another folder") from None
+
+
+def _unwritable(out: Path, error: OSError) -> InputError:
+    return InputError(
+        f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+    )
+
+
+def _difference(was: Any, now: Any) -> tuple[Any, Any]:
+    """Both values, or the first entry in which two dictionaries differ."""
+    if isinstance(was, dict) and isinstance(now, dict):
+        name = next(name for name in {**was, **now} if was.get(name) != now.get(name))
+        return f"{name} {was.get(name)}", f"{now.get(name)}"
+    return was, now
+
+
 def train_study(
     clouds: Collection,
     out: Path,
     recipe: Recipe,
     *,
-    data: Sequence[str] = (),
     split: str = "folds",
     folds: int | None = None,
     seed: int = 0,
@@ -102,10 +176,8 @@ def train_study(
         Output folder, which is created if necessary. A folder of the same plan is continued.
     recipe : Recipe
         Hyperparameters of the trainings.
-    data : sequence of str
-        Folders of the clouds, to be stated in the plan.
     split, folds, seed
-        Arguments of `rtradar.classify.splits.make_splits`. The seed is used for the trainings too.
+        Arguments of `rtradar.classify.make_splits`. The seed is used for the trainings too.
     only : sequence of int, optional
         Numbers of the trainings to run, from 1; all by default.
     device : torch.device, optional
@@ -124,7 +196,7 @@ def train_study(
     numbers = chosen(splits, only)
     names, truth = classes_of(clouds)
     plan = {
-        "data": list(data),
+        "data": [str(folder.resolve()) for folder in clouds.folders],
         "clouds": len(clouds),
         "fingerprint": fingerprint(clouds),
         "made": made(clouds),
@@ -137,9 +209,7 @@ def train_study(
     }
     check_plan(out, plan)
     values = values_of(clouds, split)
-    missing = [
-        number for number in numbers if not (training_folder(out, number) / _OUTCOME).exists()
-    ]
+    missing = [n for n in numbers if not (training_folder(out, n) / _OUTCOME).exists()]
     if missing:
         examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
         check_points(examples, recipe)
@@ -147,40 +217,46 @@ def train_study(
     with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:
         bar.update((len(numbers) - len(missing)) * recipe.epochs_run)
         for number in missing:
-            one, folder = splits[number], training_folder(out, number)
-            folder.mkdir(exist_ok=True)
-            if folder.is_symlink():
-                raise InputError(
-                    f"'{folder}' is a link, and its training would be written elsewhere; "
-                    "give another folder (--out)"
-                )
-            remove_parts(folder, rf"{re.escape(_CHECKPOINT)}|{re.escape(_OUTCOME)}")
-            start = bar.n
-
-            def show(
-                epoch: int, row: dict[str, float], start: int = start, name: str = one.name
-            ) -> None:
-                bar.set_description(name)
-                bar.set_postfix_str(
-                    f"loss {row['train_loss']:.2f}, test {row['test_accuracy']:.0%}", refresh=False
-                )
-                bar.update(start + epoch - bar.n)
-
-            train, test = examples.of(one.train), examples.of(one.test)
+            one, folder = splits[number], _made_folder(training_folder(out, number))
+            test = examples.of(one.test)
             network, history = train_network(
-                train,
+                examples.of(one.train),
                 test,
                 recipe,
                 seed=seed,
                 device=device,
                 checkpoint=folder / _CHECKPOINT,
-                on_epoch=show,
+                on_epoch=_shown(bar, one.name),
             )
             predicted = predict(network, test, recipe).argmax(axis=1)
-            save_outcome(
-                folder / _OUTCOME, outcome_of(clouds, one, values, truth, predicted, history)
-            )
+            outcome = outcome_of(clouds, one, values, truth, predicted, history)
+            save_outcome(folder / _OUTCOME, outcome)
     return load_study(out)
+
+
+def _made_folder(folder: Path) -> Path:
+    """Make the folder of a training, without partial files of an earlier one."""
+    folder.mkdir(exist_ok=True)
+    if folder.is_symlink():
+        raise InputError(
+            f"'{folder}' is a link, and its training would be written elsewhere; "
+            "give another folder (--out)"
+        )
+    remove_parts(folder, rf"{re.escape(_CHECKPOINT)}|{re.escape(_OUTCOME)}")
+    return folder
+
+
+def _shown(bar: Any, name: str) -> Callable[[int, dict[str, float]], None]:
+    """Return what moves the progress bar after each epoch of a training."""
+    start = bar.n
+
+    def show(epoch: int, row: dict[str, float]) -> None:
+        bar.set_description(name)
+        scores = f"loss {row['train_loss']:.2f}, test {row['test_accuracy']:.0%}"
+        bar.set_postfix_str(scores, refresh=False)
+        bar.update(start + epoch - bar.n)
+
+    return show
 
 
 def load_study(folder: Path) -> Study:
@@ -229,7 +305,7 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
     Returns
     -------
     network : PointNet
-        Network in evaluation mode, see `rtradar.classify.training.predict`.
+        Network in evaluation mode, see `rtradar.classify.predict`.
     recipe : Recipe
         Recipe by which clouds are sampled and scaled for the network.
     classes : tuple of str
@@ -241,7 +317,7 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
         If there is no such training, or its checkpoint cannot be read safely.
     """
     plan = read_plan(folder)
-    recipe, classes = Recipe(**plan["recipe"]), tuple(plan["classes"])
+    recipe, classes = Recipe.from_dict(plan["recipe"]), tuple(plan["classes"])
     path = training_folder(folder, number - 1) / _CHECKPOINT
     network = PointNet(len(classes), recipe)
     try:

@@ -1,12 +1,18 @@
-"""Training of one network, epoch by epoch; it can be interrupted and continued at any time."""
+"""Training of one network, epoch by epoch; it can be interrupted and continued at any time.
+
+The state is kept in a checkpoint, which is read without running any code that it may contain.
+"""
 
 from __future__ import annotations
 
+import io
+import os
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+import zipfile
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 import torch
@@ -15,10 +21,10 @@ from torch import Tensor
 from torch.nn import functional
 
 from rtradar.classify.pointnet import PointNet
-from rtradar.classify.prepare import drawn, for_training, scaled
+from rtradar.classify.prepare import for_training, sampled, scaled
 from rtradar.classify.recipes import Precision, Recipe
-from rtradar.classify.store import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.errors import BackendError, InputError
+from rtradar.system.files import atomic_file, open_regular
 from rtradar.system.seeds import stream
 
 SKEWNESS_WEIGHT = 1e-3
@@ -28,6 +34,7 @@ SAVE_EVERY_S = 15.0
 """Time between checkpoints [s], the most that a kill costs beside one epoch."""
 
 _MAX_MONITORED = 100  # test clouds of the learning curves; the outcome uses all
+_MAX_BYTES = 1_000_000_000  # PointNet with its optimiser takes 42 MB
 
 Row = dict[str, float]
 
@@ -39,7 +46,7 @@ class Examples:
     Parameters
     ----------
     points : (cloud, point, 3) float32 tensor
-        Clouds from `rtradar.classify.prepare.stack_clouds`.
+        Clouds from `rtradar.classify.stack_clouds`.
     classes : (cloud,) int64 tensor
         Class numbers, indices into ``names``.
     names : tuple of str
@@ -144,38 +151,35 @@ def train_network(
     if len(train.points) < 2:
         raise InputError(f"{len(train.points)} training cloud: batch norm needs at least 2")
     device = device or torch.device("cpu")
-    with _random_numbers(device):
+    monitored = test.of(np.arange(0, len(test.points), -(-len(test.points) // _MAX_MONITORED)))
+    # Torch's random state is restored afterwards.
+    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         torch.manual_seed(_number(seed, 0))
         network = PointNet(len(train.names), recipe).to(device)
         optimiser = torch.optim.AdamW(
             network.parameters(), lr=recipe.rate, weight_decay=recipe.weight_decay, fused=True
         )
         history: list[Row] = []
-        finished = False
         if checkpoint is not None and checkpoint.exists():
             history = _restore(checkpoint, network, optimiser, recipe)
-            finished = len(history) == recipe.epochs_run
             if history:
                 on_epoch(len(history), history[-1])
-        monitored = test.of(np.arange(0, len(test.points), -(-len(test.points) // _MAX_MONITORED)))
+        finished = bool(history) and len(history) == recipe.epochs_run
         saved = time.monotonic()
         for epoch in range(len(history), recipe.epochs_run):
             began = time.perf_counter()
             torch.manual_seed(_number(seed, 1 + epoch))
-            row = _epoch(network, optimiser, train, recipe, epoch, device) | _evaluate(
-                network, monitored, recipe
-            )
+            row = _train_epoch(network, optimiser, train, recipe, epoch)
+            row |= _evaluate(network, monitored, recipe)
             history.append(row | {"seconds": time.perf_counter() - began})
             if checkpoint is not None and time.monotonic() - saved > SAVE_EVERY_S:
-                state = Checkpoint(
-                    network.state_dict(), optimiser.state_dict(), len(history), history
-                )
-                save_checkpoint(checkpoint, state)
+                state = network.state_dict(), optimiser.state_dict(), len(history), history
+                save_checkpoint(checkpoint, Checkpoint(*state))
                 saved = time.monotonic()
             on_epoch(len(history), history[-1])
-        if checkpoint is not None and not finished:
-            # A finished training needs no optimiser state, two thirds of the file.
-            save_checkpoint(checkpoint, Checkpoint(network.state_dict(), {}, len(history), history))
+    if checkpoint is not None and not finished:
+        # A finished training needs no optimiser state, two thirds of the file.
+        save_checkpoint(checkpoint, Checkpoint(network.state_dict(), {}, len(history), history))
     return network.eval(), history
 
 
@@ -198,7 +202,7 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
     device = next(network.parameters()).device
     network.eval()
     with torch.no_grad():
-        points = drawn(examples.points, recipe.points, redraw=False)
+        points = sampled(examples.points, recipe.points, resample=False)
         # Clouds are independent of each other; batches only limit the memory.
         found = [
             network(scaled(some, recipe.scaling).to(device))[0].cpu()
@@ -207,14 +211,14 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
     return torch.cat(found).numpy()
 
 
-def _epoch(
+def _train_epoch(
     network: PointNet,
     optimiser: torch.optim.Optimizer,
     train: Examples,
     recipe: Recipe,
     epoch: int,
-    device: torch.device,
 ) -> Row:
+    device = next(network.parameters()).device
     network.train()
     n_clouds = len(train.points)
     batches = torch.randperm(n_clouds).tensor_split(max(1, n_clouds // recipe.batch))
@@ -223,7 +227,7 @@ def _epoch(
     for number, batch in enumerate(batches):
         for group in optimiser.param_groups:
             group["lr"] = recipe.rate_at(epoch, number / len(batches))
-        points = drawn(train.points[batch], recipe.points, redraw=recipe.redraw)
+        points = sampled(train.points[batch], recipe.points, resample=recipe.resample)
         points = for_training(points, recipe.augmentation, recipe.scaling).to(device)
         wanted = train.classes[batch].to(device)
         log_probabilities, skewness = network(points)
@@ -258,9 +262,8 @@ def _restore(
         raise InputError(
             f"'{path}' is of another network than recipe '{recipe.name}' makes; give another folder"
         ) from None
-    if state.epochs != len(state.history) or not (
-        state.optimiser or state.epochs == recipe.epochs_run
-    ):
+    complete = state.optimiser or state.epochs == recipe.epochs_run
+    if state.epochs != len(state.history) or not complete:
         raise InputError(
             f"'{path}' holds {state.epochs} epochs of another recipe; give another folder"
         )
@@ -272,8 +275,61 @@ def _number(seed: int, epoch: int) -> int:
     return int(stream(seed, epoch).generate_state(1, np.uint64)[0] >> np.uint64(1))
 
 
-@contextmanager
-def _random_numbers(device: torch.device) -> Iterator[None]:
-    """Restore torch's random state afterwards."""
-    with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
-        yield
+class Checkpoint(NamedTuple):
+    """State from which a training continues as if it had never been interrupted.
+
+    Learning rate and random numbers follow from the number of finished ``epochs``. The state of the
+    optimiser is empty when the training is finished. ``history`` has the quantities of `HISTORY`.
+    """
+
+    network: dict[str, Any]
+    optimiser: dict[str, Any]
+    epochs: int
+    history: list[dict[str, float]]
+
+
+def save_checkpoint(path: Path, state: Checkpoint) -> None:
+    """Write a checkpoint, which replaces an existing one; InputError if it cannot be written."""
+    content = io.BytesIO()  # torch would not report what is wrong with a disk
+    torch.save(state._asdict(), content)
+    with atomic_file(path) as file:
+        file.write(content.getbuffer())
+
+
+def load_checkpoint(path: Path) -> Checkpoint:
+    """Read a checkpoint of tensors and plain values; InputError if it is damaged or holds more."""
+    hint = "remove it to train anew, or give another folder"
+    try:
+        with open_regular(path) as file:
+            if os.fstat(file.fileno()).st_size > _MAX_BYTES:
+                raise InputError(
+                    f"'{path}' is larger than the {_MAX_BYTES / 1e6:.0f} MB that are allowed; "
+                    f"{hint}"
+                )
+            _check_archive(file)
+            file.seek(0)
+            content = torch.load(file, map_location="cpu", weights_only=True)
+    except InputError:
+        raise
+    except OSError as error:
+        raise InputError(f"cannot read '{path}': {error.strerror}; {hint}") from None
+    except Exception as error:  # torch lets any error of its archive reader and unpickler through
+        text = str(error).strip()
+        why = text.splitlines()[0][:80] if text else type(error).__name__
+        raise InputError(
+            f"'{path}' is no checkpoint that can be read safely, or is damaged ({why}); {hint}"
+        ) from None
+    keys, types = Checkpoint._fields, (dict, dict, int, list)
+    fits = isinstance(content, dict) and set(content) == set(keys)
+    if not fits or not all(map(isinstance, map(content.get, keys), types)):
+        raise InputError(
+            f"'{path}' is no checkpoint of rtradar: it must hold {', '.join(keys)}; {hint}"
+        )
+    return Checkpoint(**content)
+
+
+def _check_archive(file: BinaryIO) -> None:
+    """Raise ValueError if the archive is compressed, as its content could then exceed any limit."""
+    with zipfile.ZipFile(file) as archive:
+        if any(entry.compress_type != zipfile.ZIP_STORED for entry in archive.infolist()):
+            raise ValueError("it is compressed")

@@ -73,7 +73,7 @@ def _add_train(train: argparse.ArgumentParser) -> None:
     )
     train.add_argument(
         "--augmentation",
-        help="none, physical, or turned, which is the paper's (default: lean physical, paper none)",
+        help="none, physical, or rotation, which is the paper's (default: lean physical, paper none)",
     )
     train.add_argument(
         "--scaling",
@@ -136,7 +136,7 @@ def _train(options: argparse.Namespace) -> int:
     from rtradar.classify.recipes import RECIPES
     from rtradar.classify.study import train_study
     from rtradar.classify.training import pick_device, pick_precision
-    from rtradar.clouds.collection import Collection
+    from rtradar.clouds.dataset_store import Collection
 
     if options.recipe not in RECIPES:
         raise InputError(
@@ -156,7 +156,6 @@ def _train(options: argparse.Namespace) -> int:
         Collection(*options.data),
         options.out,
         recipe,
-        data=[str(folder.resolve()) for folder in options.data],
         split=options.split,
         folds=options.folds,
         seed=options.seed,
@@ -178,7 +177,7 @@ def _evaluate(options: argparse.Namespace) -> int:
     baselines = {}
     if options.baselines:
         from rtradar.classify.baselines import judge_baselines
-        from rtradar.clouds.collection import Collection
+        from rtradar.clouds.dataset_store import Collection
 
         baselines = judge_baselines(
             Collection(*(options.data or studies[0].plan["data"])), studies[0]

@@ -76,7 +76,7 @@ def _view(options: argparse.Namespace) -> int:
 
 def _own_page(folder: Path) -> Path:
     """Where the page goes unless told otherwise; InputError where that would replace what rtradar did not write."""
-    from rtradar.report.pages.frame import is_page
+    from rtradar.report.pages.html import is_page
 
     page = folder / "view.html"
     if os.path.lexists(page) and not is_page(page):

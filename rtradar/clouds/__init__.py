@@ -1,8 +1,7 @@
-"""Point clouds from detections."""
+"""Point clouds from detections, their files, and data sets of labelled clouds."""
 
-from rtradar.clouds.collection import Collection
-from rtradar.clouds.dataset_store import Sample
-from rtradar.clouds.files import RDT_AXES, RDT_UNITS, save_cloud_npz, save_ply
+from rtradar.clouds.dataset_store import Collection, Sample
+from rtradar.clouds.files import RDT_AXES, RDT_UNITS, save_cloud_npz, save_ply, save_spatial_npz
 from rtradar.clouds.rdt import (
     RdtCloud,
     RdtCloudResult,
@@ -10,7 +9,7 @@ from rtradar.clouds.rdt import (
     rdt_isosurface,
     sample_centres,
 )
-from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_points
+from rtradar.clouds.spatial import SpatialCloud, spatial_points
 
 __all__ = [
     "RDT_AXES",

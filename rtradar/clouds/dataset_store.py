@@ -1,4 +1,4 @@
-"""Files of a data set: one archive for each sample, and an index of the samples that belong to it.
+"""Data sets of labelled clouds: one archive for each sample, and an index of the samples.
 
 A sample's file is a NumPy archive of ``points``, ``spatial`` and ``about`` (label and provenance as
 JSON). It is not compressed and has fixed dates, so that the same sample gives the same bytes
@@ -66,28 +66,10 @@ def sample_path(folder: Path, identity: str) -> Path:
 
 
 def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike) -> int:
-    """Write the file of a sample and flush it to disk; equal samples give equal bytes.
+    """Write the file of a sample, flush it to disk, and return its size [bytes].
 
-    Parameters
-    ----------
-    folder : path
-        Existing folder of the data set.
-    identity : str
-        Name of the sample.
-    sample : Sample
-        RDT cloud, label and provenance.
-    spatial : (m, 3) float
-        Spatial cloud of the same capture [m].
-
-    Returns
-    -------
-    int
-        Size of the file in bytes.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written. The folder is then unchanged.
+    ``spatial`` (m, 3) is the spatial cloud of the same capture [m]. Equal samples give equal bytes.
+    InputError if the file cannot be written; the folder is then unchanged.
     """
     about = json.dumps(
         {"format": FORMAT, "label": sample.label, "provenance": sample.provenance},
@@ -124,34 +106,17 @@ def is_whole(path: Path) -> bool:
 
 
 def read_sample(path: Path, name: str) -> Any:
-    """Read one entry of a sample's file, without reading the others.
+    """Read one entry of a sample's file: ``points``, ``spatial``, or the dict ``about``.
 
-    The archive holds a checksum for each entry, and its comment marks the end of the file.
-
-    Parameters
-    ----------
-    path : path
-        File of the sample.
-    name : {"points", "spatial", "about"}
-        Entry to read.
-
-    Returns
-    -------
-    (n, 3) float64, or a dict with ``label`` and ``provenance`` for ``about``
-
-    Raises
-    ------
-    InputError
-        If the file is damaged or larger than 200 MB.
+    The others are not read: the archive holds a checksum for each entry, and its comment marks the
+    end of the file. InputError if the file is damaged or larger than 200 MB.
     """
     try:
         with open_regular(path) as file:
             size = os.fstat(file.fileno()).st_size
             if size <= _MAX_BYTES:
                 array = _read_array(file, name)
-                if name == "about":
-                    return _parse_about(array)
-                return array.reshape(-1, 3).astype(np.float64)
+                return _parse_about(array) if name == "about" else array.astype(np.float64)
     except Exception:  # readers of archives and headers raise any type if the file is damaged
         raise InputError(
             f"sample '{path}' is damaged; mend the collection with: rtradar dataset build"
@@ -179,32 +144,21 @@ def _read_array(file: BinaryIO, name: str) -> NDArray[Any]:
 
 def _parse_about(data: NDArray[np.uint8]) -> dict[str, Any]:
     about: dict[str, Any] = json.loads(data.tobytes())
-    if (
-        about["format"] != FORMAT
-        or not isinstance(about["label"], str)
-        or not isinstance(about["provenance"], dict)
-    ):
+    known = about["format"] == FORMAT and isinstance(about["label"], str)
+    if not known or not isinstance(about["provenance"], dict):
         raise ValueError
     return about
 
 
 def sweep(folder: Path) -> int:
-    """Remove the partial files of interrupted writers and return their number.
-
-    No writer may be at work in the folder.
-    """
+    """Remove the partial files of interrupted writers, which must have ended; return how many."""
     return remove_parts(folder, rf"({_IDENTITY.pattern}\.npz|{re.escape(INDEX)})")
 
 
 def write_index(folder: Path, identities: Iterable[str]) -> None:
-    """Write the index, the list of samples that belong to the data set.
+    """Write the list of samples that belong to the data set; the samples need not exist yet.
 
-    The samples need not exist yet.
-
-    Raises
-    ------
-    InputError
-        If the index cannot be written, or its name belongs to a file that is not an index.
+    InputError if it cannot be written, or its name belongs to a file that is not an index.
     """
     path = folder / INDEX
     if os.path.lexists(path) and not _is_index(path):
@@ -217,13 +171,7 @@ def write_index(folder: Path, identities: Iterable[str]) -> None:
 
 
 def read_index(folder: Path) -> tuple[str, ...]:
-    """Read the ids of the samples that belong to the data set, in ascending order.
-
-    Raises
-    ------
-    InputError
-        If the folder holds no index, a damaged one, or one of another format.
-    """
+    """Read the ids of the samples of a data set, ascending; InputError if there is no index."""
     path = folder / INDEX
     try:
         content = read_json(path)
@@ -262,8 +210,8 @@ def _is_index(path: Path) -> bool:
 def _has_index_keys(content: Any) -> bool:
     return (
         isinstance(content, dict)
-        and "format" in content
         and isinstance(content.get("samples"), list)
+        and "format" in content
     )
 
 
@@ -272,3 +220,133 @@ def _write_durably(path: Path, content: bytes) -> None:
         file.write(content)
         file.flush()
         os.fsync(file.fileno())
+
+
+class Collection:
+    """Labelled clouds of one or several folders, ordered by folder and then by id.
+
+    Labels and provenance are read at once, a cloud from its file when it is asked for.
+
+    Parameters
+    ----------
+    *folders : path
+        At least one folder made by ``rtradar dataset build``.
+
+    Attributes
+    ----------
+    folders : tuple of path
+        Folders of the samples.
+
+    Raises
+    ------
+    InputError
+        If no folder is given, samples are missing or damaged, or a sample is in two folders.
+    """
+
+    def __init__(self, *folders: str | Path) -> None:
+        if not folders:
+            raise InputError("no folder of clouds; give at least one of rtradar dataset build")
+        self.folders = tuple(Path(folder) for folder in folders)
+        found = {folder: read_index(folder) for folder in self.folders}
+        self._name = ", ".join(f"'{folder}'" for folder in found)
+        self._paths = [
+            sample_path(folder, identity) for folder, ids in found.items() for identity in ids
+        ]
+        self._ids = tuple(path.stem for path in self._paths)
+        for folder, ids in found.items():
+            missing = sum(not sample_path(folder, identity).is_file() for identity in ids)
+            if missing:
+                raise InputError(
+                    f"collection '{folder}': {missing} of {len(ids)} samples are missing; "
+                    "finish it with: rtradar dataset build"
+                )
+        if len(once := set(self._ids)) < len(self._ids):
+            raise InputError(
+                f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; "
+                "leave one out"
+            )
+        self._about = [read_sample(path, "about") for path in self._paths]
+
+    def __len__(self) -> int:
+        return len(self._ids)
+
+    def __getitem__(self, index: int) -> Sample:
+        about = self._about[index]
+        return Sample(self.points(index), about["label"], about["provenance"])
+
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Id of each sample."""
+        return self._ids
+
+    @property
+    def labels(self) -> NDArray[np.str_]:
+        """Activity of each sample, (sample,)."""
+        return np.array([about["label"] for about in self._about], dtype=np.str_)
+
+    def column(self, name: str) -> NDArray[Any]:
+        """Return one entry of the provenance of each sample, without reading the clouds.
+
+        Parameters
+        ----------
+        name : str
+            Name of the entry, such as ``subject`` or ``snr_db``.
+
+        Returns
+        -------
+        (sample,) ndarray
+            Values of the entry, None for a sample that lacks it.
+
+        Raises
+        ------
+        InputError
+            If no sample has such an entry.
+        """
+        if not any(name in about["provenance"] for about in self._about):
+            known = sorted({key for about in self._about for key in about["provenance"]})
+            raise InputError(
+                f"collection {self._name}: no sample has '{name}'; there are: {', '.join(known)}"
+            )
+        values = [about["provenance"].get(name) for about in self._about]
+        if all(isinstance(value, int | float | str) for value in values):
+            return np.array(values)
+        # Assigned to an object array, because lists of equal length would become a second axis.
+        column = np.empty(len(values), dtype=object)
+        column[:] = values
+        return column
+
+    def points(self, index: int) -> NDArray[np.float64]:
+        """Read the RDT cloud of a sample.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (n, 3) float64
+            Time [s], range [m] and velocity [m/s] of each point.
+        """
+        return np.asarray(read_sample(self._paths[index], "points"))
+
+    def spatial(self, index: int) -> NDArray[np.float64]:
+        """Read the spatial cloud of the same capture.
+
+        Parameters
+        ----------
+        index : int
+            Number of the sample, from 0.
+
+        Returns
+        -------
+        (m, 3) float64
+            World coordinates x, y and z [m] in the order of time; m may be 0. A coordinate that the
+            radar does not measure is NaN in every point (`SpatialCloud`).
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
+        """
+        return np.asarray(read_sample(self._paths[index], "spatial"))

@@ -157,12 +157,8 @@ class RdtCloud:
             If the mask is not a two-dimensional Boolean array of the shape of the last one, or if
             time does not advance.
         """
-        cells = np.array(mask)  # a copy, as the caller may reuse the array before the next slab
-        if cells.ndim != 2 or cells.dtype != np.bool_ or 0 in cells.shape:
-            raise InputError(
-                f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; "
-                "it must be (range, velocity) bool"
-            )
+        # A copy, as the caller may reuse the array before the next slab.
+        cells = _checked(np.array(mask), "cloud: mask", ("range", "velocity"))
         if not np.isfinite(time_s):
             raise InputError(f"RDT cloud: time_s = {time_s!r}; it must be finite")
         if self._last is None:
@@ -195,7 +191,7 @@ class RdtCloud:
         times = np.array([start_s, end_s])
         vertices, faces = _surface(np.stack([first, second]), times, self._radar)
         if len(faces):
-            self._sample.add(_centres(vertices, faces))
+            self._sample.add(vertices[faces].mean(axis=1))
 
 
 def rdt_isosurface(
@@ -224,28 +220,26 @@ def rdt_isosurface(
     InputError
         If the volume is not a three-dimensional Boolean array or the times do not fit it.
     """
-    cells, centres = np.asarray(volume), np.asarray(times, dtype=np.float64)
-    if cells.ndim != 3 or cells.dtype != np.bool_ or 0 in cells.shape:
+    cells = _checked(np.asarray(volume), "volume", ("time", "range", "velocity"))
+    centres = np.asarray(times, dtype=np.float64)
+    fits = centres.shape == cells.shape[:1] and np.isfinite(centres).all()
+    if not fits or (np.diff(centres) <= 0).any():
         raise InputError(
-            f"RDT volume has shape {cells.shape}, type {cells.dtype}; "
-            "it must be (time, range, velocity) bool"
-        )
-    if (
-        centres.shape != cells.shape[:1]
-        or not np.isfinite(centres).all()
-        or (np.diff(centres) <= 0).any()
-    ):
-        raise InputError(
-            f"RDT volume of {cells.shape[0]} windows: "
+            f"RDT volume of {cells.shape[0]} frames: "
             "times must be as many finite, ascending numbers"
         )
-    empty = np.zeros_like(cells[:1])
-    hop = radar.frame_hop_s
-    return _surface(
-        np.concatenate([empty, cells, empty]),
-        np.concatenate([[centres[0] - hop], centres, [centres[-1] + hop]]),
-        radar,
-    )
+    empty, hop = np.zeros_like(cells[:1]), radar.frame_hop_s
+    padded = np.concatenate([[centres[0] - hop], centres, [centres[-1] + hop]])
+    return _surface(np.concatenate([empty, cells, empty]), padded, radar)
+
+
+def _checked(cells: NDArray[np.bool_], name: str, axes: tuple[str, ...]) -> NDArray[np.bool_]:
+    if cells.ndim != len(axes) or cells.dtype != np.bool_ or 0 in cells.shape:
+        raise InputError(
+            f"RDT {name} has shape {cells.shape}, type {cells.dtype}; "
+            f"it must be ({', '.join(axes)}) bool"
+        )
+    return cells
 
 
 def sample_centres(
@@ -275,17 +269,9 @@ def sample_centres(
         If ``n_points`` or ``seed`` is out of its range.
     """
     sample = UniformSample(n_points, seed)
-    sample.add(
-        _centres(
-            np.asarray(vertices, dtype=np.float64).reshape(-1, 3),
-            np.asarray(faces, dtype=np.int64).reshape(-1, 3),
-        )
-    )
+    places = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
+    sample.add(places[np.asarray(faces, dtype=np.int64).reshape(-1, 3)].mean(axis=1))
     return sample.filled()
-
-
-def _centres(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    return vertices[faces].mean(axis=1)
 
 
 def _surface(

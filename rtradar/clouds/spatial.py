@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +11,6 @@ from rtradar.errors import InputError
 from rtradar.process.angles.peaks import Peaks, find_peaks
 from rtradar.process.angles.spectra import AngleSpectra
 from rtradar.radar import Radar
-from rtradar.system.files import atomic_file
 
 SPATIAL_AXES = ("x", "y", "z")
 """Coordinate names of a spatial cloud, along the world axes."""
@@ -132,36 +130,6 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
         (y.power[cell, rank] + z.power[cell, rank]) / 2,
         np.full(len(cell), time_s),
     )
-
-
-def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
-    """Write a spatial cloud as a NumPy archive.
-
-    The archive holds ``points (n, 3)``, ``velocity``, ``power`` and ``time (n,)``, ``axes`` and
-    ``units (3,)``. A coordinate that is not measured is NaN in every point.
-
-    Parameters
-    ----------
-    path : path
-        Output file, which is replaced if it exists.
-    cloud : SpatialCloud
-        Cloud to write, which may be empty.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
-    with atomic_file(path) as file:
-        np.savez_compressed(
-            file,
-            points=cloud.points,
-            velocity=cloud.velocity,
-            power=cloud.power,
-            time=cloud.time,
-            axes=np.array(SPATIAL_AXES),
-            units=np.array(SPATIAL_UNITS),
-        )
 
 
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:

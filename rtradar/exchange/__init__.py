@@ -1,6 +1,6 @@
 """Exchange of IF samples (MATLAB, xarray, int16) and point clouds with other tools."""
 
-from rtradar.exchange.clouds import CloudTable
+from rtradar.clouds.files import CloudTable
 from rtradar.exchange.export import CLOUD_FORMATS, IF_FORMATS, export, read_cloud, read_if
 from rtradar.exchange.recording import IF_AXES, IfCube
 

@@ -1,4 +1,4 @@
-"""One door for every format: what the name of a file says is written, or read."""
+"""Export and import by the suffix of a file, which names its format."""
 
 from __future__ import annotations
 
@@ -10,20 +10,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from rtradar.clouds import files as cloud_files
+from rtradar.clouds.files import CloudTable
 from rtradar.errors import InputError
-from rtradar.exchange.clouds import (
-    CloudTable,
-    checked,
-    read_npz,
-    read_pcd,
-    read_ply,
-    write_npz,
-    write_pcd,
-    write_ply,
-)
-from rtradar.exchange.int16 import read_int16, write_int16
-from rtradar.exchange.mat import read_mat, write_mat
-from rtradar.exchange.netcdf import read_netcdf, write_netcdf
+from rtradar.exchange import if_formats
 from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
 from rtradar.system.output_folder import check_whole
 
@@ -32,39 +22,30 @@ _T = TypeVar("_T")
 IF_FORMATS: Mapping[
     str, tuple[Callable[[Path, IfRecording], dict[str, Any]], Callable[[Path], IfCube]]
 ] = {
-    ".mat": (write_mat, read_mat),
-    ".nc": (write_netcdf, read_netcdf),
-    ".bin": (write_int16, read_int16),
+    ".mat": (if_formats.write_mat, if_formats.read_mat),
+    ".nc": (if_formats.write_netcdf, if_formats.read_netcdf),
+    ".bin": (if_formats.write_int16, if_formats.read_int16),
 }
-"""What writes and reads IF samples, by the suffix of the file."""
+"""Writer and reader of IF samples, by the suffix of the file."""
 
 CLOUD_FORMATS: Mapping[
     str, tuple[Callable[[Path, CloudTable], dict[str, Any]], Callable[[Path], CloudTable]]
 ] = {
-    ".npz": (write_npz, read_npz),
-    ".ply": (write_ply, read_ply),
-    ".pcd": (write_pcd, read_pcd),
+    ".npz": (cloud_files.write_npz, cloud_files.read_npz),
+    ".ply": (cloud_files.write_ply, cloud_files.read_ply),
+    ".pcd": (cloud_files.write_pcd, cloud_files.read_pcd),
 }
-"""What writes and reads point clouds."""
+"""Writer and reader of point clouds, by the suffix of the file."""
 
 _DAMAGE = (
-    OSError,
-    ValueError,
-    KeyError,
-    IndexError,
-    TypeError,
-    EOFError,
-    OverflowError,
-    RuntimeError,
-    zipfile.BadZipFile,
-    zlib.error,
-    struct.error,
-)
-"""What readers say of files that are damaged or something else."""
+    OSError, ValueError, KeyError, IndexError, TypeError, EOFError, OverflowError, RuntimeError,
+    zipfile.BadZipFile, zlib.error, struct.error,
+)  # fmt: skip
+"""Errors of readers of files that are damaged or of another kind."""
 
 
 def export(source: str | Path, out: str | Path) -> dict[str, Any]:
-    """Write what a run left for other tools; the suffix of ``out`` names the format.
+    """Write IF samples or a cloud of a run for other tools; the suffix of ``out`` is the format.
 
     Parameters
     ----------
@@ -77,12 +58,12 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
     Returns
     -------
     dict
-        What was written: ``file``, ``axes``, ``shape``, ``type``, and ``scale`` of whole numbers.
+        Plain values: ``file``, ``axes``, ``shape``, ``type``, and ``scale`` for whole numbers.
 
     Raises
     ------
     InputError
-        Where there is nothing of that kind to write, or the file cannot be written.
+        If the source holds nothing of that kind, or the file cannot be written.
     """
     origin, target = Path(source), Path(out)
     suffix = target.suffix.lower()
@@ -98,9 +79,8 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
                 f"'{origin}' is a folder; name the cloud in it, such as {origin / 'cloud_xyz.npz'}"
             )
         recording = open_recording(origin)
-        said = {"axes": list(IF_AXES), "shape": list(recording.shape)} | IF_FORMATS[suffix][0](
-            target, recording
-        )
+        about = {"axes": list(IF_AXES), "shape": list(recording.shape)}
+        about |= IF_FORMATS[suffix][0](target, recording)
     elif suffix in IF_FORMATS:
         raise InputError(
             f"'{origin}' is no folder; IF samples come from one that rtradar run --save-if made"
@@ -109,19 +89,18 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
         if os.path.isdir(origin.parent):
             check_whole(origin.parent)
         cloud = read_cloud(origin)
-        said = {"axes": list(cloud.names), "shape": list(cloud.values.shape)} | CLOUD_FORMATS[
-            suffix
-        ][0](target, cloud)
-    return {"file": str(target)} | said
+        about = {"axes": list(cloud.names), "shape": list(cloud.values.shape)}
+        about |= CLOUD_FORMATS[suffix][0](target, cloud)
+    return {"file": str(target)} | about
 
 
 def read_if(path: str | Path) -> IfCube:
-    """IF samples, all at once, from a file that `export` wrote or from the folder of a run.
+    """Read IF samples, all at once, from a file that `export` wrote or from the folder of a run.
 
     Parameters
     ----------
     path : path
-        ``.mat``, ``.nc`` or ``.bin``, or the folder of a run that kept its IF samples.
+        File ``.mat``, ``.nc`` or ``.bin``, or the folder of a run that kept its IF samples.
 
     Returns
     -------
@@ -130,25 +109,23 @@ def read_if(path: str | Path) -> IfCube:
     Raises
     ------
     InputError
-        Where it cannot be read.
+        If the file cannot be read.
     """
     place = Path(path)
     if os.path.isdir(place):
         recording = open_recording(place)
         tx, (chirps, *rest) = recording.radar.n_tx, recording.shape
         return IfCube(recording.read(0, chirps * tx).reshape(chirps, *rest), recording.radar)
-    return _read(
-        place, {suffix: reader for suffix, (_, reader) in IF_FORMATS.items()}, "IF samples"
-    )
+    return _read(place, IF_FORMATS, "IF samples")
 
 
 def read_cloud(path: str | Path) -> CloudTable:
-    """A cloud of a run, or one that `export` wrote.
+    """Read a cloud of a run, or one that `export` wrote.
 
     Parameters
     ----------
     path : path
-        ``.npz``, ``.ply`` or ``.pcd``.
+        File ``.npz``, ``.ply`` or ``.pcd``.
 
     Returns
     -------
@@ -157,27 +134,20 @@ def read_cloud(path: str | Path) -> CloudTable:
     Raises
     ------
     InputError
-        Where it cannot be read.
+        If the file cannot be read.
     """
     place = Path(path)
-    return checked(
-        _read(place, {suffix: reader for suffix, (_, reader) in CLOUD_FORMATS.items()}, "a cloud"),
-        place,
-    )
+    return cloud_files.checked(_read(place, CLOUD_FORMATS, "a cloud"), place)
 
 
-def _read(path: Path, readers: Mapping[str, Callable[[Path], _T]], what: str) -> _T:
-    reader = readers.get(path.suffix.lower())
-    if reader is None:
-        raise InputError(f"'{path}': {what} is read from {', '.join(readers)}; give such a file")
+def _read(path: Path, formats: Mapping[str, tuple[Any, Callable[[Path], _T]]], what: str) -> _T:
+    if path.suffix.lower() not in formats:
+        raise InputError(f"'{path}': {what} is read from {', '.join(formats)}; give such a file")
     try:
-        return reader(path)
+        return formats[path.suffix.lower()][1](path)
     except _DAMAGE as error:
-        why = (
-            getattr(error, "strerror", None)
-            or " ".join(str(error).split())[:100]
-            or type(error).__name__
-        )
+        reason = " ".join(str(error).split())[:100] or type(error).__name__
+        why = getattr(error, "strerror", None) or reason
         raise InputError(
             f"cannot read {what} from '{path}': {why}; give a file that rtradar wrote"
         ) from None

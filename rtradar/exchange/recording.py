@@ -10,7 +10,7 @@ import stat
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,10 @@ _MOST_BYTES, _MOST_CHUNK_BYTES = 2**42, 2**34
 """Limits of an array (hours at the paper's rate) and of a chunk; a file may claim any size."""
 
 _MOST_TEXT_BYTES = 1_000_000
+_WAVEFORM = (
+    "start_frequency_hz", "bandwidth_hz", "centre_frequency_hz", "slope_hz_per_s",
+    "sample_rate_hz", "chirp_duration_s", "cycle_duration_s",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -50,18 +54,21 @@ class IfCube:
     radar: Radar
 
 
+class Quantity(NamedTuple):
+    """Array that goes with the samples, under the same name in every format."""
+
+    axes: tuple[str, ...]
+    values: NDArray[np.float64]
+    unit: str
+    meaning: str
+
+
 @dataclass(frozen=True)
 class IfRecording:
-    """IF samples of a run on the disk.
+    """IF samples of a run on the disk, of a radar at its position in the scene.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar at its position in the scene.
-    stored : array-like
-        Samples (chirp, rx, sample) complex64, with the chirps of all Tx in turn.
-    name : str
-        Name in progress bars.
+    ``stored`` is a zarr array (chirp, rx, sample) complex64, with the chirps of all Tx in turn.
+    ``name`` is shown in progress bars.
     """
 
     radar: Radar
@@ -79,6 +86,30 @@ class IfRecording:
         """Number of chirps of each Tx in a block that is stored together."""
         return min(max(1, self.stored.chunks[0] // self.radar.n_tx), self.shape[0])
 
+    @property
+    def radar_text(self) -> str:
+        """The radar as JSON, from which `radar_of` makes it again."""
+        return json.dumps(dataclasses.asdict(self.radar))
+
+    def waveform(self) -> dict[str, float]:
+        """Return the parameters of the waveform, with units in their names."""
+        return {name: getattr(self.radar, name) for name in _WAVEFORM}
+
+    def quantities(self) -> dict[str, Quantity]:
+        """Return times and positions along the axes of the samples."""
+        radar, (chirps, tx, *_) = self.radar, self.shape
+        times = radar.chirp_times(chirps * tx).reshape(chirps, tx)
+        since = "centre of each chirp since the start of the capture"
+        fast = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
+        begun = "time of each sample since the chirp began"
+        rx, listens = radar.rx[radar.rx_of_tx], "place of each Rx that listens to a Tx"
+        return {
+            "chirp_time": Quantity(("chirp", "tx"), times, "s", since),
+            "sample_time": Quantity(("sample",), fast, "s", begun),
+            "tx_position": Quantity(("tx", "xyz"), radar.tx, "m", "place of each Tx, world axes"),
+            "rx_position": Quantity(("tx", "rx", "xyz"), rx, "m", listens),
+        }
+
     def blocks(self, doing: str) -> Iterator[tuple[int, NDArray[np.complex64]]]:
         """Yield first chirp and samples (chirp, tx, rx, sample) of each block, with a bar."""
         chirps, tx, rx, samples = self.shape
@@ -89,13 +120,7 @@ class IfRecording:
             yield first, self.read(first * tx, last * tx).reshape(last - first, tx, rx, samples)
 
     def read(self, first: int, last: int) -> NDArray[np.complex64]:
-        """Read the chirps ``first`` to ``last - 1`` of all Tx in turn, (chirp, rx, sample).
-
-        Raises
-        ------
-        InputError
-            If the samples are damaged or exceed the memory.
-        """
+        """Read the chirps ``first`` to ``last - 1`` of all Tx in turn, (chirp, rx, sample)."""
         try:
             return np.asarray(self.stored[first:last], dtype=np.complex64)
         except MemoryError:
@@ -112,13 +137,7 @@ class IfRecording:
 
 
 def open_recording(folder: Path) -> IfRecording:
-    """Open the samples of a run's folder.
-
-    Raises
-    ------
-    InputError
-        If there are no samples, or the summary does not fit them.
-    """
+    """Open the samples of a run's folder; InputError if there are none that fit its summary."""
     import zarr  # slow to import
 
     check_whole(folder)
@@ -136,14 +155,12 @@ def open_recording(folder: Path) -> IfRecording:
     if not summary["parameters"].get("save_if", True):
         raise InputError(
             f"'{folder}' holds IF samples (if.zarr) of an earlier run than the last one, "
-            "which kept none; "
-            "run it again with --save-if, into another folder to keep both"
+            "which kept none; run it again with --save-if, into another folder to keep both"
         )
     if radar.multiplexing == "ddm":
         raise InputError(
             f"'{folder}' holds the sum of all Tx, as Doppler division receives it, "
-            "which has no tx axis; "
-            "export a run under tdm or fdm"
+            "which has no tx axis; export a run under tdm or fdm"
         )
     try:
         largest = _largest_file(folder / "if.zarr")
@@ -153,11 +170,8 @@ def open_recording(folder: Path) -> IfRecording:
         raise InputError(
             f"'{folder / 'if.zarr'}' cannot be read ({_short(error)}); run it again"
         ) from None
-    fits = (
-        len(shape) == 3
-        and shape[1:] == (radar.n_rx, radar.samples_per_chirp)
-        and shape[0] >= radar.n_tx
-    )
+    expected = (radar.n_rx, radar.samples_per_chirp)
+    fits = len(shape) == 3 and shape[1:] == expected and shape[0] >= radar.n_tx
     if not fits or kind != np.complex64:
         raise InputError(
             f"'{folder / 'if.zarr'}' holds {kind} {shape}; "
@@ -178,97 +192,23 @@ def open_recording(folder: Path) -> IfRecording:
 
 
 def _largest_file(store: Path) -> int:
-    """Return the size of the largest file of an array [bytes]; zarr reads a file all at once.
-
-    Raises
-    ------
-    ValueError
-        If an entry is neither a file nor a folder, or the description of the array is too large.
-    """
+    """Return the size of the largest file of an array [bytes]; zarr reads a file all at once."""
     largest = 0
     for folder, folders, names in os.walk(store):
         for name in (*folders, *names):
             status = os.lstat(os.path.join(folder, name))
-            if not (
-                stat.S_ISREG(status.st_mode) or (name in folders and stat.S_ISDIR(status.st_mode))
-            ):
+            if name in folders and stat.S_ISDIR(status.st_mode):
+                continue
+            if not stat.S_ISREG(status.st_mode):
                 raise ValueError(f"'{name}' in it is a link, a pipe or a device")
-            if stat.S_ISREG(status.st_mode):
-                largest = max(largest, status.st_size)
-                if name == "zarr.json" and status.st_size > _MOST_TEXT_BYTES:
-                    raise ValueError(f"{name} has more than {_MOST_TEXT_BYTES / 1e6:g} MB")
+            largest = max(largest, status.st_size)
+            if name == "zarr.json" and status.st_size > _MOST_TEXT_BYTES:
+                raise ValueError(f"{name} has more than {_MOST_TEXT_BYTES / 1e6:g} MB")
     return largest
 
 
-@dataclass(frozen=True)
-class Quantity:
-    """Quantity that accompanies the samples under the same name in every format.
-
-    Parameters
-    ----------
-    axes : tuple of str
-        Axes of the values.
-    values : array of float64
-        Values.
-    unit, meaning : str
-        Unit and description.
-    """
-
-    axes: tuple[str, ...]
-    values: NDArray[np.float64]
-    unit: str
-    meaning: str
-
-
-def quantities(radar: Radar, chirps: int) -> dict[str, Quantity]:
-    """Return times and positions along the axes of a cube with ``chirps`` chirps of each Tx."""
-    samples = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
-    return {
-        "chirp_time": Quantity(
-            ("chirp", "tx"),
-            radar.chirp_times(chirps * radar.n_tx).reshape(chirps, radar.n_tx),
-            "s",
-            "centre of each chirp since the start of the capture",
-        ),
-        "sample_time": Quantity(
-            ("sample",), samples, "s", "time of each sample since the chirp began"
-        ),
-        "tx_position": Quantity(("tx", "xyz"), radar.tx, "m", "place of each Tx, world axes"),
-        "rx_position": Quantity(
-            ("tx", "rx", "xyz"),
-            radar.rx[radar.rx_of_tx],
-            "m",
-            "place of each Rx that listens to a Tx",
-        ),
-    }
-
-
-def scalars(radar: Radar) -> dict[str, float]:
-    """Return the parameters of the waveform, with units in their names."""
-    return {
-        "start_frequency_hz": radar.start_frequency_hz,
-        "bandwidth_hz": radar.bandwidth_hz,
-        "centre_frequency_hz": radar.centre_frequency_hz,
-        "slope_hz_per_s": radar.slope_hz_per_s,
-        "sample_rate_hz": radar.sample_rate_hz,
-        "chirp_duration_s": radar.chirp_duration_s,
-        "cycle_duration_s": radar.cycle_duration_s,
-    }
-
-
-def radar_text(radar: Radar) -> str:
-    """Return a radar as JSON."""
-    return json.dumps(dataclasses.asdict(radar))
-
-
 def radar_of(text: str) -> Radar:
-    """Parse a radar from the text of `radar_text`.
-
-    Raises
-    ------
-    ValueError, TypeError
-        If the text describes no radar; an InputError is a ValueError.
-    """
+    """Make a radar of `IfRecording.radar_text`; ValueError or TypeError if the text is another."""
     return Radar(**json.loads(text))
 
 

@@ -19,7 +19,7 @@ from rtradar.pipeline.chain import Result, simulate
 from rtradar.pipeline.output.output_files import comparison_files
 from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.figures.side_by_side import (
     draw_maps,
     draw_part_power,

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from rtradar.campaign import in_words
-from rtradar.campaign.sample import Made, Recipe
+from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.cli import main
 from rtradar.clouds import Sample
 
@@ -25,14 +25,14 @@ subjects = 12
 """
 
 
-def fake(recipe: Recipe) -> Made:
+def fake(recipe: SamplePlan) -> Made:
     return Made(Sample(np.zeros((3, 3)), recipe.label, recipe.parameters), np.zeros((0, 3)), 2.0)
 
 
 def test_a_plan_then_the_whole(
     here: None, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("rtradar.campaign.build.make", fake)
+    monkeypatch.setattr("rtradar.campaign.build.make_sample", fake)
     (tmp_path / "set.toml").write_text(SPEC)
     words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
     words += ["--json", str(tmp_path / "told.json")]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rtradar.campaign.plan import counts, recipes
-from rtradar.campaign.spec_file import read_spec
+from rtradar.campaign.samples import counts, plan_samples
+from rtradar.campaign.spec import read_spec
 from rtradar.validate import validation_folder
 
 FOUR = ("jumping_jack", "kick", "punch", "walk")
@@ -23,7 +23,7 @@ FOUR = ("jumping_jack", "kick", "punch", "walk")
     ],
 )
 def test_every_activity_has_as_many(name: str, each: int, settings: int) -> None:
-    found = recipes(read_spec(validation_folder() / f"{name}.toml"))
+    found = plan_samples(read_spec(validation_folder() / f"{name}.toml"))
     assert counts(found)["label"] == dict.fromkeys(FOUR, each * settings)
     assert len(counts(found)["subject"]) == 20
 
@@ -44,7 +44,7 @@ def test_both_sets_of_the_transfer_have_the_same_motions() -> None:
     free, room = (
         {
             recipe.parameters["recording"]: recipe
-            for recipe in recipes(read_spec(validation_folder() / f"transfer_{name}.toml"))
+            for recipe in plan_samples(read_spec(validation_folder() / f"transfer_{name}.toml"))
         }
         for name in ("free_space", "room")
     )
@@ -58,6 +58,6 @@ def test_real_recordings_are_of_all_activities(
     mocap: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("RTRADAR_MOCAP", str(mocap))
-    told = counts(recipes(read_spec(validation_folder() / "real_recordings.toml")))
+    told = counts(plan_samples(read_spec(validation_folder() / "real_recordings.toml")))
     assert tuple(told["label"]) == FOUR
     assert told["source"] == {"recorded": 92}

@@ -12,8 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from rtradar.campaign.spec import Windows
-from rtradar.campaign.spec_file import _spec, read_spec
+from rtradar.campaign.spec import Intervals, _spec, read_spec
 from rtradar.errors import InputError
 
 SMALL = """
@@ -40,8 +39,8 @@ def write(folder: Path, text: str) -> Path:
 
 def test_what_is_left_out_has_a_value(tmp_path: Path) -> None:
     spec = read_spec(write(tmp_path, SMALL))
-    assert (spec.seed, spec.pfa, spec.clutter_removal) == (0, 1e-6, "none")
-    (setting,) = spec.settings
+    assert (spec.run.seed, spec.run.pfa, spec.run.clutter_removal) == (0, 1e-6, "none")
+    (setting,) = spec.combinations
     assert (setting.radar.name, setting.scene.name, setting.fidelity) == (
         "paper-12ghz",
         "free-space",
@@ -121,7 +120,7 @@ snr_db = [10.0, 20, 30]
 person_position_m = [[0, 0], [0.5, 0.5]]
 radar_position_m = [[-4, 1, 1]]
 """
-    settings = read_spec(write(tmp_path, SMALL + each)).settings
+    settings = read_spec(write(tmp_path, SMALL + each)).combinations
     assert len(settings) == 2 * 2 * 3 * 2
     assert {setting.scene.person_position_m for setting in settings} == {(0.0, 0.0), (0.5, 0.5)}
     assert {setting.scene.radar_position_m for setting in settings} == {(-4.0, 1.0, 1.0)}
@@ -132,8 +131,8 @@ def test_files_are_sought_beside_the_data_set_file(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("samples_per_chirp = 128")
     spec = read_spec(write(tmp_path, RECORDING + '[each]\nradar = ["mine.toml"]'))
     assert spec.recordings[0].path == tmp_path / "walk.bvh"
-    assert spec.recordings[0].windows == Windows()
-    assert spec.settings[0].radar.samples_per_chirp == 128
+    assert spec.recordings[0].intervals == Intervals()
+    assert spec.combinations[0].radar.samples_per_chirp == 128
 
 
 def test_recordings_may_lie_where_the_environment_says(
@@ -154,7 +153,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             "[windows]\nduration_s = 2.0\nhop_s = 1.0" + RECORDING + "start_s = 0.5\nend_s = 4.0",
         )
     )
-    assert spec.recordings[0].windows == Windows(0.5, 2.0, 1.0, 4.0)
+    assert spec.recordings[0].intervals == Intervals(0.5, 2.0, 1.0, 4.0)
 
 
 @pytest.mark.parametrize(
@@ -342,29 +341,34 @@ def test_a_file_that_is_not_there_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("windows", "length_s", "expected"),
     [
-        (Windows(), 3.0, [(0.0, 3.0)]),
-        (Windows(start_s=1.0), 3.0, [(1.0, 2.0)]),
-        (Windows(duration_s=2.0), 3.0, [(0.0, 2.0)]),
-        (Windows(0.5, 1.0, 1.0), 3.5, [(0.5, 1.0), (1.5, 1.0), (2.5, 1.0)]),
-        (Windows(0.5, 1.0, 1.0), 3.4, [(0.5, 1.0), (1.5, 1.0)]),
+        (Intervals(), 3.0, [(0.0, 3.0)]),
+        (Intervals(start_s=1.0), 3.0, [(1.0, 2.0)]),
+        (Intervals(duration_s=2.0), 3.0, [(0.0, 2.0)]),
+        (Intervals(0.5, 1.0, 1.0), 3.5, [(0.5, 1.0), (1.5, 1.0), (2.5, 1.0)]),
+        (Intervals(0.5, 1.0, 1.0), 3.4, [(0.5, 1.0), (1.5, 1.0)]),
         (
-            Windows(0.0, 0.3, 0.1),
+            Intervals(0.0, 0.3, 0.1),
             0.6,
             [(0.0, 0.3), (0.1, 0.3), (0.2, 0.3), (0.3, 0.3)],
         ),  # 0.6 - 0.3 is less than 3 x 0.1
-        (Windows(0.0, 1.0, 0.5, 2.0), 9.0, [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]),
+        (Intervals(0.0, 1.0, 0.5, 2.0), 9.0, [(0.0, 1.0), (0.5, 1.0), (1.0, 1.0)]),
     ],
 )
 def test_intervals_fill_the_recording(
-    windows: Windows, length_s: float, expected: list[tuple[float, float]]
+    windows: Intervals, length_s: float, expected: list[tuple[float, float]]
 ) -> None:
     assert windows.of("walk", length_s) == expected
 
 
 @pytest.mark.parametrize(
     "windows",
-    [Windows(duration_s=3.0), Windows(start_s=2.5), Windows(end_s=2.5), Windows(2.0, 1.0, 0.5)],
+    [
+        Intervals(duration_s=3.0),
+        Intervals(start_s=2.5),
+        Intervals(end_s=2.5),
+        Intervals(2.0, 1.0, 0.5),
+    ],
 )
-def test_a_recording_that_is_too_short_is_named(windows: Windows) -> None:
+def test_a_recording_that_is_too_short_is_named(windows: Intervals) -> None:
     with pytest.raises(InputError, match=r"recording 'walk' has 2 s, too short"):
         windows.of("walk", 2.0)

@@ -47,6 +47,8 @@ class MadeUpClouds:
             for view in range(views)
         ]
 
+    folders: tuple[Path, ...] = ()
+
     def __len__(self) -> int:
         return len(self.rows)
 

@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtradar.classify.baselines import BASELINES, judge_baselines
-from rtradar.classify.features import metadata_features, rdt_features, spatial_features
-from rtradar.classify.scores import summary
+from rtradar.classify.baselines import (
+    BASELINES,
+    judge_baselines,
+    metadata_features,
+    rdt_features,
+    spatial_features,
+)
+from rtradar.classify.outcomes import Outcome, outcome_of, summary
 from rtradar.classify.splits import make_splits, values_of
-from rtradar.classify.store import Outcome, outcome_of
 from rtradar.classify.study import Study, classes_of, fingerprint, made
 from rtradar.errors import InputError
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from rtradar.classify.prepare import drawn, for_training, scaled, stack_clouds
+from rtradar.classify.prepare import for_training, sampled, scaled, stack_clouds
 from rtradar.errors import InputError
 
 SCALES = torch.tensor([0.5, 0.5, 2.5])
@@ -64,8 +64,8 @@ def test_clouds_without_points_are_refused(made_up: Callable[..., Any]) -> None:
 
 
 def test_points_are_drawn_once_or_anew(points: torch.Tensor) -> None:
-    assert torch.equal(drawn(points, 50, redraw=False), points[:, :50])
-    first, second = drawn(points, 50, redraw=True), drawn(points, 50, redraw=True)
+    assert torch.equal(sampled(points, 50, resample=False), points[:, :50])
+    first, second = sampled(points, 50, resample=True), sampled(points, 50, resample=True)
     assert not torch.equal(first, second)
     for cloud, own in zip(first, points, strict=True):
         rows = {tuple(row) for row in cloud.tolist()}
@@ -103,7 +103,7 @@ def test_turned_clouds_are_turned_in_the_plane_of_time_and_velocity_and_jittered
     points: torch.Tensor,
 ) -> None:
     plain = scaled(points[:1], "unit-sphere").expand(400, -1, -1)
-    turned = for_training(points[:1].expand(400, -1, -1), "turned", "unit-sphere")
+    turned = for_training(points[:1].expand(400, -1, -1), "rotation", "unit-sphere")
     before, after = (torch.complex(cloud[..., 0], cloud[..., 2]) for cloud in (plain, turned))
     turn = (after * before.conj()).sum(dim=1) / (before.abs() ** 2).sum(dim=1)
     torch.testing.assert_close(

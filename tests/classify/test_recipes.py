@@ -41,7 +41,10 @@ def test_a_recipe_that_cannot_be_is_refused(field: str, value: object) -> None:
 
 
 def test_plain_values_make_the_same_recipe() -> None:
-    assert Recipe(**LEAN.as_dict()) == LEAN
+    assert Recipe.from_dict(LEAN.as_dict()) == LEAN
+    assert PAPER.as_dict()["schedule"] == "halving"  # as in the plans of earlier versions
+    assert LEAN.as_dict()["redraw"] is True
+    assert PAPER.changed(augmentation="turned") == PAPER.changed(augmentation="rotation")
 
 
 def test_every_public_name_is_found() -> None:

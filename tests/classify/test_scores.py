@@ -3,8 +3,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtradar.classify.scores import (
+from rtradar.classify.outcomes import (
     TABLE_4,
+    Outcome,
     accuracy_table,
     confusion,
     confusion_table,
@@ -13,7 +14,6 @@ from rtradar.classify.scores import (
     transfer,
     transfer_table,
 )
-from rtradar.classify.store import Outcome
 
 
 def outcome(

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rtradar.classify.store import HISTORY, Outcome, load_outcome, save_outcome
+from rtradar.classify.outcomes import HISTORY, Outcome, load_outcome, save_outcome
 from rtradar.errors import InputError
 
 EPOCH = dict.fromkeys(HISTORY, 0.5)

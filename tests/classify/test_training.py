@@ -12,9 +12,17 @@ import torch
 from rtradar.classify import training
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import LEAN, PAPER, Recipe
-from rtradar.classify.store import Checkpoint, load_checkpoint, save_checkpoint
 from rtradar.classify.study import classes_of
-from rtradar.classify.training import Examples, Row, pick_device, pick_precision, train_network
+from rtradar.classify.training import (
+    Checkpoint,
+    Examples,
+    Row,
+    load_checkpoint,
+    pick_device,
+    pick_precision,
+    save_checkpoint,
+    train_network,
+)
 from rtradar.errors import BackendError, InputError
 
 TINY = LEAN.changed(points=32, batch=4, epochs=4)
@@ -53,7 +61,7 @@ def test_eight_clouds_are_learnt_by_heart(examples: Examples, recipe: Recipe) ->
 
 @pytest.mark.parametrize(
     "recipe",
-    [TINY, PAPER.changed(points=32, epochs=4, augmentation="turned", precision="bfloat16")],
+    [TINY, PAPER.changed(points=32, epochs=4, augmentation="rotation", precision="bfloat16")],
     ids=["lean", "paper"],
 )
 def test_a_training_that_was_stopped_ends_as_one_that_was_not(

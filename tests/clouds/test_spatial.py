@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.clouds.spatial import SpatialCloud, save_spatial_npz, spatial_points
+from rtradar.clouds import SpatialCloud, save_spatial_npz, spatial_points
 from rtradar.errors import InputError
 from rtradar.process.angles.spectra import AngleSpectra
 from rtradar.radar import Radar

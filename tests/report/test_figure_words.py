@@ -27,8 +27,7 @@ from rtradar.report import (
     draw_spatial_cloud,
     draw_spectrogram,
 )
-from rtradar.report.figures.field_units import FieldUnit
-from rtradar.report.figures.maps import new_figure, save_figure
+from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
 from rtradar.report.figures.side_by_side import (
     draw_maps,
     draw_part_power,

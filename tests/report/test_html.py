@@ -20,8 +20,8 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
+from rtradar.report.pages.html import limits_table, quantity
 from rtradar.report.pages.run_page import write_report
-from rtradar.report.pages.sections import limits_table, quantity
 from rtradar.report.view.three_d import (
     MOST_FRAMES,
     MOST_POINTS,

@@ -26,10 +26,9 @@ import numpy as np
 from sklearn.ensemble import RandomForestClassifier
 from sklearn.model_selection import StratifiedKFold, cross_val_score
 
-from rtradar.campaign.plan import recipes
-from rtradar.campaign.spec import Spec
-from rtradar.campaign.spec_file import read_spec
-from rtradar.classify.features import metadata_features
+from rtradar.campaign.samples import plan_samples
+from rtradar.campaign.spec import Spec, read_spec
+from rtradar.classify.baselines import metadata_features
 
 DATA_SETS = Path(__file__).resolve().parents[1]
 SIZES = (500, 1000, 2000, 3000)
@@ -116,7 +115,7 @@ class Planned:
     """Clouds that are not made yet, of which only their provenance is known."""
 
     def __init__(self, spec: Spec) -> None:
-        self._recipes = recipes(spec)
+        self._recipes = plan_samples(spec)
         self.labels = np.array([recipe.label for recipe in self._recipes])
 
     def __len__(self) -> int:

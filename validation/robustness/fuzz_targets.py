@@ -18,10 +18,11 @@ import trimesh
 from fuzz_kit import Target, npy, written
 
 from rtradar.body import Body
-from rtradar.campaign.spec_file import read_spec
+from rtradar.campaign.spec import read_spec
+from rtradar.classify.outcomes import load_outcome
 from rtradar.classify.recipes import LEAN
-from rtradar.classify.store import load_checkpoint, load_outcome
 from rtradar.classify.study import load_network, load_study
+from rtradar.classify.training import load_checkpoint
 from rtradar.clouds import Collection
 from rtradar.clouds.dataset_store import Sample, write_index, write_sample
 from rtradar.errors import InputError

@@ -15,7 +15,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.pipeline.pictures.run_pictures import thinned
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import HANN_BINS, FieldUnit, field_unit
+from rtradar.report.figures.canvas import HANN_BINS, FieldUnit, field_unit
 from rtradar.report.view.page import COLOURS, write_view
 from rtradar.report.view.run_view import MOST_LEVEL, Levels, RunView
 from rtradar.report.view.snapshots import Moments, load_moments

@@ -1,50 +1,18 @@
-"""Pictures of maps and clouds, with axes and units, as PNG files."""
+"""Pictures of maps and clouds of a run, with axes and units, as PNG files."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from rtradar.process import measured_angles
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, field_unit
-
-
-def new_figure(width: float, height: float) -> Figure:
-    """Make an empty figure of this size [inch] without a window."""
-    return Figure(figsize=(width, height), dpi=130, layout="constrained")
-
-
-def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
-    """Save in the format of the path's suffix, or as PNG to an open file, and clear the figure.
-
-    Figure and axes refer to each other. Without clearing, the memory of one picture could
-    still be in use with the next, until Python's garbage collector runs.
-    """
-    for axes in figure.axes:
-        axes.title.set_wrap(True)
-    figure.savefig(file, format=None if isinstance(file, Path) else "png")
-    figure.clear()
-
-
-def colour_limits(
-    level_db: NDArray[np.float64], below_peak_db: float = 60.0
-) -> tuple[float, float]:
-    """Return the limits of the colour scale [dB].
-
-    They are the peak and 3 dB below the median, or ``below_peak_db`` below the peak if higher.
-    """
-    top = float(level_db.max())
-    return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
-
-
-def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
-    """Outer edges of evenly spaced bins."""
-    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
-    return float(centres[0] - half), float(centres[-1] + half)
+from rtradar.report.figures import canvas
+from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, draw_levels, field_unit
 
 
 def draw_range_time(
@@ -56,38 +24,30 @@ def draw_range_time(
     *,
     spreading: bool = True,
 ) -> None:
-    """Range-time picture.
+    """Draw power over time and range.
 
     Parameters
     ----------
     path : path
         PNG file.
     power : (slow_time, range)
-        [m^2].
+        Power, mean of the channels [m^2].
     slow_time : (slow_time,)
-        [s].
+        Times of the rows [s], evenly spaced.
     radar : Radar
+        Radar whose ranges are the axis.
     title : str
+        Heading of the picture.
     spreading : bool
-        Whether amplitudes hold the loss over distance.
+        Whether amplitudes include the spreading loss.
     """
-    figure = new_figure(8, 4.5)
+    figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
     unit = field_unit(radar, spreading=spreading, range_m=radar.range_m)
-    values = unit.level(power)
-    low, high = colour_limits(values)
-    image = axes.imshow(
-        values.T,
-        origin="lower",
-        aspect="auto",
-        cmap="viridis",
-        vmin=low,
-        vmax=high,
-        extent=(*bin_edges(slow_time), *bin_edges(radar.range_m)),
-    )
+    image = draw_levels(axes, unit.level(power).T, slow_time, radar.range_m)
     axes.set(xlabel="Time [s]", ylabel="Range [m]", title=title)
     figure.colorbar(image, label=unit.label("mean of channels"))
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def draw_range_doppler(
@@ -99,74 +59,40 @@ def draw_range_doppler(
     *,
     spreading: bool = True,
 ) -> None:
-    """Range-Doppler map beside itself with its detections.
+    """Draw a range-Doppler map, and beside it the map with its detections.
 
     Parameters
     ----------
     path : path
         PNG file.
     power : (range, velocity)
-        Sum over all channels [m^2].
+        Power, summed over all channels [m^2].
     mask : (range, velocity) bool
-        Detections.
+        True where a cell is detected.
     radar : Radar
+        Radar whose ranges and velocities are the axes.
     title : str
+        Heading of the picture.
     spreading : bool
-        Whether amplitudes hold the loss over distance.
+        Whether amplitudes include the spreading loss.
     """
-    figure = new_figure(11, 4.5)
+    figure = canvas.new_figure(11, 4.5)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
     unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
     values = unit.level(power / radar.n_channels)
-    low, high = colour_limits(values)
     velocity, distance = radar.velocity_mps(power.shape[1]), radar.range_m
-    extent = (*bin_edges(velocity), *bin_edges(distance))
-    image = left.imshow(
-        values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
-    )
-    right.imshow(
-        values, origin="lower", aspect="auto", cmap="Greys", vmin=low, vmax=high, extent=extent
-    )
+    image = draw_levels(left, values, velocity, distance)
+    draw_levels(right, values, velocity, distance, cmap="Greys")
     rows, columns = np.nonzero(mask)
-    right.scatter(
-        velocity[columns], distance[rows], s=3, color="crimson", label=f"{len(rows)} detections"
-    )
+    label = f"{len(rows)} detections"
+    right.scatter(velocity[columns], distance[rows], s=3, color="crimson", label=label)
     right.legend(loc="upper right")
     for axes, name in ((left, "Range-Doppler map"), (right, "Detections, over the map in grey")):
         axes.set(xlabel=VELOCITY_LABEL, title=name)
     left.set_ylabel("Range [m]")
     figure.colorbar(image, ax=[left, right], label=unit.label("mean of channels"))
     figure.suptitle(title, wrap=True)
-    save_figure(figure, path)
-
-
-def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
-    """Range-Doppler-time cloud, coloured by velocity.
-
-    Parameters
-    ----------
-    path : path
-        PNG file.
-    points : (point, 3) float64
-        Time [s], range [m], velocity [m/s].
-    title : str
-    """
-    figure = new_figure(8, 6.5)
-    axes = figure.add_subplot(projection="3d")
-    time, distance, velocity = points.T
-    largest = float(np.abs(velocity).max(initial=1e-9))
-    dots = axes.scatter(
-        time, distance, velocity, c=velocity, s=4, cmap="coolwarm", vmin=-largest, vmax=largest
-    )
-    axes.set(
-        xlabel="Time [s]",
-        ylabel="Range [m]",
-        zlabel=VELOCITY_LABEL,
-        title=f"{title}\n{len(points)} points",
-    )
-    axes.set_box_aspect((1.6, 1, 1))
-    figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def draw_spectrogram(
@@ -192,21 +118,133 @@ def draw_spectrogram(
     velocity : (velocity,)
         Ascending velocities [m/s].
     radar : Radar
-        Radar of the run.
+        Radar that received the power, which decides its unit.
     title : str
-        Title of the picture.
+        Heading of the picture.
     spreading : bool
         Whether amplitudes include the spreading loss.
     """
-    figure = new_figure(8, 4.5)
+    figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()) / HANN_BINS)
     values = unit.level(power / HANN_BINS)  # one echo is spread over as many range bins
-    low, high = colour_limits(values)
-    extent = (*bin_edges(time), *bin_edges(velocity))
-    image = axes.imshow(
-        values.T, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
-    )
+    image = draw_levels(axes, values.T, time, velocity)
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title=title)
     figure.colorbar(image, label=unit.label("one channel"))
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
+
+
+def draw_range_angle(
+    path: Path,
+    maps: Mapping[str, tuple[NDArray[np.floating], NDArray[np.float64]]],
+    radar: Radar,
+    title: str,
+    *,
+    spreading: bool = True,
+) -> None:
+    """Draw power over range and angle, with a panel for each angle.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    maps : mapping of str to ((range, angle) float, (angle,) float64)
+        Power summed over detected cells [m^2] and the angles [rad], by the name of the angle.
+    radar : Radar
+        Radar whose ranges are the axis.
+    title : str
+        Heading of the picture.
+    spreading : bool
+        Whether amplitudes include the spreading loss.
+    """
+    figure = canvas.new_figure(1 + 5 * len(maps), 4.5)
+    panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
+    unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
+    for axes, (name, (power, angles)) in zip(panels, maps.items(), strict=True):
+        values = unit.level(power / HANN_BINS)  # one echo is spread over as many velocities
+        # Cells that were not detected are zero, which has no decibels.
+        limits = canvas.colour_limits(values, 40)
+        image = draw_levels(axes, values, np.degrees(angles), radar.range_m, limits)
+        axes.set(xlabel=angle_label(name, radar), title=f"Range-{name}")
+        figure.colorbar(image, ax=axes, label=unit.label("detected cells"))
+    panels[0].set_ylabel("Range [m]")
+    figure.suptitle(title, wrap=True)
+    canvas.save_figure(figure, path)
+
+
+def angle_label(name: str, radar: Radar) -> str:
+    """Label of the axis; without an array along z, azimuth is the angle of a cone."""
+    if name == "azimuth" and measured_angles(radar) == ("azimuth",):
+        return "Azimuth [°] (cone angle; elevation is not measured)"
+    return f"{name.capitalize()} [°]"
+
+
+def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
+    """Draw the range-Doppler-time cloud, coloured by velocity.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    points : (point, 3) float64
+        Time [s], range [m] and velocity [m/s] of each point.
+    title : str
+        Heading of the picture.
+    """
+    figure = canvas.new_figure(8, 6.5)
+    axes = figure.add_subplot(projection="3d")
+    dots = rdt_points(axes, points, f"{title}\n{len(points)} points", s=4)
+    axes.set_box_aspect((1.6, 1, 1))
+    figure.colorbar(dots, label=VELOCITY_LABEL, shrink=0.6, pad=0.1)
+    canvas.save_figure(figure, path)
+
+
+def rdt_points(
+    axes: Any, points: NDArray[np.float64], title: str, *, fastest: float | None = None, s: float
+) -> Any:
+    """Draw points (point, 3) [s, m, m/s] in 3D, coloured by velocity up to ``fastest`` [m/s]."""
+    if fastest is None:
+        fastest = float(np.abs(points[:, 2]).max(initial=1e-9))
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL, title=title)
+    colours = {"c": points[:, 2], "cmap": "coolwarm", "vmin": -fastest, "vmax": fastest}
+    return axes.scatter(*points.T, s=s, **colours)
+
+
+def draw_spatial_cloud(
+    path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str
+) -> None:
+    """Draw points from the side and from above, coloured by velocity.
+
+    For a linear array only the view that it measures is drawn.
+
+    Parameters
+    ----------
+    path : path
+        PNG file.
+    points : (point, 3) float64
+        World coordinates [m]; NaN in a coordinate that is not measured.
+    velocity : (point,) float64
+        Velocity of each point [m/s].
+    radar : Radar
+        Radar, drawn at its position.
+    title : str
+        Heading of the picture.
+    """
+    names = measured_angles(radar)
+    views = [axis for axis, name in ((2, "elevation"), (1, "azimuth")) if name in names]
+    figure = canvas.new_figure(1 + 5 * len(views), 4.8)
+    largest = float(np.abs(velocity).max(initial=1e-9))
+    colours = {"c": velocity, "cmap": "coolwarm", "vmin": -largest, "vmax": largest}
+    x_label = "x [m]" if len(views) == 2 else "x [m], by the distance from the line of the array"
+    for axes, up in zip(figure.subplots(1, len(views), squeeze=False)[0], views, strict=True):
+        dots = axes.scatter(points[:, 0], points[:, up], s=2, alpha=0.6, **colours)
+        axes.plot(radar.position_m[0], radar.position_m[up], "k^", label="radar")
+        view, other = ("From the side", "azimuth") if up == 2 else ("From above", "elevation")
+        missing = "" if len(views) == 2 else f"; {other} is not measured"
+        axes.set(xlabel=x_label, ylabel=f"{'xyz'[up]} [m]", title=view + missing)
+        axes.set_aspect("equal", adjustable="datalim")
+        axes.grid(alpha=0.3)
+        axes.legend(loc="upper right")
+    figure.colorbar(dots, ax=figure.axes, label=VELOCITY_LABEL)
+    figure.suptitle(f"{title}\n{len(points)} points", wrap=True)
+    canvas.save_figure(figure, path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -12,11 +13,15 @@ from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
 from rtradar.radar import Radar
-from rtradar.report.figures.angles import angle_label
-from rtradar.report.figures.field_units import HANN_BINS, VELOCITY_LABEL, field_unit
-from rtradar.report.figures.maps import bin_edges, colour_limits, new_figure, save_figure
+from rtradar.report.figures import canvas
+from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, draw_levels, field_unit
+from rtradar.report.figures.maps import angle_label
 from rtradar.scene import Scene
 
+_LEGEND: dict[str, Any] = {"fontsize": 8, "facecolor": "dimgrey", "labelcolor": "white"}
+_BOX = {"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1}
+_ARROW = {"arrowstyle": "-", "color": "red", "linewidth": 0.6, "shrinkA": 0, "shrinkB": 4}
+_GHOST: dict[str, Any] = {"markerfacecolor": "none", "markeredgecolor": "red", "markersize": 9}
 _UPRIGHT = 0.5
 """Largest vertical component of the normals of walls in a plan; others are floor or ceiling."""
 
@@ -29,40 +34,37 @@ def draw_plan(
     paths: Mapping[str, NDArray[np.float64]],
     title: str,
 ) -> None:
-    """The room from above: walls, furniture, radar, the person's way, and paths of echoes.
+    """Draw the room from above: walls, furniture, radar, the person's track and paths of echoes.
 
     Parameters
     ----------
     path : path
         PNG file.
     scene : Scene
+        Scene whose walls and furniture are drawn.
     radar : Radar
-        Where it stands.
+        Radar, drawn at its position.
     track : (time, 2) float64
-        Where the person's root goes [m].
+        Positions of the person's root [m].
     paths : mapping of str to (point, 3) float64
-        Corners of each path from Tx to Rx [m].
+        Corners of each path from Tx to Rx [m], by its name.
     title : str
+        Heading of the picture.
     """
-    figure = new_figure(10, 6)
+    figure = canvas.new_figure(10, 6)
     axes = figure.subplots()
     walls = walls_in_plan(scene)
     corners = np.array([corner for first, last, _ in walls for corner in (first, last)])
     for first, last, name in walls:
         axes.plot(*zip(first, last, strict=True), color="black", linewidth=2.5)
         middle = (first + last) / 2
-        # Outside the room, where no furniture has its name.
+        # Names are outside the room, because those of furniture are inside.
         across = np.abs(last - first) < np.abs(last - first).max()
         outward = 9 * across * np.sign(middle - corners.mean(axis=0))
-        text = axes.annotate(
-            name,
-            tuple(middle),
-            xytext=tuple(outward),
-            textcoords="offset points",
-            fontsize=7,
-            color="dimgrey",
+        style: dict[str, Any] = {"fontsize": 7, "color": "dimgrey", "ha": "center", "va": "center"}
+        axes.annotate(
+            name, tuple(middle), xytext=tuple(outward), textcoords="offset points", **style
         )
-        text.set(ha="center", va="center")
     for piece in scene.furniture:
         triangles = piece.triangles()
         corners = triangles.corners[..., :2]
@@ -71,16 +73,10 @@ def draw_plan(
         seen = ax * by - ay * bx
         covering = corners[seen > 0 if triangles.closed else seen != 0]
         axes.add_collection(PolyCollection(list(covering), color="tan", alpha=0.5, linewidth=0))
-        axes.annotate(
-            piece.name,
-            tuple(corners.reshape(-1, 2).mean(axis=0)),
-            fontsize=7,
-            color="saddlebrown",
-            ha="center",
-        )
-    axes.set_prop_cycle(
-        color=[colormaps["tab20"](number) for number in range(20)]
-    )  # more than ten paths
+        centre = tuple(corners.reshape(-1, 2).mean(axis=0))
+        axes.annotate(piece.name, centre, fontsize=7, color="saddlebrown", ha="center")
+    # There may be more than ten paths.
+    axes.set_prop_cycle(color=[colormaps["tab20"](number) for number in range(20)])
     for name, corners in paths.items():
         axes.plot(corners[:, 0], corners[:, 1], linewidth=1, label=name)
     axes.plot(track[:, 0], track[:, 1], color="crimson", linewidth=2.5, label="person")
@@ -89,7 +85,7 @@ def draw_plan(
     axes.set_aspect("equal")
     axes.grid(alpha=0.3)
     axes.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), fontsize=7)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def walls_in_plan(scene: Scene) -> list[tuple[NDArray[np.float64], NDArray[np.float64], str]]:
@@ -111,49 +107,40 @@ def draw_before_after(
     radar: Radar,
     title: str,
 ) -> None:
-    """Range-Doppler maps with their detections, and ghosts where they are predicted.
+    """Draw range-Doppler maps with their detections, and ghosts where they are predicted.
 
     Parameters
     ----------
     path : path
         PNG file.
     maps : mapping of str to ((range, velocity) float, (range, velocity) bool)
-        Power summed over all channels [m^2], and detections, by panel.
+        Power summed over all channels [m^2], and detections, by the title of the panel.
     ghosts : sequence of (str, float, float)
-        Path over walls, range [m] and velocity [m/s].
+        Path over walls, range [m] and velocity [m/s] of each ghost.
     radar : Radar
+        Radar whose ranges and velocities are the axes.
     title : str
+        Heading of the picture.
     """
-    figure = new_figure(1 + 5.5 * len(maps), 5)
+    figure = canvas.new_figure(1 + 5.5 * len(maps), 5)
     panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
     unit = field_unit(radar, range_m=radar.range_m[:, None])
-    levels = {name: unit.level(power / radar.n_channels) for name, (power, _) in maps.items()}
-    limits = [colour_limits(level) for level in levels.values()]
-    low, high = min(low for low, _ in limits), max(high for _, high in limits)
-    for axes, (name, (power, mask)) in zip(panels, maps.items(), strict=True):
-        velocity = radar.velocity_mps(power.shape[1])
-        extent = (*bin_edges(velocity), *bin_edges(radar.range_m))
-        image = axes.imshow(
-            levels[name],
-            origin="lower",
-            aspect="auto",
-            cmap="viridis",
-            vmin=low,
-            vmax=high,
-            extent=extent,
-        )
+    levels = [unit.level(power / radar.n_channels) for power, _ in maps.values()]
+    low, high = zip(*map(canvas.colour_limits, levels), strict=True)
+    for axes, (name, (_, mask)), level in zip(panels, maps.items(), levels, strict=True):
+        velocity = radar.velocity_mps(level.shape[1])
+        image = draw_levels(axes, level, velocity, radar.range_m, (min(low), max(high)))
         rows, columns = np.nonzero(mask)
-        axes.scatter(
-            velocity[columns], radar.range_m[rows], s=1, color="white", alpha=0.5, label="detected"
-        )
+        style = {"s": 1, "color": "white", "alpha": 0.5, "label": "detected"}
+        axes.scatter(velocity[columns], radar.range_m[rows], **style)
         axes.set(xlabel=VELOCITY_LABEL, title=f"{name}\n{len(rows)} detections")
-        axes.set(xlim=bin_edges(velocity), ylim=bin_edges(radar.range_m))
+        axes.set(xlim=canvas.bin_edges(velocity), ylim=canvas.bin_edges(radar.range_m))
         _mark(axes, ghosts, radar)
     panels[0].set_ylabel("Range [m]")
-    panels[0].legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
+    panels[0].legend(loc="upper right", **_LEGEND)
     figure.colorbar(image, ax=list(panels), label=unit.label("mean of channels"))
     figure.suptitle(title, wrap=True)
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)
 
 
 def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) -> None:
@@ -162,21 +149,11 @@ def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) 
     Names stand beside them toward the middle of the axes, far enough apart to be read.
     """
     label = "ghost over a wall, predicted"
-    inside = sorted(
-        (ghost for ghost in ghosts if ghost[1] < radar.max_range_m), key=lambda ghost: ghost[1]
-    )
+    inside = (ghost for ghost in ghosts if ghost[1] < radar.max_range_m)
     (left, right), gap = axes.get_xlim(), 0.035 * radar.max_range_m
     placed: list[tuple[float, float]] = []
-    for name, distance, across in inside:
-        axes.plot(
-            across,
-            distance,
-            "o",
-            markerfacecolor="none",
-            markeredgecolor="red",
-            markersize=9,
-            label=label,
-        )
+    for name, distance, across in sorted(inside, key=lambda ghost: ghost[1]):
+        axes.plot(across, distance, "o", label=label, **_GHOST)
         label = ""
         toward = 1 if across < (left + right) / 2 else -1
         beside, place = across + 0.08 * toward * (right - left), distance
@@ -184,22 +161,14 @@ def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) 
             if abs(other - beside) < 0.25 * (right - left):
                 place = max(place, taken + gap)
         placed.append((beside, place))
+        style: dict[str, Any] = {"fontsize": 7, "color": "white", "bbox": _BOX, "va": "center"}
         axes.annotate(
             name,
             (across, distance),
             xytext=(beside, place),
-            fontsize=7,
-            color="white",
             ha="left" if toward > 0 else "right",
-            va="center",
-            bbox={"facecolor": "black", "alpha": 0.6, "edgecolor": "none", "pad": 1},
-            arrowprops={
-                "arrowstyle": "-",
-                "color": "red",
-                "linewidth": 0.6,
-                "shrinkA": 0,
-                "shrinkB": 4,
-            },
+            arrowprops=_ARROW,
+            **style,
         )
 
 
@@ -212,56 +181,46 @@ def draw_range_azimuth_with_walls(
     ghosts: Sequence[tuple[str, float, float]],
     title: str,
 ) -> None:
-    """Power over azimuth and range, with upright walls drawn where they are.
+    """Draw power over azimuth and range, with upright walls where they are.
 
     Parameters
     ----------
     path : path
         PNG file.
     power : (range, azimuth) float
-        [m^2].
+        Power summed over detected cells [m^2].
     azimuth : (azimuth,) float64
-        [rad].
+        Azimuth angles of the columns [rad].
     scene : Scene
+        Scene whose walls are drawn.
     radar : Radar
+        Radar whose ranges are the axis, at its position in the scene.
     ghosts : sequence of (str, float, float)
-        Path over walls, range [m] and azimuth [rad].
+        Path over walls, range [m] and azimuth [rad] of each ghost.
     title : str
+        Heading of the picture.
     """
-    figure = new_figure(8, 5.5)
+    figure = canvas.new_figure(8, 5.5)
     axes = figure.subplots()
     unit = field_unit(radar, range_m=radar.range_m[:, None])
     values = unit.level(power / HANN_BINS)
-    extent = (*bin_edges(np.degrees(azimuth)), *bin_edges(radar.range_m))
-    low, high = colour_limits(
-        values, 50
-    )  # cells that were not detected are zero, and zero has no decibels
-    image = axes.imshow(
-        values, origin="lower", aspect="auto", cmap="viridis", vmin=low, vmax=high, extent=extent
-    )
-    place = np.asarray(radar.position_m)
+    limits = canvas.colour_limits(values, 50)  # cells that were not detected have no decibels
+    left, right = canvas.bin_edges(np.degrees(azimuth))
+    image = draw_levels(axes, values, np.degrees(azimuth), radar.range_m, limits)
+    place = np.asarray(radar.position_m)[:2]
     for first, last, name in walls_in_plan(scene):
-        along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place[:2]
-        angle, distance = (
-            np.degrees(np.arctan2(along[:, 1], along[:, 0])),
-            np.hypot(along[:, 0], along[:, 1]),
-        )
+        along = first + np.linspace(0, 1, 200)[:, None] * (last - first) - place
+        angle, distance = np.degrees(np.arctan2(along[:, 1], along[:, 0])), np.hypot(*along.T)
         axes.plot(angle, distance, color="white", linewidth=1.2, linestyle="--")
-        inside = np.flatnonzero(
-            (angle > extent[0]) & (angle < extent[1]) & (distance < radar.max_range_m)
-        )
+        shown = (angle > left) & (angle < right) & (distance < radar.max_range_m)
+        inside = np.flatnonzero(shown)
         if len(inside):
             near = inside[len(inside) // 6]  # beside the middle, where names of ghosts stand
             axes.annotate(name, (angle[near], distance[near]), fontsize=8, color="white")
-    axes.set(
-        xlabel=angle_label("azimuth", radar),
-        ylabel="Range [m]",
-        title=title,
-        xlim=extent[:2],
-        ylim=extent[2:],
-    )
+    axes.set(xlabel=angle_label("azimuth", radar), ylabel="Range [m]", title=title)
+    axes.set(xlim=(left, right), ylim=canvas.bin_edges(radar.range_m))
     _mark(axes, [(name, distance, np.degrees(angle)) for name, distance, angle in ghosts], radar)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(loc="upper right", fontsize=8, facecolor="dimgrey", labelcolor="white")
+        axes.legend(loc="upper right", **_LEGEND)
     figure.colorbar(image, label=unit.label("detected cells"))
-    save_figure(figure, path)
+    canvas.save_figure(figure, path)

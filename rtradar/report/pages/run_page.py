@@ -12,21 +12,13 @@ from numpy.typing import ArrayLike
 from rtradar.body import Body
 from rtradar.clouds.spatial import SHOWN_DB, SpatialCloud
 from rtradar.radar import Radar
-from rtradar.report.pages.frame import player, write_page
-from rtradar.report.pages.sections import (
-    limits_box,
-    limits_table,
-    mapping_table,
-    picture,
-    stages_table,
-    table,
-    tiles,
-)
+from rtradar.report.pages import html
+from rtradar.report.pages.html import mapping_table, picture, table, write_page
 from rtradar.report.view.three_d import figure_data, rdt_data, spatial_data
 
 _FIGURE = f"""<section id="figure"><h2>The recording before the radar</h2>
 <div class="scene tall" id="scene-figure"></div>
-{player()}
+{html.player()}
 <p class="note">Each ellipsoid is a body part of the echo model, the line inside it its bone.
 Drag to turn, scroll to come nearer. World axes: x from the radar to the person, y to the left seen
 from the radar, z up.</p></section>
@@ -54,9 +46,9 @@ def write_report(
     body : Body
         Body at its position before the radar.
     radar : Radar
-        Radar of the run.
+        Radar of the run, whose limits and settings are listed.
     summary : mapping
-        Content of ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``,
+        Values of ``summary.json``. ``parameters``, ``fidelity``, ``limits``, ``stages``,
         ``versions`` and ``part_power_m2`` have sections of their own; other numbers and texts are
         listed under their names.
     pictures : mapping of title to path
@@ -72,49 +64,39 @@ def write_report(
         If a picture is missing or is not a PNG file, or ``rdt_points`` has a wrong shape or values
         that are not finite.
     """
-    spreading = bool(summary.get("parameters", {}).get("spreading", True))
+    parameters = summary.get("parameters", {})
+    spreading = bool(parameters.get("spreading", True))
     figure = figure_data(body, radar, summary.get("part_power_m2"), spreading=spreading)
     data = {"figure": figure, "rdt": rdt_data(rdt_points)}
     if spatial is not None:
         data["spatial"] = spatial_data(spatial)
-    parameters = summary.get("parameters", {})
     fidelity = str(summary.get("fidelity", ""))
-    top = limits_box(summary.get("limits", ())) + "\n" + tiles(_headline(summary))
+    subtitle = ", ".join(filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}")))
     write_page(
         path,
-        kind="rtradar report",
-        heading=str(parameters.get("motion", "Recording")),
-        subtitle=", ".join(
-            filter(None, (f"radar {radar.name}", fidelity and f"fidelity {fidelity}"))
-        ),
-        top=top,
-        body=chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
+        html.Titles("rtradar report", str(parameters.get("motion", "Recording")), subtitle),
+        html.limits_box(summary.get("limits", ())) + "\n" + html.tiles(_headline(summary)),
+        chain((_FIGURE, _clouds(data)), _pictures(pictures), (_tables(summary, radar),)),
         data=data,
         scripts=("plots.js", "figure.js", "report.js"),
     )
 
 
 def _headline(summary: Mapping[str, Any]) -> Iterable[tuple[str, str]]:
-    if "capture_s" in summary:
-        yield f"{summary['capture_s']:.2f} s", "of radar"
-    if "wall_s" in summary:
-        yield f"{summary['wall_s']:.1f} s", "to compute"
-    if "real_time_factor" in summary:
-        yield f"{summary['real_time_factor']:.2g} s", "for each second of radar"
-    if "peak_memory_mb" in summary:
-        yield f"{summary['peak_memory_mb']:.0f} MB", "peak memory"
-    if "detections" in summary:
-        yield f"{summary['detections']:,}".replace(",", "\u202f"), "detections"
+    for name, form, caption in (
+        ("capture_s", "{:.2f} s", "of radar"),
+        ("wall_s", "{:.1f} s", "to compute"),
+        ("real_time_factor", "{:.2g} s", "for each second of radar"),
+        ("peak_memory_mb", "{:.0f} MB", "peak memory"),
+        ("detections", "{:,}", "detections"),
+    ):
+        if name in summary:
+            yield form.format(summary[name]).replace(",", "\u202f"), caption
 
 
 def _clouds(data: Mapping[str, Any]) -> str:
-    views = [
-        (
-            "rdt",
-            "Range-Doppler-time cloud",
-            "The surface about the detections of all windows, sampled.",
-        )
-    ]
+    note = "The surface about the detections of all windows, sampled."
+    views = [("rdt", "Range-Doppler-time cloud", note)]
     if "spatial" in data:
         note = f"Where detected cells are, down to {SHOWN_DB:g} dB below the strongest; world axes."
         measured = dict(zip("xyz", data["spatial"]["measured"], strict=True))
@@ -128,16 +110,11 @@ def _clouds(data: Mapping[str, Any]) -> str:
     parts = []
     for name, title, note in views:
         cloud = data[name]
-        thinned = (
-            ""
-            if cloud["shown"] == cloud["count"]
-            else f" {cloud['shown']} of {cloud['count']} points are shown."
-        )
-        scene = (
-            f'<div class="scene" id="scene-{name}"></div>'
-            if cloud["count"]
-            else '<p class="empty">Nothing was detected.</p>'
-        )
+        shown, count = cloud["shown"], cloud["count"]
+        thinned = "" if shown == count else f" {shown} of {count} points are shown."
+        scene = f'<div class="scene" id="scene-{name}"></div>'
+        if not count:
+            scene = '<p class="empty">Nothing was detected.</p>'
         parts.append(
             f'<section id="{name}"><h2>{title}</h2>{scene}'
             f'<p class="note">{note}{thinned}</p></section>\n'
@@ -158,37 +135,24 @@ def _tables(summary: Mapping[str, Any], radar: Radar) -> str:
     settings = parameters.pop("radar", {})
     own = ("parameters", "limits", "stages", "versions", "part_power_m2", "modelled")
     modelled = summary.get("modelled", {})
-    ways = {**modelled.get("ways", {}), **modelled.get("why", {})}
+    models = {**modelled.get("ways", {}), **modelled.get("why", {})}
     power = summary.get("part_power_m2", {})
     total = sum(power.values()) or 1.0
+    powers = ((name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items())
+    versions = ((name, str(value)) for name, value in summary.get("versions", {}).items())
+    others = {key: value for key, value in summary.items() if key not in own}
+    fractions = ((name, f"{value:.1%}") for name, value in models.items())
     sections = (
-        ("Derived limits of the radar", limits_table(radar)),
-        ("Time of each stage", stages_table(summary.get("stages", {}))),
-        (
-            "How parts were modelled, of all parts and time",
-            table((name, f"{value:.1%}") for name, value in ways.items()),
-        ),
+        ("Derived limits of the radar", html.limits_table(radar)),
+        ("Time of each stage", html.stages_table(summary.get("stages", {}))),
+        ("How parts were modelled, of all parts and time", table(fractions)),
         ("Parameters", mapping_table(parameters)),
         ("Radar", mapping_table(settings)),
-        (
-            "Capture",
-            mapping_table({key: value for key, value in summary.items() if key not in own}),
-        ),
-        (
-            "Echo power by part",
-            table(
-                (name, f"{value:.3g} m²", f"{value / total:.1%}") for name, value in power.items()
-            ),
-        ),
-        (
-            "Versions",
-            table((name, str(value)) for name, value in summary.get("versions", {}).items()),
-        ),
+        ("Capture", mapping_table(others)),
+        ("Echo power by part", table(powers)),
+        ("Versions", table(versions)),
     )
-    return (
-        '<div class="tables">'
-        + "".join(
-            f"<section><h2>{t}</h2>{html}</section>\n" for t, html in sections if "<tr>" in html
-        )
-        + "</div>\n"
+    shown = (
+        f"<section><h2>{title}</h2>{text}</section>\n" for title, text in sections if "<tr>" in text
     )
+    return f'<div class="tables">{"".join(shown)}</div>\n'

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.report.pages.frame import player, write_page
+from rtradar.report.pages.html import Titles, player, write_page
 from rtradar.report.view.run_view import GROUPS, RunView, group_of_parts
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import packed_floats, posed_figure, rdt_data, spatial_data
@@ -42,13 +42,12 @@ time.</p>
 
 
 def _controls(colour: str) -> str:
-    options = "".join(
-        f'<option value="{name}"{" selected" if name == colour else ""}>{name}</option>'
-        for name in COLOURS
-    )
-    legend = "".join(
+    chosen = {name: " selected" if name == colour else "" for name in COLOURS}
+    options = "".join(f'<option value="{n}"{mark}>{n}</option>' for n, mark in chosen.items())
+    tints = (
         f'<span><i style="background:{tint}"></i>{name}</span>' for name, tint in GROUPS.items()
     )
+    legend = "".join(tints)
     return player(
         f'<label>Colour by <select id="colour">{options}</select></label>'
         '<label>Paths <select id="paths"><option value="all">all</option>'
@@ -63,41 +62,21 @@ def write_view(
 ) -> None:
     """Write the view page as one file that opens without a network.
 
-    Parameters
-    ----------
-    path : path
-        HTML file, which is replaced if it exists.
-    run_view : RunView
-        Data of the run.
-    name : str
-        File name of pictures that the page saves, without ``.png``.
-    colour : {"part", "power", "velocity"}
-        Quantity that colours show when the page opens.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    Pictures that the page saves are called ``name``. When it opens, colours show ``colour``, one of
+    `COLOURS`. InputError if the file cannot be written.
     """
-    scene = '<div class="scene" id="scene-{}"></div>'
-    cloud = (
-        scene.format("rdt")
-        if len(run_view.rdt_points)
-        else '<p class="empty">Nothing was detected.</p>'
+    cloud, spectrogram = (
+        f'<div class="scene" id="scene-{view}"></div>' for view in ("rdt", "spectrogram")
     )
-    long_enough = run_view.spectrogram.level.size > 0
-    spectrogram = (
-        scene.format("spectrogram")
-        if long_enough
-        else '<p class="empty">The capture is too short for one.</p>'
-    )
+    if not len(run_view.rdt_points):
+        cloud = '<p class="empty">Nothing was detected.</p>'
+    if not run_view.spectrogram.level.size:
+        spectrogram = '<p class="empty">The capture is too short for one.</p>'
     write_page(
         path,
-        kind="rtradar view",
-        heading=run_view.heading,
-        subtitle=run_view.subtitle,
-        top=_controls(colour),
-        body=(_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),),
+        Titles("rtradar view", run_view.heading, run_view.subtitle),
+        _controls(colour),
+        (_BODY.replace("$cloud", cloud).replace("$spectrogram", spectrogram),),
         data=view_data(run_view) | {"name": name},
         scripts=("plots.js", "figure.js", "linked.js"),
     )
@@ -158,9 +137,7 @@ def _with_room(ranges: list[list[float]], moments: Moments) -> list[list[float]]
     places = np.concatenate(
         [moments.walls.reshape(-1, 3), moments.furniture_vertices, np.array(ranges).T]
     )
-    low, high = (
-        np.floor(2 * places.min(axis=0) - 1e-6) / 2,
-        np.ceil(2 * places.max(axis=0) + 1e-6) / 2,
-    )
+    low = np.floor(2 * places.min(axis=0) - 1e-6) / 2
+    high = np.ceil(2 * places.max(axis=0) + 1e-6) / 2
     low[2] = 0.0 if low[2] > -0.6 else low[2]
     return [[float(a), float(b)] for a, b in zip(low, high, strict=True)]

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import FieldUnit, field_unit
+from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.view.snapshots import Moments
 
 GROUPS = {
@@ -27,7 +27,7 @@ GROUPS = {
 }
 """Names and colours of the groups of body parts; the last is for what belongs to none."""
 
-_LIMBS = {"clavicle": "arm", "upper arm": "arm", "forearm": "arm", "hand": "arm"}
+_ARM = ("clavicle", "upper arm", "forearm", "hand")
 
 
 def group_of_parts(parts: Sequence[str]) -> list[int]:
@@ -36,13 +36,9 @@ def group_of_parts(parts: Sequence[str]) -> list[int]:
     found = []
     for part in parts:
         side, _, limb = part.partition(" ")
-        group = (
-            f"{side} {_LIMBS.get(limb, 'leg')}"
-            if side in ("left", "right")
-            else "torso"
-            if "torso" in part
-            else "head, neck"
-        )
+        group = "torso" if "torso" in part else "head, neck"
+        if side in ("left", "right"):
+            group = f"{side} {'arm' if limb in _ARM else 'leg'}"
         found.append(names.index(group))
     return found
 
@@ -55,16 +51,9 @@ MOST_LEVEL = 250
 class Levels:
     """Maps in decibels, quantised coarsely so that a page stays small.
 
-    Parameters
-    ----------
-    level : (map, row, column) uint8
-        Quantised power; a level stands for ``low_db + step_db level``.
-    low_db, step_db : float
-        Lowest level and step from one level to the next [dB].
-    label : str
-        Quantity with its unit, as the label of a colour bar.
-    across, up : (float, float)
-        Value of the first column or row, and the step to the next one.
+    ``level`` (map, row, column) means ``low_db + step_db level`` [dB]; ``label`` is that of a
+    colour bar; ``across`` and ``up`` are the value of the first column or row and the step to the
+    next.
     """
 
     level: NDArray[np.uint8]
@@ -100,26 +89,11 @@ _NEAREST_BINS = 4.0  # a point of the cloud farther from any echo belongs to non
 class RunView:
     """Data of a run that the view page and its still pictures show.
 
-    Parameters
-    ----------
-    heading, subtitle : str
-        Titles of the page.
-    moments : Moments
-        Snapshots of body and echoes.
-    radar : Radar
-        Radar at its position in the scene.
-    range_doppler : Levels
-        One map for each snapshot, mean of the channels.
-    spectrogram : Levels
-        One map, time across and velocity up; it has no columns if the capture is too short.
-    rdt_points : (point, 3) float64
-        Time [s], range [m] and velocity [m/s] of each point.
-    rdt_power_db : (point,) float64
-        Power of the range-Doppler map at each point, in the unit of that map [dB].
-    spatial : SpatialCloud
-        Spatial cloud of the run.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
+    ``moments`` are snapshots of body and echoes, and ``radar`` is at its position in the scene.
+    ``range_doppler`` has one map, the mean of the channels, for each snapshot; ``spectrogram`` one
+    map, time across and velocity up, without columns if the capture is too short. ``rdt_points``
+    (point, 3) are time [s], range [m] and velocity [m/s], and ``rdt_power_db`` (point,) the power
+    of the range-Doppler map there, in its unit [dB].
     """
 
     heading: str
@@ -164,27 +138,21 @@ class RunView:
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
         moments, levels = self.moments, self.range_doppler
-        found = []
-        for values, points, margin, (first, step), count in (
-            (
-                self.shown_velocity(),
-                self.rdt_points[:, 2],
-                1.0,
-                levels.across,
-                levels.level.shape[2],
-            ),
-            (moments.range_m, self.rdt_points[:, 1], 0.5, levels.up, levels.level.shape[1]),
-        ):
+
+        def box(
+            values: NDArray[np.float64], column: int, margin: float, axis: tuple[float, float]
+        ) -> tuple[float, float]:
+            (first, step), count = axis, levels.level.shape[column]
             least, most = first - step / 2, first + step * (count - 0.5)
-            inside = np.concatenate([values[self.seen], points])
+            inside = np.concatenate([values[self.seen], self.rdt_points[:, column]])
             inside = inside[(inside >= least) & (inside <= most)]
-            if len(inside):
-                least, most = (
-                    max(least, float(inside.min()) - margin),
-                    min(most, float(inside.max()) + margin),
-                )
-            found.append((least, most))
-        return found[0], found[1]
+            if not len(inside):
+                return least, most
+            low, high = float(inside.min()) - margin, float(inside.max()) + margin
+            return max(least, low), min(most, high)
+
+        velocity = box(self.shown_velocity(), 2, 1.0, levels.across)
+        return velocity, box(moments.range_m, 1, 0.5, levels.up)
 
     def shown_velocity(self) -> NDArray[np.float64]:
         """Return the aliased velocity of each echo (step, echo) [m/s], as on the velocity axis."""
@@ -194,11 +162,7 @@ class RunView:
     def rdt_group(self) -> NDArray[np.int64]:
         """Return the group of body parts of each point (point,), that of the nearest echo."""
         moments, radar = self.moments, self.radar
-        steps = (
-            np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1)
-            if len(self.rdt_points)
-            else np.zeros(0, int)
-        )
+        steps = np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1)
         groups = np.array(group_of_parts(moments.part_names.tolist()))[moments.echo_part]
         seen, velocity = self.seen, self.shown_velocity()
         found = np.full(len(steps), len(GROUPS) - 1)

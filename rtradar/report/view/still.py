@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
-from rtradar.report.figures.field_units import VELOCITY_LABEL
-from rtradar.report.figures.maps import new_figure, save_figure
+from rtradar.report.figures.canvas import VELOCITY_LABEL, new_figure, save_figure
 from rtradar.report.view.page import VELOCITY_COLOURS
 from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
 from rtradar.system.files import atomic_file

@@ -14,7 +14,7 @@ from rtradar.body import Body, unit_sphere
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.report.figures.field_units import field_unit
+from rtradar.report.figures.canvas import field_unit
 
 FRAME_RATE_HZ = 20.0
 """Rate of the poses of the moving figure [Hz]."""
@@ -37,26 +37,10 @@ def figure_data(
     *,
     spreading: bool = True,
 ) -> dict[str, Any]:
-    """Return the recording as poses of ellipsoids, with the radar and the floor.
+    """Return the recording as poses of ellipsoids, with the radar, as plain values for JSON.
 
-    Parameters
-    ----------
-    body : Body
-        Body at its position before the radar.
-    radar : Radar
-        Radar of the run.
-    part_power_m2 : mapping of part name to float, optional
-        Mean echo power of each part [m^2], for its colour.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON. ``poses`` is float32 (frame, part, column, xyz): centre and the three
-        semi-axes of each part in world coordinates [m]; ``times`` [s]; ``vertices`` and ``faces``
-        of the unit sphere; ``tx``, ``rx`` [m]; ``ranges`` of the axes x, y, z [m]; ``power_db`` of
-        each part, at most 30 dB below the strongest, or None; its ``power_label``, ``power_unit``.
+    To those of `posed_figure` are added, from the mean echo power of each part [m^2], ``power_db``
+    of each part, at most 30 dB below the strongest, or None, its ``power_label``, ``power_unit``.
     """
     intervals = min(math.ceil(body.duration_s * FRAME_RATE_HZ), MOST_FRAMES - 1)
     times = np.linspace(0.0, body.duration_s, intervals + 1)
@@ -64,13 +48,10 @@ def figure_data(
     power = np.array([(part_power_m2 or {}).get(part, 0.0) for part in body.part_names])
     strongest = float(power.max())
     unit = field_unit(radar, spreading=spreading, strongest_m2=strongest)
-    levels = (
-        unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10))).round(2).tolist()
-    )
-    label = unit.label("mean of the part")
+    levels = unit.level(np.maximum(power, strongest * 10 ** (-_DYNAMIC_RANGE_DB / 10)))
     return figure | {
-        "power_db": levels if strongest > 0 else None,
-        "power_label": label,
+        "power_db": levels.round(2).tolist() if strongest > 0 else None,
+        "power_label": unit.label("mean of the part"),
         "power_unit": unit.name,
     }
 
@@ -89,29 +70,18 @@ def posed_figure(
     poses: NDArray[np.floating],
     radar: Radar,
 ) -> dict[str, Any]:
-    """Return what the run page and the view page draw of a moving body before a radar.
+    """Return what pages draw of a moving body before a radar, as plain values for JSON.
 
-    Parameters
-    ----------
-    part_names : sequence of str
-        Names of the body parts.
-    times : (frame,) float64
-        Times of the poses [s].
-    poses : (frame, part, 4, 3)
-        Poses from `semi_axis_poses`.
-    radar : Radar
-        Radar of the run.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON: all of `figure_data` except ``power_db``.
+    ``poses`` is float32 (frame, part, 4, xyz): centre and the three semi-axes of each part in world
+    coordinates [m]; ``times`` [s]; ``vertices`` and ``faces`` of the unit sphere; ``tx``, ``rx``
+    [m]; ``ranges`` of the axes x, y, z [m].
     """
     centres, axes = poses[:, :, 0], poses[:, :, 1:]
     vertices, faces = unit_sphere(_SUBDIVISIONS)
     # Half the extent of an ellipsoid along a world axis is the root of the sum of squares of its
     # semi-axes' components.
     extent = np.sqrt((axes**2).sum(axis=2))
+    places = [(centres - extent).reshape(-1, 3), (centres + extent).reshape(-1, 3)]
     return {
         "parts": list(part_names),
         "times": np.round(times, 4).tolist(),
@@ -120,32 +90,16 @@ def posed_figure(
         "faces": faces.ravel().tolist(),
         "tx": np.round(radar.tx, 4).tolist(),
         "rx": np.round(radar.rx, 4).tolist(),
-        "ranges": _ranges(
-            (centres - extent).reshape(-1, 3),
-            (centres + extent).reshape(-1, 3),
-            np.concatenate([radar.tx, radar.rx]),
-        ),
+        "ranges": _ranges(np.concatenate(places), np.concatenate([radar.tx, radar.rx])),
         "window_s": radar.frame_duration_s,
     }
 
 
 def rdt_data(points: ArrayLike) -> dict[str, Any]:
-    """Return the range-Doppler-time cloud, thinned evenly to `MOST_POINTS`.
+    """Return the range-Doppler-time cloud, thinned evenly to `MOST_POINTS`, for JSON.
 
-    Parameters
-    ----------
-    points : (point, 3)
-        Time [s], range [m] and velocity [m/s] of each point.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON: ``count``, ``shown``, and ``points`` as float32 (point, 3).
-
-    Raises
-    ------
-    InputError
-        If the shape is wrong or a value is not finite.
+    The values are ``count``, ``shown``, and ``points`` as float32 (point, 3). InputError if the
+    shape is wrong or a value is not finite.
     """
     places = np.asarray(points, dtype=np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
@@ -159,18 +113,10 @@ def rdt_data(points: ArrayLike) -> dict[str, Any]:
 
 
 def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
-    """Return the strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`.
+    """Return the strongest points of the spatial cloud, thinned evenly to `MOST_POINTS`, for JSON.
 
-    Parameters
-    ----------
-    cloud : SpatialCloud
-        Spatial cloud of the run.
-
-    Returns
-    -------
-    dict
-        Plain values for JSON: ``count``, ``shown``, ``measured`` of x, y and z, and as float32
-        ``points`` (point, 3), ``velocity`` and ``time`` (point,).
+    The values are ``count``, ``shown``, ``measured`` of x, y and z, and as float32 ``points``
+    (point, 3), ``velocity`` and ``time`` (point,).
     """
     cloud = cloud.strongest()
     return {"measured": cloud.measured.tolist()} | _thinned(
@@ -180,9 +126,8 @@ def spatial_data(cloud: SpatialCloud) -> dict[str, Any]:
 
 def _thinned(points: NDArray[np.float64], **values: NDArray[np.float64]) -> dict[str, Any]:
     every = max(1, math.ceil(len(points) / MOST_POINTS))
-    packed = {
-        name: packed_floats(array[::every]) for name, array in {"points": points, **values}.items()
-    }
+    arrays = {"points": points, **values}
+    packed = {name: packed_floats(array[::every]) for name, array in arrays.items()}
     return {"count": len(points), "shown": len(points[::every]), **packed}
 
 
@@ -191,12 +136,10 @@ def packed_floats(array: NDArray[np.floating]) -> str:
     return base64.b64encode(np.ascontiguousarray(array, dtype="<f4").tobytes()).decode()
 
 
-def _ranges(
-    low: NDArray[np.floating], high: NDArray[np.floating], antennas: NDArray[np.float64]
-) -> list[list[float]]:
+def _ranges(body: NDArray[np.floating], antennas: NDArray[np.float64]) -> list[list[float]]:
     """Box about all poses, the radar and the floor, in half metres."""
-    least = np.minimum(low.min(axis=0), antennas.min(axis=0))
-    most = np.maximum(high.max(axis=0), antennas.max(axis=0))
+    least = np.minimum(body.min(axis=0), antennas.min(axis=0))
+    most = np.maximum(body.max(axis=0), antennas.max(axis=0))
     least[:2] -= _MARGIN_M
     most[:2] += _MARGIN_M
     # The floor is z = 0: a heel a little below it needs no more room.

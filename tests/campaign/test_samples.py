@@ -8,9 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rtradar.campaign.plan import counts, recipes
-from rtradar.campaign.sample import Recipe
-from rtradar.campaign.spec_file import read_spec
+from rtradar.campaign.samples import SamplePlan, counts, plan_samples
+from rtradar.campaign.spec import read_spec
 from rtradar.errors import InputError
 
 HEAD = """
@@ -40,10 +39,10 @@ Frame Time: 0.1
 )
 
 
-def planned(folder: Path, text: str, seed: int = 0) -> list[Recipe]:
+def planned(folder: Path, text: str, seed: int = 0) -> list[SamplePlan]:
     path = folder / "set.toml"
     path.write_text(f"seed = {seed}\n{text}")
-    return recipes(read_spec(path))
+    return plan_samples(read_spec(path))
 
 
 def actors(count: int, *labels: str) -> str:
@@ -76,7 +75,7 @@ def test_a_motion_is_the_same_for_every_setting(tmp_path: Path) -> None:
     found = planned(
         tmp_path, HEAD + '[each]\nfidelity = ["analytic", "specular"]\n' + actors(4, "walk")
     )
-    by_take: dict[str, list[Recipe]] = {}
+    by_take: dict[str, list[SamplePlan]] = {}
     for recipe in found:
         by_take.setdefault(recipe.parameters["recording"], []).append(recipe)
     assert len(by_take) == 4
@@ -117,7 +116,7 @@ def test_an_id_is_of_all_that_a_sample_follows_from(tmp_path: Path) -> None:
 
 
 def test_an_id_is_the_same_tomorrow() -> None:
-    recipe = Recipe("walk", {"b": [1, 2.5], "a": "x"}, None, None)  # type: ignore[arg-type]
+    recipe = SamplePlan("walk", {"b": [1, 2.5], "a": "x"}, None, None)  # type: ignore[arg-type]
     assert recipe.identity == "d0a8e28dc6775d9616b6"
 
 

@@ -18,18 +18,17 @@ from hypothesis import strategies as st
 
 from rtradar import __version__
 from rtradar.campaign import build as building
-from rtradar.campaign.build import Store, build_dataset
+from rtradar.campaign.build import Store, build_dataset, make_and_store, work
 from rtradar.campaign.cluster import _place_for_kernels as place_for_kernels
 from rtradar.campaign.cluster import dask_client
-from rtradar.campaign.sample import Made, Recipe
-from rtradar.campaign.work import make_and_store, work
+from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.dataset_store import sample_path, sweep, write_index
 from rtradar.errors import CampaignError, InputError
 from rtradar.system.output_folder import alone_in
 
 RECIPES = [
-    Recipe(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
+    SamplePlan(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
     for number in range(9)
 ]
 TINY = """
@@ -53,13 +52,13 @@ frame_duration_s = 0.05
 """
 
 
-def fake(recipe: Recipe) -> Made:
+def fake(recipe: SamplePlan) -> Made:
     """A cloud that follows from the recipe, at no cost."""
     points = np.random.default_rng(recipe.parameters["number"]).random((4, 3))
     return Made(Sample(points, recipe.label, recipe.parameters), points, 0.5)
 
 
-def deadly(recipe: Recipe) -> Made:
+def deadly(recipe: SamplePlan) -> Made:
     """The same, but the process dies of signal 9 the first time."""
     mark = Path(recipe.parameters["mark"])
     if not mark.exists():
@@ -98,7 +97,7 @@ def test_what_is_missing_is_made_once(client: Client, tmp_path: Path) -> None:
 )
 def test_order_kills_and_damage_leave_the_same_bytes(
     tmp_path_factory: pytest.TempPathFactory,
-    order: list[Recipe],
+    order: list[SamplePlan],
     killed: int,
     spoiled: int,
     cut: int,
@@ -133,7 +132,7 @@ def test_a_damaged_sample_is_found_and_made_anew(tmp_path: Path) -> None:
 def test_a_sample_that_cannot_be_made_does_not_stop_the_others(
     client: Client, tmp_path: Path
 ) -> None:
-    def picky(recipe: Recipe) -> Made:
+    def picky(recipe: SamplePlan) -> Made:
         if recipe.parameters["number"] == 3:
             raise InputError("the person stands in the wall")
         return fake(recipe)
@@ -157,7 +156,9 @@ def test_a_folder_that_cannot_be_written_stops_it_in_one_line(
 
 
 def test_a_worker_of_another_version_makes_nothing(tmp_path: Path) -> None:
-    outcome = make_and_store(Recipe("walk", {"version": "0.0"}, None, None), str(tmp_path), fake)  # type: ignore[arg-type]
+    outcome = make_and_store(
+        SamplePlan("walk", {"version": "0.0"}, None, None), str(tmp_path), fake
+    )  # type: ignore[arg-type]
     assert f"this worker has rtradar {__version__}, not 0.0" in outcome.trouble
     assert not contents(tmp_path)
 
@@ -245,12 +246,12 @@ def test_a_plan_estimates_what_it_does_not_make(
     )
     (tmp_path / "set.toml").write_text(text)
 
-    def timed(recipe: Recipe) -> Made:
+    def timed(recipe: SamplePlan) -> Made:
         points = np.zeros((10, 3))
         seconds = 1.0 if recipe.parameters["fidelity"] == "analytic" else 5.0
         return Made(Sample(points, recipe.label, {}), points, seconds)
 
-    monkeypatch.setattr(building, "make", timed)
+    monkeypatch.setattr(building, "make_sample", timed)
     report = build_dataset(tmp_path / "set.toml", tmp_path / "out", plan_only=True)
     assert (report["samples"], report["made"], report["missing"]) == (
         14,
@@ -282,7 +283,7 @@ def test_a_worker_killed_by_signal_9_loses_nothing(
     cloudpickle.register_pickle_by_value(sys.modules[__name__])  # workers cannot import the tests
     request.addfinalizer(lambda: cloudpickle.unregister_pickle_by_value(sys.modules[__name__]))
     marked = [
-        Recipe(recipe.label, {**recipe.parameters, "mark": str(tmp_path / "mark")}, None, None)  # type: ignore[arg-type]
+        SamplePlan(recipe.label, {**recipe.parameters, "mark": str(tmp_path / "mark")}, None, None)  # type: ignore[arg-type]
         for recipe in RECIPES
     ]
     killed, undisturbed = tmp_path / "killed", tmp_path / "undisturbed"

@@ -1,0 +1,308 @@
+"""Samples of a data set: their plans, which follow from a specification, their ids, and making."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, fields, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from tqdm import tqdm
+
+from rtradar import __version__
+from rtradar.campaign.spec import (
+    DRAWN,
+    RUN_KEYS,
+    Actor,
+    Combination,
+    Recorded,
+    Spec,
+    check_samples,
+)
+from rtradar.clouds.dataset_store import FORMAT, Sample
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.motion import Motion, cut, load_motion, synthetic_motion
+from rtradar.pipeline import clouds_of
+from rtradar.radar import Radar
+from rtradar.scene import Scene
+from rtradar.settings import RunSettings
+from rtradar.system.files import open_regular
+from rtradar.system.seeds import stream
+
+SPATIAL_POINTS = 3000
+"""Largest number of points of the spatial cloud, a uniform sample if there are more."""
+
+_ID_DIGITS = 20  # 80 bits: two of a million samples share an id once in 2e12 collections
+_SPATIAL_STREAM = 2  # differs from the random streams of noise and RDT cloud with the same seed
+_SYNTHETIC_LICENCE = "none: made by rtradar"
+_PATIENCE_S = 2.0  # what lasts longer shows a progress bar
+_BODY = ("build", "height_m")  # drawn once for each synthetic subject
+_LATER_FIELDS = (
+    "multiplexing", "carrier_step_hz", "doppler_bands", "transmit_power_dbm", "noise_figure_db",
+    "noise_temperature_k", "tx_antenna", "rx_antenna",
+)  # fmt: skip
+"""Radar fields added later, left out at their defaults, so that ids of older samples stay."""
+
+_FIRST_KEYS = ("pfa", "clutter_removal")
+"""Settings of a run that ids always contain; others are left out at their defaults."""
+
+
+@dataclass(frozen=True)
+class SamplePlan:
+    """Everything that one sample follows from.
+
+    ``parameters`` are plain JSON values, from which all else follows, and part of the provenance.
+    ``motion`` is the recording, or None for a synthetic actor, made anew from the parameters.
+    """
+
+    label: str
+    parameters: Mapping[str, Any]
+    radar: Radar
+    scene: Scene
+    motion: Motion | None = None
+
+    @cached_property
+    def identity(self) -> str:
+        """Id of the sample: a hash of the label, the parameters and the format of the file."""
+        content = {"format": FORMAT, "label": self.label, "parameters": self.parameters}
+        text = json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+        return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
+
+    @property
+    def kind(self) -> tuple[str, str, str]:
+        """Radar, scene and fidelity, on which the cost depends most."""
+        return self.parameters["radar"], self.parameters["scene"], self.parameters["fidelity"]
+
+    @property
+    def interval_s(self) -> float:
+        """Length of the interval [s], to which the cost is in proportion."""
+        return float(self.parameters["duration_s"])
+
+    def packed(self) -> SamplePlan:
+        """Return a copy whose motion is cut to the interval, small enough to send to a worker."""
+        if self.motion is None:
+            return self
+        start_s = self.parameters["start_s"]
+        # An interval to the end is rounded, and may be a little longer than what is there.
+        duration_s = min(self.interval_s, self.motion.duration_s - start_s)
+        return replace(self, motion=cut(self.motion, start_s, duration_s))
+
+    def run_settings(self) -> RunSettings:
+        """Return the settings of the run that makes the sample of a `packed` plan."""
+        names = {field.name for field in fields(RunSettings)}
+        given = {name: value for name, value in self.parameters.items() if name in names}
+        if self.motion is not None:  # which is cut already
+            given["start_s"] = 0.0
+        return RunSettings(**given | {"variant": "cpu"})  # workers share the cores
+
+
+class _Interval(NamedTuple):
+    """Interval of a recording: parameters of the recording, drawn values, motion if recorded."""
+
+    label: str
+    parameters: dict[str, Any]
+    drawn: Mapping[str, float]
+    motion: Motion | None
+
+
+def plan_samples(spec: Spec) -> list[SamplePlan]:
+    """Plan all samples, in the order of their ids.
+
+    InputError if a recording cannot be read or is too short, two samples are equal, or there are
+    too many.
+    """
+    intervals = [interval for actor in spec.actors for interval in _takes(spec, actor)]
+    # Reading takes a second for a long recording.
+    reading = {"desc": "reading recordings", "unit": "file"}
+    for recorded in tqdm(spec.recordings, disable=None if spec.recordings else True, **reading):
+        motion = load_motion(recorded.path, skeleton=recorded.skeleton)
+        count = len(intervals) + recorded.intervals.count(motion.duration_s)
+        check_samples(count, len(spec.combinations))
+        intervals += _intervals(spec, recorded, motion)
+    run = asdict(spec.run)
+    usual = asdict(RunSettings())
+    common = {key: run[key] for key in RUN_KEYS if key in _FIRST_KEYS or run[key] != usual[key]}
+    common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
+    planned = [
+        _plan(interval, combination, common)
+        for interval in tqdm(
+            intervals,
+            desc="planning samples",
+            unit="interval",
+            disable=None,
+            leave=False,
+            delay=_PATIENCE_S,
+        )
+        for combination in spec.combinations
+    ]
+    identities = Counter(plan.identity for plan in planned)
+    for plan in planned:
+        if identities[plan.identity] > 1:
+            raise InputError(
+                f"recording '{plan.parameters['recording']}' from {plan.parameters['start_s']:g} s "
+                "stands there twice; leave one out"
+            )
+    return sorted(planned, key=lambda plan: plan.identity)
+
+
+def counts(planned: Sequence[SamplePlan]) -> dict[str, dict[str, int]]:
+    """Count the samples of each label, source, radar, scene, fidelity level and subject."""
+    columns: dict[str, Counter[str]] = {"label": Counter(plan.label for plan in planned)}
+    for key in ("source", "radar", "scene", "fidelity", "subject"):
+        columns[key] = Counter(str(plan.parameters[key]) for plan in planned)
+    return {key: dict(sorted(column.items())) for key, column in columns.items()}
+
+
+def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
+    take_s = spec.intervals.needed_s
+    assert take_s is not None  # the specification was checked
+    for take in actor.seeds:
+        subject = actor.subjects[take % len(actor.subjects)]
+        seed = _seed(spec.run.seed, actor.label, take)
+        body = _draw(spec, _seed("subject", subject))
+        drawn = _draw(spec, seed) | {key: body[key] for key in _BODY}
+        name = f"synthetic:{actor.label}:{spec.run.seed}:{take}"
+        motion: dict[str, Any] = {
+            "recording": name,
+            "recording_digest": "",
+            "source": "synthetic",
+            "subject": f"synthetic-{subject}",
+            "subject_seed": subject,
+            "licence": _SYNTHETIC_LICENCE,
+            "take": seed,
+            "take_s": take_s,
+            "side": "left" if np.random.default_rng(stream(seed, 1)).integers(2) else "right",
+            **{key: drawn[key] for key in ("tempo", "amplitude", *_BODY)},
+            "seed": seed,
+        }
+        for start_s, duration_s in spec.intervals.of(name, take_s):
+            yield _Interval(
+                actor.label, {**motion, "start_s": start_s, "duration_s": duration_s}, drawn, None
+            )
+
+
+def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Interval]:
+    content = digest([path for path in (recorded.path, recorded.skeleton) if path is not None])
+    for start_s, duration_s in recorded.intervals.of(recorded.name, motion.duration_s):
+        seed = _seed(spec.run.seed, content, start_s)
+        parameters = {
+            "recording": recorded.name,
+            "recording_digest": content,
+            "source": "recorded",
+            "subject": recorded.subject,
+            "licence": recorded.licence,
+            "seed": seed,
+            "start_s": start_s,
+            "duration_s": duration_s,
+        }
+        yield _Interval(recorded.label, parameters, _draw(spec, seed), motion)
+
+
+def _plan(interval: _Interval, each: Combination, common: Mapping[str, Any]) -> SamplePlan:
+    drawn, radar = interval.drawn, each.radar
+    x, y = each.scene.person_position_m
+    place = (x + drawn["offset_x_m"], y + drawn["offset_y_m"])
+    scene = replace(each.scene, person_position_m=place)
+    parameters = {
+        **interval.parameters,
+        **common,
+        "radar": radar.name,
+        "radar_parameters": _radar_parameters(radar),
+        "scene": scene.name,
+        "scene_digest": scene_digest(scene),
+        "fidelity": each.fidelity,
+        "heading_deg": drawn["heading_deg"] if each.heading_deg is None else each.heading_deg,
+        "snr_db": drawn["snr_db"] if each.snr_db is None else each.snr_db,
+        "person_position_m": list(place),
+        "radar_position_m": list(scene.radar_position_m or radar.position_m),
+    }
+    return SamplePlan(interval.label, parameters, radar, scene, interval.motion)
+
+
+@lru_cache(maxsize=16)
+def _radar_parameters(radar: Radar) -> dict[str, Any]:
+    values = asdict(radar)
+    for field in fields(radar):
+        if field.name in _LATER_FIELDS and values[field.name] == field.default:
+            del values[field.name]
+    return values | {"position_m": list(values["position_m"])}
+
+
+def _draw(spec: Spec, seed: int) -> dict[str, float]:
+    """Draw one value from every range, each independent of the other ranges."""
+    places = np.random.default_rng(stream(seed, 0)).random(len(DRAWN))
+    # Four decimals are enough, and are read as the same number everywhere.
+    return {
+        key: round(low + (high - low) * float(place), 4)
+        for (key, (low, high)), place in zip(spec.drawn.items(), places, strict=True)
+    }
+
+
+def _seed(*values: object) -> int:
+    """Derive a seed of 32 bits from values, which it does not reveal."""
+    return int.from_bytes(hashlib.sha256(repr(values).encode()).digest()[:4], "big")
+
+
+class Made(NamedTuple):
+    """Sample, spatial cloud (m, 3) [m] of the same capture, and time ``work_s`` without warm-up."""
+
+    sample: Sample
+    spatial: NDArray[np.float64]
+    work_s: float
+
+
+def make_sample(plan: SamplePlan) -> Made:
+    """Make the sample of a `packed` plan; InputError if the person cannot be where it says."""
+    began = time.perf_counter()
+    motion, values = plan.motion, plan.parameters
+    if motion is None:
+        # The whole take is made, because the path of a walk depends on its length.
+        keys = ("height_m", "build", "tempo", "amplitude", "side", "take")
+        actor = {key: values[key] for key in keys}
+        motion = synthetic_motion(
+            plan.label, seed=values["subject_seed"], duration_s=values["take_s"], **actor
+        )
+    settings: Any = vars(plan.run_settings())
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always", ValidityWarning)
+        clouds, warmup_s = clouds_of(motion, plan.radar, plan.scene, **settings)
+    limits = {str(one.message) for one in caught if issubclass(one.category, ValidityWarning)}
+    found = {
+        "detections": clouds.rdt.n_voxels,
+        "rdt_triangles": clouds.rdt.n_triangles,
+        "xyz_points_found": clouds.n_spatial,
+        "limits": sorted(limits),
+    }
+    places = clouds.spatial.points
+    if len(places) > SPATIAL_POINTS:
+        random = np.random.default_rng(stream(values["seed"], _SPATIAL_STREAM))
+        places = places[np.sort(random.choice(len(places), SPATIAL_POINTS, replace=False))]
+    sample = Sample(clouds.rdt.points, plan.label, {**values, **found})
+    return Made(sample, places, time.perf_counter() - began - warmup_s)
+
+
+def scene_digest(scene: Scene) -> str:
+    """Hash of a scene, including the content of its mesh files."""
+
+    def content(value: object) -> str:
+        return digest([value]) if isinstance(value, Path) else str(value)
+
+    text = json.dumps(asdict(scene), sort_keys=True, default=content)
+    return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
+
+
+def digest(paths: list[Path]) -> str:
+    """Hash of the content of files, one after the other."""
+    found = hashlib.sha256()
+    for path in paths:
+        with open_regular(path) as file:
+            found.update(hashlib.file_digest(file, "sha256").digest())
+    return found.hexdigest()[:_ID_DIGITS]

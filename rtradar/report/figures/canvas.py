@@ -1,0 +1,140 @@
+"""What all pictures share: units of power in place of the square metres of the maps, and canvases.
+
+Maps hold abs(amplitude)^2 [m^2] including the spreading loss 1 / (R1^2 R2^2)
+(`rtradar.conventions`). Read as a cross-section, a person of 1 m^2 at 4 m would be 24 dB too low.
+Pictures therefore use one of three units:
+
+``dBm``
+    Received power, if the radar states its transmit power.
+``dBsm``
+    Radar cross-section relative to 1 m^2, otherwise. The loss is removed with the range R of the
+    cell: R^4 times the map. An echo on boresight shows its own cross-section, less the scalloping
+    loss between two bins (at most 1.4 dB in range and as much in velocity for Hann windows). Noise
+    shows as the cross-section of equal power, and so rises with range. Nothing is removed if
+    amplitudes do not include the loss.
+``dB re maximum``
+    Decibels below the strongest value shown, for sums over ranges, as in a spectrogram or over all
+    body parts, which have no single loss to remove. If the loss were removed before the sum, the
+    noise of the farthest bins would dominate and hide the person. A level above the noise would
+    have no meaning in runs without noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.radar import Radar
+
+VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
+"""Label of every velocity axis."""
+
+HANN_BINS = 1.5
+"""Noise bandwidth of a Hann window [bins]; a sum over bins divided by it is the echo's power."""
+
+_QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power"}
+
+
+@dataclass(frozen=True, eq=False)
+class FieldUnit:
+    """Unit of power in pictures, made by `field_unit`.
+
+    Parameters
+    ----------
+    name : {"dBm", "dBsm", "dB re maximum"}
+        Name of the unit.
+    scale : float or array of float
+        Factor from power [m^2] to the linear unit, of a shape that broadcasts with the powers.
+    """
+
+    name: str
+    scale: float | NDArray[np.float64]
+
+    def level(self, power_m2: ArrayLike) -> NDArray[np.float64]:
+        """Convert powers [m^2] to levels in this unit [dB], about -380 dB for a power of 0."""
+        linear = np.asarray(power_m2, dtype=np.float64) * self.scale
+        return np.asarray(10 * np.log10(np.maximum(linear, np.finfo(np.float32).tiny)))
+
+    def label(self, qualifier: str = "") -> str:
+        """Return the label of an axis, such as ``RCS, mean of channels [dBsm]``."""
+        return f"{_QUANTITIES[self.name]}{', ' if qualifier else ''}{qualifier} [{self.name}]"
+
+
+def field_unit(
+    radar: Radar,
+    *,
+    spreading: bool = True,
+    range_m: ArrayLike | None = None,
+    strongest_m2: float = 1.0,
+) -> FieldUnit:
+    """Choose the unit of power in the pictures of a run, as this module's docstring explains.
+
+    ``spreading`` tells whether amplitudes include the spreading loss. ``range_m`` are the ranges of
+    the powers [m], of a shape that broadcasts with them, or None for sums over ranges.
+    ``strongest_m2`` is the reference of ``dB re maximum`` [m^2].
+    """
+    if not spreading:
+        return FieldUnit("dBsm", 1.0)
+    if radar.transmit_power_dbm is not None:
+        return FieldUnit("dBm", 1e3 * radar.watts_per_m2)
+    if range_m is None:
+        return FieldUnit("dB re maximum", 1 / max(strongest_m2, float(np.finfo(np.float32).tiny)))
+    # The first bin begins at the antennas.
+    distance = np.maximum(np.asarray(range_m, dtype=np.float64), radar.range_bin_m / 2)
+    return FieldUnit("dBsm", distance**4)
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Make an empty figure of this size [inch] without a window."""
+    return Figure(figsize=(width, height), dpi=130, layout="constrained")
+
+
+def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
+    """Save in the format of the path's suffix, or as PNG to an open file, and clear the figure.
+
+    Figure and axes refer to each other. Without clearing, the memory of one picture could
+    still be in use with the next, until Python's garbage collector runs.
+    """
+    for axes in figure.axes:
+        axes.title.set_wrap(True)
+    figure.savefig(file, format=None if isinstance(file, Path) else "png")
+    figure.clear()
+
+
+def colour_limits(
+    level_db: NDArray[np.float64], below_peak_db: float = 60.0
+) -> tuple[float, float]:
+    """Return the limits of the colour scale [dB].
+
+    They are the peak and 3 dB below the median, or ``below_peak_db`` below the peak if higher.
+    """
+    top = float(level_db.max())
+    return max(top - below_peak_db, min(float(np.median(level_db)) - 3, top - 1)), top
+
+
+def bin_edges(centres: NDArray[np.float64]) -> tuple[float, float]:
+    """Outer edges of evenly spaced bins."""
+    half = (centres[1] - centres[0]) / 2 if len(centres) > 1 else 0.5
+    return float(centres[0] - half), float(centres[-1] + half)
+
+
+def draw_levels(
+    axes: Axes,
+    level_db: NDArray[np.float64],
+    across: NDArray[np.float64],
+    up: NDArray[np.float64],
+    limits_db: tuple[float, float] | None = None,
+    **style: Any,
+) -> AxesImage:
+    """Draw ``level_db`` (up, across) over evenly spaced axes, in the colours of `colour_limits`."""
+    low, high = limits_db or colour_limits(level_db)
+    extent = (*bin_edges(across), *bin_edges(up))
+    style = {"cmap": "viridis", "aspect": "auto", "origin": "lower"} | style
+    return axes.imshow(level_db, vmin=low, vmax=high, extent=extent, **style)

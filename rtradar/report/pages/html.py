@@ -1,0 +1,270 @@
+"""HTML of pages: the frame of a page that makes no requests, and tables, boxes and pictures in it.
+
+All given texts are escaped.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import struct
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any, NamedTuple
+
+from matplotlib.ticker import EngFormatter
+
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.system.files import atomic_file, open_regular
+
+_HEAD = Template("""<!doctype html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta http-equiv="Content-Security-Policy" content="$policy">
+<meta name="generator" content="rtradar">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title</title>
+<style>
+$style</style>
+</head>
+<body>
+<header>
+<p class="kind">$kind</p>
+<h1>$heading</h1>
+<p class="sub">$subtitle</p>
+</header>
+<main>
+""")
+_NO_SCRIPT = """
+<noscript><p class="box warn">The views that move need JavaScript; all else on this page does
+without.</p></noscript>
+"""
+_UNITS = {
+    "hz": "Hz", "s": "s", "m": "m", "m2": "m²", "mps": "m/s", "db": "dB", "deg": "°", "mb": "MB",
+    "wavelengths": "wavelengths at the start of the sweep",
+}  # fmt: skip
+_ACRONYMS = {"pfa": "Pfa", "rdt": "RDT", "rx": "Rx", "snr": "SNR", "tx": "Tx"}
+_PREFIXED = {"Hz", "s"}  # shown as 12 GHz or 62.5 µs
+_PNG = b"\x89PNG\r\n\x1a\n"
+
+
+class Titles(NamedTuple):
+    """Plain texts at the top of a page."""
+
+    kind: str
+    heading: str
+    subtitle: str
+
+
+def player(more: str = "") -> str:
+    """Make the HTML of the time controls of a figure, with ``more`` beside them."""
+    return f"""<div class="player" id="player"><button type="button" id="play">Play</button>
+<input type="range" id="moment" min="0" value="0" step="1" aria-label="Moment of the recording">
+<output id="clock" for="moment"></output>
+<label>Speed <select id="speed"><option value="0.1">× 0.1</option>
+<option value="0.25">× 0.25</option><option value="0.5">× 0.5</option>
+<option value="1" selected>× 1</option></select></label>{more}</div>"""
+
+
+def write_page(
+    path: str | Path,
+    titles: Titles,
+    top: str,
+    body: Iterable[str],
+    *,
+    data: object = None,
+    scripts: Sequence[str] = (),
+) -> None:
+    """Write a page whose policy forbids any request.
+
+    The HTML of ``body`` is written part by part, so that memory does not grow with the pictures.
+    Pages with ``scripts``, files of this package that are run as one, include plotly.js (about
+    5 MB), and ``data`` as JSON in the element ``report-data``. InputError if the file cannot be
+    written; an existing file is then unchanged.
+    """
+    code: list[bytes] = []
+    if scripts:
+        text = "".join(map(_asset, scripts))
+        code = [
+            # As bytes, because text with letters beyond Latin takes twice the memory.
+            files("plotly").joinpath("package_data/plotly.min.js").read_bytes(),
+            f'(() => {{\n"use strict";\n{text}}})();\n'.encode(),
+        ]
+    head = _HEAD.substitute(
+        policy=_policy(code),
+        title=escape(f"{titles.heading} - {titles.kind.split()[0]}"),
+        style=_asset("page.css"),
+        **{name: escape(value) for name, value in titles._asdict().items()},
+    )
+    with atomic_file(path) as file:
+        file.write((head + top + (_NO_SCRIPT if scripts else "\n")).encode())
+        file.writelines(part.encode() for part in body)
+        file.write(b"</main>\n")
+        if scripts:
+            # Without any <, so that no text can end the element.
+            content = json.dumps(data, allow_nan=False, separators=(",", ":"))
+            file.write(b'<script type="application/json" id="report-data">')
+            file.write(content.replace("<", "\\u003c").encode() + b"</script>\n")
+        for script in code:
+            file.writelines((b"<script>", script, b"</script>\n"))
+        file.write(b"</body>\n</html>\n")
+
+
+def is_page(path: Path) -> bool:
+    """Return whether a regular file exists at this path and was written by `write_page`."""
+    with suppress(OSError), open_regular(path) as file:
+        return b'<meta name="generator" content="rtradar">' in file.read(4096)
+    return False
+
+
+def _asset(name: str) -> str:
+    return files("rtradar.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _policy(scripts: Iterable[bytes]) -> str:
+    """Content security policy that allows these scripts and embedded pictures only."""
+    none = "'none'"
+    hashes = " ".join(
+        f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts
+    )
+    # Plotly writes style rules of its own, and pictures for download are blobs.
+    sources = f"script-src {hashes or none}; style-src 'unsafe-inline'; img-src data: blob:"
+    return f"default-src {none}; {sources}; base-uri {none}; form-action {none}"
+
+
+def quantity(name: str, value: object) -> tuple[str, str]:
+    """Format a name with a unit suffix and its value, such as ("chirp duration", "62.5 µs").
+
+    The value is a number, a text, a Boolean, a sequence of them, or None. Nothing is escaped yet.
+    """
+    words = name.split("_")
+    unit = _UNITS.get(words[-1], "") if len(words) > 1 else ""
+    if unit:
+        words = words[:-1]
+    return " ".join(_ACRONYMS.get(word, word) for word in words), _text(value, unit)
+
+
+def _text(value: object, unit: str) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, list | tuple):
+        return f"({', '.join(_text(item, '') for item in value)}){' ' if unit else ''}{unit}"
+    if isinstance(value, int) and not unit:
+        return str(value)
+    if isinstance(value, int | float):
+        if unit in _PREFIXED and value:
+            return EngFormatter(unit=unit, places=None)(value)
+        shown = f"{value:.5g}"
+    else:
+        shown = str(value)
+        if not shown.lstrip("-").isalnum() or not unit:
+            unit = ""
+    return shown + ("" if unit in ("", "°") else " ") + unit
+
+
+def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
+    """Make an HTML table of plain texts; the first column names the row."""
+    top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
+    body = "".join(
+        f'<tr><th scope="row">{escape(row[0])}</th>'
+        + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:])
+        + "</tr>"
+        for row in rows
+    )
+    head_row = f"<thead><tr>{top}</tr></thead>" if head else ""
+    return f"<table>{head_row}<tbody>{body}</tbody></table>"
+
+
+def mapping_table(values: Mapping[str, Any]) -> str:
+    """Make a table of all values except mappings and lists of mappings."""
+    return table(
+        quantity(name, value)
+        for name, value in values.items()
+        if not isinstance(value, Mapping)
+        and not (isinstance(value, list) and value and isinstance(value[0], Mapping))
+    )
+
+
+def limits_table(radar: Radar) -> str:
+    """Make the paper's Table 2, the measurement limits, for this radar at its centre frequency."""
+    bin_cm, turn = f"{100 * radar.range_bin_m:.3f} cm", _text(radar.cycle_duration_s, "s")
+    channels = f"{radar.n_tx} × {radar.n_rx} = {radar.n_channels}"
+    beam = f"{radar.angle_resolution_deg:.2f}°"
+    rows = (
+        ("r_max", "Maximum detectable range", f"{radar.max_range_m:.3f} m"),
+        ("r_dis", "Minimum distinguishable distance, one range bin", bin_cm),
+        ("v_max", "Maximum unambiguous velocity", f"±{radar.max_velocity_mps:.3f} m/s"),
+        (
+            "v_dis",
+            "Minimum distinguishable velocity, one Doppler bin",
+            f"{radar.velocity_bin_mps:.4f} m/s",
+        ),
+        ("A_range", "Unambiguous azimuth and elevation", f"±{radar.max_angle_deg:.1f}°"),
+        ("A_dis", "Beam width, -3 dB, uniform line, far field", beam),
+        ("λ", "Wavelength at the centre of the sweep", f"{1000 * radar.wavelength_m:.3f} mm"),
+        ("T_cycle", "One turn through all Tx", turn),
+        ("N_cycle", "Cycles in one frame", str(radar.cycles_per_frame)),
+        ("N_virtual", "Virtual channels, Tx by Rx", channels),
+    )
+    return table(rows, ("", "Limit", "Value"))
+
+
+def stages_table(seconds: Mapping[str, float]) -> str:
+    """Make a table of the time of each stage, with bars relative to the slowest one."""
+    longest = max(seconds.values(), default=0.0) or 1.0
+    total = sum(seconds.values()) or 1.0
+    rows = "".join(
+        f'<tr><th scope="row">{escape(name)}</th><td>{value:.3f} s</td><td>{value / total:.0%}</td>'
+        f'<td class="bar"><span style="width:{100 * value / longest:.1f}%"></span></td></tr>'
+        for name, value in seconds.items()
+    )
+    return f'<table class="stages"><tbody>{rows}</tbody></table>'
+
+
+def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
+    """Make a box that lists where a model came near the end of its validity, or that none did."""
+    if not limits:
+        text = "Nothing came near the end of a model's validity."
+        return f'<aside class="box fine"><p>{text}</p></aside>'
+    items = []
+    for limit in limits:
+        share = float(limit.get("share", 0.0))
+        message = f"{share:.1%} of the {limit['message']}" if share > 0 else str(limit["message"])
+        items.append(f"<li>{escape(message)} <code>{escape(str(limit['name']))}</code></li>")
+    title = "<h2>Limits of this result</h2>"
+    return f'<aside class="box warn">{title}<ul>{"".join(items)}</ul></aside>'
+
+
+def tiles(values: Iterable[tuple[str, str]]) -> str:
+    """Make a row of large figures from pairs (value, caption)."""
+    cells = (f"<div><b>{escape(v)}</b><span>{escape(n)}</span></div>" for v, n in values)
+    return f'<div class="tiles">{"".join(cells)}</div>'
+
+
+def picture(title: str, path: Path) -> str:
+    """Embed a PNG file with its caption; InputError if it is missing or not a PNG file."""
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise InputError(
+            f"report: picture '{path}': {error.strerror}; give the path of a PNG file"
+        ) from None
+    if data[:8] != _PNG or len(data) < 24:
+        raise InputError(f"report: picture '{path}' is no PNG file; only PNG is embedded")
+    width, height = struct.unpack(">II", data[16:24])
+    text = escape(title)
+    return (
+        f'<figure><img alt="{text}" width="{width}" height="{height}" '
+        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
+        f"<figcaption>{text}</figcaption></figure>"
+    )
