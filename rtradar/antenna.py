@@ -16,7 +16,7 @@ from rtradar.system.checks import check_number, shown
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
 _PATTERNS = ("isotropic", "cosine", "dipole", "table")
 _CUTS = ("azimuth_deg", "azimuth_db", "elevation_deg", "elevation_db")
-_MOST_EXPONENT = 1e4
+_LIMITS = {"exponent": (0.0, 1e4), "gain_dbi": (-100.0, 100.0)}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,17 +64,10 @@ class Antenna:
                 f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only "
                 "'cosine' has one, and needs it"
             )
-        if self.exponent is not None:
-            object.__setattr__(
-                self,
-                "exponent",
-                check_number("antenna", "exponent", self.exponent, 0, _MOST_EXPONENT),
-            )
-        if self.gain_dbi is not None:
-            object.__setattr__(
-                self, "gain_dbi", check_number("antenna", "gain_dbi", self.gain_dbi, -100, 100)
-            )
-        elif self.pattern == "table":
+        for key, (least, most) in _LIMITS.items():
+            if (value := getattr(self, key)) is not None:
+                object.__setattr__(self, key, check_number("antenna", key, value, least, most))
+        if self.gain_dbi is None and self.pattern == "table":
             raise InputError("antenna: pattern = 'table' needs gain_dbi, the gain at its peak")
         for cut in _CUTS:
             values = getattr(self, cut)
@@ -84,9 +77,8 @@ class Antenna:
                     f"{shown(values)}"
                 )
             limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
-            object.__setattr__(
-                self, cut, tuple(check_number("antenna", cut, value, *limits) for value in values)
-            )
+            checked = tuple(check_number("antenna", cut, value, *limits) for value in values)
+            object.__setattr__(self, cut, checked)
         for name in ("azimuth", "elevation"):
             angles, levels = getattr(self, f"{name}_deg"), getattr(self, f"{name}_db")
             if len(angles) != len(levels) or (np.diff(angles) <= 0).any():

@@ -1,7 +1,6 @@
 """A person as 21 posed ellipsoids, and their meshes."""
 
-from rtradar.body.body import PART_NAMES, Body, Poses
-from rtradar.body.ellipsoids import Ellipsoids
+from rtradar.body.body import PART_NAMES, Body, Ellipsoids, Poses
 from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
 
 __all__ = ["PART_NAMES", "Body", "Ellipsoids", "Poses", "ellipsoid_meshes", "unit_sphere"]

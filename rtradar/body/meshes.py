@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.ellipsoids import Ellipsoids
+from rtradar.body.body import Ellipsoids
 from rtradar.errors import InputError
 
 MAXIMUM_SUBDIVISIONS = 8

@@ -28,7 +28,10 @@ from rtradar.system.toml_tables import check_keys, read_toml
 PRESETS = Registry(
     "rtradar.radars",
     "radar",
-    {"paper-12ghz": "rtradar.presets:paper_12ghz", "paper-77ghz": "rtradar.presets:paper_77ghz"},
+    {
+        "paper-12ghz": "rtradar.radar.radar:paper_12ghz",
+        "paper-77ghz": "rtradar.radar.radar:paper_77ghz",
+    },
 )
 """Radars that have a name: each is made by a function without arguments."""
 
@@ -515,3 +518,13 @@ class Radar:
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
         noise_k = self.noise_temperature_k + receiver_k
         return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
+
+
+def paper_12ghz() -> Radar:
+    """Make the radar of the paper's Table 1."""
+    return Radar(start_frequency_hz=12e9, chirp_duration_s=62.5e-6)
+
+
+def paper_77ghz() -> Radar:
+    """Make the paper's radar at 77 GHz, whose chirps are five times shorter."""
+    return Radar(start_frequency_hz=77e9, chirp_duration_s=12.5e-6)
