@@ -55,13 +55,15 @@ def build_model(
     fidelity : str
         One of `MODELS`.
     radar : Radar
+        Radar whose chirps and antennas the model uses.
     body : Body
+        Person, or another moving body of ellipsoids.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, for models that trace.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     **model_options
-        Of the model, such as ``shadow_rays`` of ``fresnel``; its class documents them.
+        Settings of that model, such as ``shadow_rays`` of ``fresnel``; its class documents them.
 
     Returns
     -------

@@ -62,14 +62,15 @@ def scattering_length(
     tx, rx : (n, 3) array_like
         Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single (3,).
     frequency : float or (n,) array_like
-        [Hz].
+        Frequency of the wave, for all pairs or for each [Hz].
     fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}
         The model.
     polarization : {"v", "h"}
         v is world z projected across the line of sight, h is across both.
     **model_options
-        Of the model: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that trace, ``shadow_rays`` of ``fresnel``,
-        ``facets`` of ``physical-optics`` and ``reference``, ``rays_per_wavelength`` and ``bounces`` of ``rays``.
+        Settings of that model: ``variant`` ("auto", "cpu", "llvm", "scalar", "cuda") of all that
+        trace, ``shadow_rays`` of ``fresnel``, ``facets`` of ``physical-optics`` and ``reference``,
+        ``rays_per_wavelength`` and ``bounces`` of ``rays``.
 
     Returns
     -------

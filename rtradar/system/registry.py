@@ -51,7 +51,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
         Parameters
         ----------
         name : str
-            By which it is asked for.
+            Name on the command line and in Python, which must be free.
         make : callable
             Function or class; ``docs/extending.md`` says what each kind takes and gives.
 

@@ -89,14 +89,18 @@ class ChirpPoses(NamedTuple):
 
 
 def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPoses:
-    """Poses at the centres of some chirps; past the end of the recording the body rests in its last pose.
+    """Compute the poses of a body at the centres of some chirps.
+
+    Past the end of the recording the body rests in its last pose.
 
     Parameters
     ----------
     radar : Radar
+        Radar that transmits the chirps.
     body : Body
+        Moving body.
     chirps : (chirp,) int64
-        Counted from the start of the capture.
+        Numbers of chirps, counted from the start of the capture.
 
     Returns
     -------
