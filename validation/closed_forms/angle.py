@@ -1,9 +1,11 @@
-"""Angles of a point echo: where it is, how sharply it is seen, and what focusing on its distance gains.
+"""Angles of a point echo: its direction, the width of the beam, and the gain of focusing.
 
-The IF samples of a point are written down here from the paper's Table 1: antenna places, TDM order, the exact path over that
-Tx and that Rx at the instant of every sample, exp(j 2 pi (f tau + s tau t - s tau^2 / 2)). The point stands 4 m away, or passes
-there in the middle of the window at +-3 m/s along the line of sight, which is through 8 range bins. Beam widths are held
-against the closed form: the phases of the 48 paths at the middle of the sweep, summed.
+The IF samples of a point are computed here from the paper's Table 1: the antenna positions, the
+TDM order, the exact path over each Tx and Rx at the instant of every sample, and
+exp(j 2 pi (f tau + s tau t - s tau^2 / 2)). The point is 4 m away and stands still, or it moves at
++-3 m/s along the line of sight, through 8 range bins, and is 4 m away in the middle of the frame.
+Beam widths are compared with the closed form, the sum of the phases of the 48 paths at the middle
+of the sweep.
 
     python validation/closed_forms/angle.py [--quick] [--json FILE]
 """
@@ -40,13 +42,13 @@ TOLERANCE_DEG = 0.5
 
 
 def line_places(preset: str) -> tuple[Array, Array]:
-    """Tx and Rx along one line, about its middle [m]: 4 and 1/2 wavelengths of the sweep's start apart."""
+    """Tx and Rx on one line, about its middle [m]: 4 and 1/2 wavelengths of the low end apart."""
     wavelength = C / START_HZ[preset]
     return (np.arange(N_TX) - 2.5) * 4 * wavelength, (np.arange(N_RX) - 3.5) * wavelength / 2
 
 
 def place_of(azimuth_deg: float, elevation_deg: float) -> Array:
-    """Place at the range of all points, in the radar's frame [m]."""
+    """Position at the range of all points, in the radar's frame [m]."""
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
     way = [
         np.cos(elevation) * np.cos(azimuth),
@@ -57,14 +59,14 @@ def place_of(azimuth_deg: float, elevation_deg: float) -> Array:
 
 
 def samples_of(preset: str, place: Array, speed: float) -> NDArray[np.complex64]:
-    """IF of one window (chirp, rx, sample), in whose middle the point is at ``place``."""
+    """IF samples of one frame (chirp, rx, sample); the point is at ``place`` in its middle."""
     chirp_s, slope = CHIRP_S[preset], BANDWIDTH_HZ / CHIRP_S[preset]
     tx, rx = line_places(preset)
     n_chirps = CYCLES[preset] * 2 * N_TX
     fast = np.arange(N_SAMPLES) / N_SAMPLES * chirp_s
     x = np.empty((n_chirps, N_RX, N_SAMPLES), dtype=np.complex64)
     for chirp in range(n_chirps):
-        line, number = divmod(chirp % (2 * N_TX), N_TX)  # y-line first, then z
+        line, number = divmod(chirp % (2 * N_TX), N_TX)  # the line along y first, then that along z
         moved = speed * (chirp * chirp_s + fast - n_chirps * chirp_s / 2)
         at = place[:, None] * (1 + moved / RANGE_M)
         along, square = at[1 + line], (at**2).sum(axis=0)
@@ -80,7 +82,7 @@ def samples_of(preset: str, place: Array, speed: float) -> NDArray[np.complex64]
 def spectra_of(
     preset: str, x: NDArray[np.complex64], speed: float, focus: bool, taper: Taper
 ) -> AngleSpectra:
-    """Spectra of the cell in which the point is in the middle of the window."""
+    """Spectra of the cell in which the point is in the middle of the frame."""
     radar = Radar.preset(preset)
     cube = range_spectrum(x, radar).reshape(CYCLES[preset], 2 * N_TX, N_RX, N_SAMPLES)
     row = round(RANGE_M / radar.range_bin_m)
@@ -91,14 +93,14 @@ def spectra_of(
 
 
 def finely(seen: AngleSpectra) -> tuple[Array, Array]:
-    """Azimuths [deg] and power of the one cell between the points of the grid, twice as fine as the power's own detail."""
+    """Azimuths [deg] and power of one cell, sampled twice as finely as the power varies."""
     assert seen.y is not None
     fine = np.linspace(seen.sines[0], seen.sines[-1], 40_001)
     return np.degrees(np.arcsin(fine)), CubicSpline(seen.sines, seen.y[0].astype(np.float64))(fine)
 
 
 def peak_and_width(angles_deg: Array, power: Array) -> tuple[float, float]:
-    """Highest power, and the width of its lobe at half of it [deg]."""
+    """Highest power, and the width of its lobe at half of that power [deg]."""
     top = int(power.argmax())
     below = power < power[top] / 2
     left, right = top - np.argmax(below[top::-1]), top + np.argmax(below[top:])
@@ -106,20 +108,20 @@ def peak_and_width(angles_deg: Array, power: Array) -> tuple[float, float]:
 
 
 def closed_form(preset: str, focus: bool) -> tuple[float, float]:
-    """Highest power and width [deg] of one line, uniform weights, for a point on the boresight."""
+    """Highest power and beam width [deg] of one line, uniformly weighted, for a boresight point."""
     tx, rx = line_places(preset)
     wavelength = C / (START_HZ[preset] + BANDWIDTH_HZ / 2)
     angles = np.linspace(-10, 10, 8001)
     u = np.sin(np.radians(angles))
 
-    def ways(sines: ArrayLike) -> Array:
+    def paths(sines: ArrayLike) -> Array:
         legs = [
             np.sqrt(RANGE_M**2 - 2 * RANGE_M * np.multiply.outer(sines, p) + p**2) for p in (tx, rx)
         ]
         return np.asarray(legs[0][..., :, None] + legs[1][..., None, :])
 
     plane = 2 * RANGE_M - np.multiply.outer(u, tx[:, None] + rx)
-    phase = 2 * np.pi / wavelength * (ways(0.0) - (ways(u) if focus else plane))
+    phase = 2 * np.pi / wavelength * (paths(0.0) - (paths(u) if focus else plane))
     return peak_and_width(angles, np.abs(np.exp(1j * phase).mean(axis=(1, 2))) ** 2)
 
 
@@ -141,7 +143,7 @@ def direction_rows(preset: str, direction: tuple[float, float], speed: float) ->
             case, name, "deg", degrees, TOLERANCE_DEG, reference=truth, key="point", says=says
         )
     cloud = spatial_points(spectra_of(preset, x, speed, True, "taylor"), radar, 0.05)
-    # Half a range bin and half a degree at 4 m; of several peaks all must lie there.
+    # Half a range bin and half a degree at 4 m. If there are several peaks, all must lie there.
     off = np.linalg.norm(cloud.points - np.array(radar.position_m) - place, axis=1)
     limit = radar.range_bin_m / 2 + RANGE_M * np.radians(TOLERANCE_DEG)
     says = "a point reads back: farthest point of its spatial cloud"
@@ -183,7 +185,7 @@ def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
             2.0,
             says=says,
         )
-    # 0.1 dB, 0.05 deg: the point lies a quarter of a range bin off the middle of its cell.
+    # 0.1 dB and 0.05 deg, because the point is a quarter of a range bin off the middle of its cell.
     says = "what the far-field FFT loses at 4 m against the phases of all 48 paths, summed"
     yield judged(case, "far-field FFT against focusing", "dB", ours, 0.1, reference=loss, says=says)
     for name, focus, expected in (("focused", True, sharp[1]), ("far-field FFT", False, flat[1])):
@@ -203,7 +205,7 @@ def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
 
 
 def pair_rows(preset: str, apart_deg: float, taper: Taper) -> Iterator[Row]:
-    """Two equal points side by side, for eight phases between them: they are told apart where the power dips between."""
+    """Two equal points side by side at eight phases: resolved where the power dips between them."""
     first, second = (
         samples_of(preset, place_of(side * apart_deg / 2, 0.0), 0.0) for side in (-1, 1)
     )
@@ -224,7 +226,7 @@ def pair_rows(preset: str, apart_deg: float, taper: Taper) -> Iterator[Row]:
                 errors += [abs(abs(angles[there]) - apart_deg / 2) for there in (left, right)]
                 counts.append(len(spatial_points(seen, radar, 0.0).points))
     case = f"{preset}, two points {apart_deg:g} deg apart, {taper}"
-    if taper == "uniform":  # the claim; in phase the gap fills most
+    if taper == "uniform":  # the claim; the dip is shallowest when the points are in phase
         says = "two points 3 degrees apart at 4 m: dip between them, at any phase"
         quantity = "dip between them, shallowest of 8 phases, at most"
         yield judged(case, quantity, "dB", max(dips), -1.0, says=says, cases=len(dips))

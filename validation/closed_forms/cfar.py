@@ -1,13 +1,15 @@
 """False-alarm rates of the CFAR detectors on noise alone, against those asked.
 
-Independent cells: Gamma-distributed maps, detections counted. The rate must be within 10 % of the asked one.
+Independent cells: detections are counted in maps with a Gamma distribution. The rate must be
+within 10 % of the one asked for.
 
-Windowed maps: complex white noise through range and Doppler spectra as the pipeline makes them. The Hann window makes
-neighbouring cells alike, so the training cells count for fewer than they are and the threshold scatters more: the rate
-comes out higher than asked. It is counted, and also found from the thresholds alone: cells three apart share nothing (the
-spectrum of a Hann window is three bins wide) and with a guard of two the cell under test is independent of its threshold
-T, so the rate is the mean of Q(looks, T), Q the survival function of its Gamma law. That needs no alarm to happen and
-reaches down to the default of 1e-6.
+Windowed maps: complex white noise goes through range and Doppler spectra as in the pipeline. The
+Hann window correlates neighbouring cells, so the training cells count for fewer than they are and
+the threshold scatters more: the rate exceeds the one asked for. It is counted, and it is also
+computed from the thresholds alone. Cells three bins apart are independent, because the spectrum of
+a Hann window is three bins wide; with two guard cells the cell under test is therefore independent
+of its threshold T, and the rate is the mean of Q(looks, T), where Q is the survival function of
+the Gamma law. This needs no alarm to occur, and so reaches down to the default rate of 1e-6.
 
     python validation/closed_forms/cfar.py [--quick] [--json FILE]
 """
@@ -38,7 +40,7 @@ DETECTORS: dict[str, Callable[..., NDArray[np.bool_]]] = {"os": os_cfar, "ca": c
 
 
 class Rate(NamedTuple):
-    """One rate: on which cells, by which detector, asked and measured."""
+    """One rate: its cells and detector, the rate asked for, and the rates measured."""
 
     cells: str
     detector: str
@@ -53,8 +55,8 @@ class Rate(NamedTuple):
 
 
 @compiled(parallel=True)
-def noise_levels(power, ranks, guard, reach):  # type: ignore[no-untyped-def]
-    """Order statistic and mean of the training cells of every cell, by sorting as the text book has it, and their number."""
+def noise_levels(power, ranks, guard, reach):
+    """Order statistic, mean and number of the training cells of every cell, by sorting them."""
     n_range, n_velocity = power.shape
     ordered, averaged, counts = (
         np.empty(power.shape),
@@ -89,7 +91,7 @@ def scale_tables(pfa: float, looks: int) -> dict[str, NDArray[np.float64]]:
 
 
 def rate(values: list[float]) -> tuple[float, float]:
-    """Mean over the maps and its standard deviation."""
+    """Mean over the maps, and its standard deviation."""
     return float(np.mean(values)), float(np.std(values, ddof=1) / math.sqrt(len(values)))
 
 
@@ -112,7 +114,7 @@ def noise_power(radar: Radar) -> float:
 def windowed_maps(
     radar: Radar, n_maps: int, rng: np.random.Generator
 ) -> Iterator[tuple[NDArray[np.floating], list[NDArray[np.floating]]]]:
-    """The map of all channels summed and those of three channels alone, in units of the mean power of a channel."""
+    """The sum of all channels and three single channels, in units of a channel's mean power."""
     shape = (radar.chirps_per_frame, radar.n_rx, radar.samples_per_chirp)
     unit = noise_power(radar)
     for _ in range(n_maps):
@@ -129,7 +131,7 @@ def windowed_maps(
 
 
 class Tally:
-    """Alarms and survival means of one kind of cells, map by map."""
+    """Alarms and mean survival probabilities of one kind of cells, map by map."""
 
     def __init__(
         self, cells: str, looks: int, pfas: tuple[float, ...], *, conditional: bool
@@ -178,7 +180,7 @@ class Tally:
 
 
 def rates(n_maps: int, seed: int) -> Iterator[Rate]:
-    """Of ``n_maps`` windowed maps of 96 channels, and four times as many of independent cells."""
+    """Rates of ``n_maps`` windowed maps of 96 channels, and of four times as many single ones."""
     rng = np.random.default_rng(seed)
     for looks in (1, 96):
         tally = Tally("independent", looks, (1e-2, 1e-3), conditional=False)
@@ -200,7 +202,8 @@ def rates(n_maps: int, seed: int) -> Iterator[Rate]:
 
 
 def rate_rows(found: Rate) -> Iterator[Row]:
-    claim = f"{found.cells} cells, {found.detector}, {found.looks} look{'s' if found.looks > 1 else ''}, {found.pfa:g} asked"
+    looks = f"{found.looks} look{'s' if found.looks > 1 else ''}"
+    claim = f"{found.cells} cells, {found.detector}, {looks}, {found.pfa:g} asked"
     counted = found.counted / found.pfa
     if found.cells == "independent":
         says = "false alarms counted over those asked, independent cells, less 1"
@@ -224,9 +227,10 @@ def rate_rows(found: Rate) -> Iterator[Row]:
 
 
 def voxel_rows(found: list[Rate]) -> Iterator[Row]:
-    """False voxels expected in the RDT volume of a capture, OS-CFAR at the default rate.
+    """False voxels expected in the RDT volume of a capture, by OS-CFAR at the default rate.
 
-    The rate of the 12 GHz map serves the 77 GHz map too: the law of a cell and its neighbours does not know the number of bins.
+    The rate of the 12 GHz map also holds for the 77 GHz map, because the joint distribution of a
+    cell and its neighbours does not depend on the number of bins.
     """
     for name in ("paper-12ghz", "paper-77ghz"):
         radar = Radar.preset(name)

@@ -1,15 +1,18 @@
 """Static-clutter removal and clutter-map CFAR, against sums written out here and counted alarms.
 
-Removal. A still room of five reflectors and three moving points 60 dB below the strongest of them, IF in float64, rounded to
-complex64 as the pipeline does, through range spectra and each removal. Held against the movers alone, in float64 from the IF
-to the removal written out here: what differs is what is left of the room, and the rounding it left on the movers.
+Removal: the IF samples of a static room of five reflectors and of three moving points, 60 dB below
+the strongest reflector, are computed in float64, rounded to complex64 as in the pipeline, and go
+through range spectra and each removal. The reference is the moving points alone, in float64 from
+the IF samples to the removal, which is written out here. The difference is the residual of the
+room and the rounding that it leaves on the moving points.
 
-Maps. A walk of 0.6 s in the living room by `rt.run` under each removal: what every map of ``maps.h5`` holds where nothing moves,
-over what it holds without removal.
+Maps: a walk of 0.6 s in the living room by `rt.run` with each removal. What every map of
+``maps.h5`` contains where nothing moves is divided by the same without removal.
 
-Clutter map. Noise alone, alarms counted: on Gamma-distributed maps that share nothing, and on white noise through range and
-Doppler spectra with the radar's overlapping windows. Beside these the text book's map, which takes overlapping windows for
-independent and takes the newest ones in.
+Clutter map: alarms are counted on noise alone, on independent maps with a Gamma distribution, and
+on white noise through range and Doppler spectra with the overlapping frames of the radar. The
+textbook's clutter map, which treats overlapping frames as independent and includes the newest
+ones, is reported beside it.
 
     python validation/closed_forms/clutter.py [--quick] [--json FILE]
 """
@@ -52,7 +55,7 @@ SETTINGS: dict[str, tuple[str, dict[str, Any]]] = {
 
 
 def thin(name: str, n_tx: int, n_rx: int, **changes: Any) -> Radar:
-    """A preset with fewer antennas and its own cycle."""
+    """A preset with fewer antennas and its own cycle duration."""
     whole = Radar.preset(name)
     return Radar(
         name=name,
@@ -70,13 +73,13 @@ def hann(n: int) -> NDArray[np.float64]:
     return np.sin(np.pi * np.arange(n) / n) ** 2
 
 
-# -- removal ---------------------------------------------------------------------------------------------------------------
+# -- removal ---------------------------------------------------------------------------------------
 
 
 def echo(
     radar: Radar, n_chirps: int, range_of: Callable[[NDArray[np.float64]], Any]
 ) -> NDArray[np.complex128]:
-    """IF of a point of amplitude 1, (chirp, rx, sample): each Tx and Rx a little farther than the one before."""
+    """IF of a point of amplitude 1, (chirp, rx, sample); each antenna is a little farther away."""
     chirps = np.arange(n_chirps)
     extra = 1.3e-3 * (chirps % radar.n_tx)[:, None] + 1.7e-3 * np.arange(radar.n_rx)
     times = (chirps + 0.5) * radar.chirp_duration_s
@@ -91,7 +94,7 @@ def echo(
 
 
 def room(radar: Radar, n_chirps: int) -> NDArray[np.complex128]:
-    """Five still reflectors, the strongest of amplitude 1, each tenth as strong as the one before in power."""
+    """Five static reflectors of amplitude 1 and less, each a tenth of the one before in power."""
     one = sum(
         10 ** (-i / 2) * echo(radar, radar.n_tx, lambda _, r=r: r)
         for i, r in enumerate((4.3, 2.71, 6.05, 1.2, 8.4))
@@ -100,7 +103,7 @@ def room(radar: Radar, n_chirps: int) -> NDArray[np.complex128]:
 
 
 def movers(radar: Radar, n_chirps: int) -> NDArray[np.complex128]:
-    """A torso that comes slowly nearer, a limb that swings at up to 5 m/s, and a point that breathes."""
+    """A torso that approaches slowly, a limb that swings at up to 5 m/s, and a breathing chest."""
     paths: list[Callable[[NDArray[np.float64]], Any]] = [
         lambda t: 4.4 - 1.1 * t,
         lambda t: 4.2 + 0.5 * np.sin(10 * t),
@@ -117,7 +120,7 @@ def by_hand(
     time_constant_s: float = 1.0,
     pulses: int = 2,
 ) -> NDArray[np.complex128]:
-    """The last window after each removal, written out."""
+    """The last frame after each removal, written out in NumPy."""
     n = radar.cycles_per_frame
     if method == "mean":
         return cycles[-n:] - cycles[-n:].mean(axis=0)
@@ -146,7 +149,7 @@ def spectra_of(cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloatin
 def by_package(
     method: str, x: NDArray[np.complex128], radar: Radar, options: dict[str, Any]
 ) -> NDArray[np.complexfloating]:
-    """The last window of the stream, in the precision of the pipeline."""
+    """The last frame of the stream, in the precision of the pipeline."""
     removal, shape = (
         clutter_removal(method, radar, **options),
         (-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp),
@@ -174,7 +177,7 @@ def room_rows(name: str) -> Iterator[Row]:
     for label, (method, options) in SETTINGS.items():
         claim = f"{name}, {label}"
         alone = by_package(method, still, radar, options)
-        says = "clutter removal: left of a still room alone, of its strongest cell"
+        says = "clutter removal: residual of a static room alone, over its strongest cell"
         quantity = "left of a still room alone, of its strongest cell"
         yield judged(claim, quantity, "", abs(alone).max() / strongest, 0.0, says=says)
         ours = spectra_of(by_package(method, still + moving, radar, options))
@@ -191,7 +194,7 @@ def room_rows(name: str) -> Iterator[Row]:
 
 
 def response_rows(name: str) -> Iterator[Row]:
-    """Tones of 1 bin to half the pulse rate, as complex64 range spectra."""
+    """Tones from 1 bin to half the pulse rate, as complex64 range spectra."""
     radar = thin(name, 1, 1, samples_per_chirp=1)
     n = 40 * radar.cycles_per_frame
     turns = np.linspace(1 / radar.cycles_per_frame, 0.5, 60)
@@ -211,7 +214,8 @@ def response_rows(name: str) -> Iterator[Row]:
                 keep = math.exp(-radar.cycle_duration_s / options["time_constant_s"])
                 gain /= abs(1 - keep * np.exp(-2j * np.pi * turn))
             worst = max(worst, abs(measured_db - 20 * math.log10(gain)))
-        # float32 values of size 1 whose second difference is down to 9e-5 at 77 GHz: 6e-8 / 9e-5 = 0.006 dB at most, rms less.
+        # The second difference of float32 values of size 1 is as small as 9e-5 at 77 GHz, so the
+        # rounding error is at most 6e-8 / 9e-5 = 0.006 dB, and its rms is less.
         quantity = "response from 1 bin to half the pulse rate, largest error"
         yield judged(
             f"{name}, {label}", quantity, "dB", worst, 0.006, says=f"clutter removal: {quantity}"
@@ -229,7 +233,7 @@ def response_rows(name: str) -> Iterator[Row]:
 
 
 def mean_rows(name: str) -> Iterator[Row]:
-    """What the mean over a window takes from a slow echo, and the ghost that a fast one leaves at zero."""
+    """Loss of a slow echo by subtracting the mean, and the ghost of a fast echo at zero Doppler."""
     radar = thin(name, 1, 1, samples_per_chirp=1)
     n, removal = radar.cycles_per_frame, clutter_removal("mean", radar)
 
@@ -260,7 +264,7 @@ def mean_rows(name: str) -> Iterator[Row]:
         before, after = powers(bins)
 
         def sums(x: float) -> complex:
-            """Mean of a tone of x bins over the window."""
+            """Mean of a tone of x bins over the frame."""
             return (
                 np.exp(1j * np.pi * x * (n - 1) / n)
                 * math.sin(math.pi * x)
@@ -279,7 +283,7 @@ def mean_rows(name: str) -> Iterator[Row]:
 
 
 def noise_rows(quick: bool) -> Iterator[Row]:
-    """Mean power of white noise, after over before."""
+    """Mean power of white noise after removal, over that before."""
     radar = thin("paper-12ghz", 1, 8, samples_per_chirp=256)
     n = 4 * radar.cycles_per_frame if quick else 20 * radar.cycles_per_frame
     rng = np.random.default_rng(2)
@@ -294,7 +298,7 @@ def noise_rows(quick: bool) -> Iterator[Row]:
         expected = {"mean": 1 - 1 / n, "mti": 1.0, "exponential": 2 / (2 - share)}[method]
         if (
             method != "exponential" or options["time_constant_s"] < 0.1
-        ):  # in the longer one the start has not died away
+        ):  # in the longer one the transient has not yet decayed
             says = "clutter removal: power of white noise, after over before"
             yield judged(
                 f"white noise, {label}",
@@ -307,11 +311,11 @@ def noise_rows(quick: bool) -> Iterator[Row]:
             )
 
 
-# -- clutter map -----------------------------------------------------------------------------------------------------------
+# -- clutter map -----------------------------------------------------------------------------------
 
 
 class TextBook:
-    """The map with the law of independent windows; ``wait`` windows pass before one is taken in."""
+    """Clutter map by the law of independent frames; it includes a frame after ``wait`` more."""
 
     def __init__(self, share: float, pfa: float, looks: int, wait: int) -> None:
         self.share, self.pfa, self.looks, self.wait = share, pfa, looks, wait
@@ -395,11 +399,15 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
         for key, detector in detectors.items():
             alarms[key].append(float(detector.push(power).mean()))
     for (kind, pfa), rates in alarms.items():
-        claim = f"windows share 75 %, {looks} look{'s' if looks > 1 else ''}, {pfa:g} asked, {kind}"
+        asked = f"{looks} look{'s' if looks > 1 else ''}, {pfa:g} asked"
+        claim = f"windows share 75 %, {asked}, {kind}"
         for part, values in ((f"windows 5 to {old}", rates[4:old]), ("all later", rates[old:])):
             ratio = float(np.mean(values)) / pfa
             if kind == "ours":
-                says = "clutter-map CFAR on noise, windows that share 75 %: false alarms counted over those asked"
+                says = (
+                    "clutter-map CFAR on noise, frames that overlap by 75 %: "
+                    "false alarms counted over those asked"
+                )
                 yield judged(
                     claim,
                     f"counted over asked, {part}",
@@ -414,7 +422,7 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
 
 
 def steady_rows(quick: bool) -> Iterator[Row]:
-    """Cells with a steady echo in the noise: fewer alarms than asked."""
+    """Cells with a constant echo in the noise have fewer alarms than asked for."""
     radar = thin("paper-12ghz", 1, 1, frame_hop_s=0.1)
     rng = np.random.default_rng(5)
     for echo_db in (0.0, 10.0, 20.0):
@@ -427,7 +435,7 @@ def steady_rows(quick: bool) -> Iterator[Row]:
 
 
 def map_rows(quick: bool) -> Iterator[Row]:
-    """What maps hold where nothing moves: zero Doppler, and of range over time the mean over all cells."""
+    """Level of maps where nothing moves: at zero Doppler, or the mean of range over time."""
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
     level: dict[str, dict[str, float]] = {}
     removals = ("mean",) if quick else ("mean", "exponential", "mti")
@@ -448,10 +456,10 @@ def map_rows(quick: bool) -> Iterator[Row]:
                 level[removal] = {
                     name: 10 * math.log10(float(values.mean())) for name, values in still.items()
                 }
-    says = "clutter removal in a living room: what maps still hold where nothing moves, over that without removal"
+    says = "clutter removal in a living room: level where nothing moves, over that without removal"
     for removal in removals:
         for name, value in level[removal].items():
-            # The walker himself is 20 to 30 dB below the room; a map that is not cleaned stays at 0 dB.
+            # The walker is 20 to 30 dB below the room; a map without removal stays at 0 dB.
             yield judged(
                 f"{removal}, {name}",
                 "level over none",

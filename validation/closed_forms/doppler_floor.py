@@ -1,15 +1,18 @@
-"""Doppler floor of smooth motion: what stands beside the true Doppler of one ellipsoid, on every model.
+"""Doppler floor of smooth motion: the power outside the true Doppler of one ellipsoid, every model.
 
-A sphere flies past and an ellipsoid turns, both analytically, through model, IF, range and slow-time spectra, all in
-complex128 under Chebyshev windows of 160 dB. Whatever is not smooth from chirp to chirp, a facet that flips or a mirror
-point that is found only nearly, would raise the floor; outside the Doppler that the motion really has, and the main lobe
-of the window round it, it must stay below -80 dB of the strongest cell, in every channel.
+A sphere flies past and an ellipsoid rotates, both analytically, through the model, IF samples,
+range spectra and slow-time spectra, all in complex128 with Chebyshev windows of 160 dB. Whatever
+is not smooth from chirp to chirp, such as a facet that flips or an inexact specular point, would
+raise the floor. Outside the true Doppler of the motion and the main lobe of the window around it,
+the floor must stay below -80 dB of the strongest cell, in every channel.
 
-The true Doppler comes from the shortest path over the surface, found here by a general minimiser at a few instants.
+The true Doppler comes from the shortest path over the surface, which is found here by a general
+minimiser at a few instants.
 
-Physical optics of a turning body has a wave of its own terminator, -60 to -65 dB, which is no fault of its sampling. There the
-median outside must stay below -80 dB, and the highest cell within 3 dB of that of `reference`. These models are seen by one Tx
-that sends once in each TDM cycle, for `reference` takes every facet at every chirp.
+Physical optics of a rotating body has a wave of its own from the terminator, at -60 to -65 dB,
+which is no fault of its sampling. There the median outside must stay below -80 dB, and the highest
+cell within 3 dB of that of `reference`. These models are tested with one Tx that transmits once in
+each TDM cycle, because `reference` evaluates every facet at every chirp.
 
     python validation/closed_forms/doppler_floor.py [--quick] [--json FILE]
 """
@@ -55,7 +58,7 @@ class Moving(Protocol):
 
 @dataclass(frozen=True)
 class FlyingSphere:
-    """Straight ahead at constant velocity."""
+    """A sphere in straight flight at constant velocity."""
 
     velocity: tuple[float, float, float]
     radius: float = 0.1
@@ -76,7 +79,7 @@ class FlyingSphere:
 
 @dataclass(frozen=True)
 class TurningEllipsoid:
-    """About an axis through the middle of one end, as a limb does about its joint."""
+    """An ellipsoid that rotates about an axis through one end, as a limb does about its joint."""
 
     rate: float  # [rad/s]
     axes: tuple[float, float, float]
@@ -89,7 +92,7 @@ class TurningEllipsoid:
         return np.array([self.axes])
 
     def at(self, times: Array) -> Poses:
-        # Tilted, so that nothing is symmetric about the array.
+        # The axis is tilted, so that nothing is symmetric about the array.
         turn = Rotation.from_rotvec(
             np.outer(self.start + self.rate * np.asarray(times), [0.1, 0.97, 0.2])
         )
@@ -107,7 +110,7 @@ MOTIONS: dict[str, Moving] = {
 
 
 def shortest(tx: Array, rx: Array, centre: Array, frame: Array, axes: Array) -> float:
-    """Shortest way Tx..surface..Rx, by a general minimiser over two angles about the side that faces them [m]."""
+    """Shortest path Tx-surface-Rx [m], minimised over two angles about the side that faces them."""
     local_t, local_r = (tx - centre) @ frame, (rx - centre) @ frame
     pole = axes * (local_t / np.linalg.norm(local_t) + local_r / np.linalg.norm(local_r))
     pole /= np.linalg.norm(pole)
@@ -128,7 +131,7 @@ def shortest(tx: Array, rx: Array, centre: Array, frame: Array, axes: Array) -> 
 
 
 def true_velocities(radar: rt.Radar, body: Moving, tx: int, rx: Array) -> tuple[float, float]:
-    """Least and largest range rate over the window for one channel [m/s]."""
+    """Least and largest range rate over the frame for one channel [m/s]."""
     times = np.linspace(0, radar.cycles_per_frame * radar.cycle_duration_s, 41)
     poses = body.at(times)
     lengths = np.array(
@@ -142,9 +145,10 @@ def true_velocities(radar: rt.Radar, body: Moving, tx: int, rx: Array) -> tuple[
 
 
 def main_lobe_bins(n: int) -> float:
-    """Half the width of the main lobe of the Chebyshev window, down to its side lobes [bins].
+    """Half the width of the Chebyshev window's main lobe, down to its side lobes [bins].
 
-    T_(n-1)(x0 cos(w/2)) = 1 at x0 cos(w/2) = 1, x0 = cosh(arccosh(10^(A/20)) / (n-1)); Harris, 1978.
+    T_(n-1)(x0 cos(w/2)) = 1 at x0 cos(w/2) = 1, x0 = cosh(arccosh(10^(A/20)) / (n-1));
+    Harris, 1978.
     """
     x0 = np.cosh(np.arccosh(10 ** (ATTENUATION_DB / 20)) / (n - 1))
     return float(2 * np.arccos(1 / x0) * n / (2 * np.pi))
@@ -152,7 +156,7 @@ def main_lobe_bins(n: int) -> float:
 
 @dataclass(frozen=True)
 class Floor:
-    """Power outside the true Doppler, relative to the strongest cell, worst of all channels [dB]."""
+    """Power outside the true Doppler over that of the strongest cell, worst channel [dB]."""
 
     highest: float
     farther: float  # highest twice as far outside
@@ -166,8 +170,7 @@ def floor_of(
     chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
     lobe = main_lobe_bins(n) * radar.velocity_bin_mps
     chirps = np.arange(radar.chirps_per_frame)
-    # The model asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_model(fidelity, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(fidelity, radar, body).echoes(chirps)
     x = rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps)))
     spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
     found = []
@@ -185,7 +188,7 @@ def floor_of(
             ]
             for wide in (1, 2)
         )
-        # Doppler cells at their strongest range: the median over all ranges would be that of empty ones.
+        # Doppler cells at their strongest range; a median over all ranges would be of empty ones.
         found.append([outside.max(), farther.max(), np.median(outside.max(axis=0))] / power.max())
     return Floor(*(10 * np.log10(np.max(found, axis=0))).tolist())
 
@@ -202,11 +205,12 @@ def optical_rows(
 ) -> Iterator[Row]:
     bands = bands_of(radar, body, channels)
     claim = f"{radar.name}, {name}"
-    # A turning body has another Doppler by the paper's model, which takes the range of its centre.
+    # The Doppler of a rotating body differs in the paper's model, which has the centre's range.
     for fidelity in (*OPTICAL, *(("analytic-paper",) if isinstance(body, FlyingSphere) else ())):
         floor = floor_of(radar, body, fidelity, bands)
-        # -80 dB is what was asked; -160 dB is what the windows leave. What crosses range bins has a wider lobe than the
-        # window's, for each bin sees it come and go: that stands in the first figure and is gone in the second.
+        # -80 dB was asked for; -160 dB is what the windows leave. An echo that crosses range bins
+        # has a wider lobe than the window, because each bin sees it come and go. That enters the
+        # first figure, and it is gone in the second.
         quantity = f"{fidelity}: highest cell outside, worst of {len(bands)} channels"
         motion = "sphere in flight" if isinstance(body, FlyingSphere) else "turning ellipsoid"
         says = f"Doppler floor of `{fidelity}`: {motion}, highest cell"
@@ -259,14 +263,17 @@ def faceted_rows(radar: rt.Radar, name: str, body: Moving) -> Iterator[Row]:
             if fidelity != "reference":
                 over = floor.highest - highest["reference"]
                 quantity = f"{fidelity}: highest cell outside, over reference"
-                says = f"Doppler floor of `{fidelity}`: turning ellipsoid, highest cell over that of `reference`"
+                says = (
+                    f"Doppler floor of `{fidelity}`: turning ellipsoid, "
+                    "highest cell over that of `reference`"
+                )
                 yield judged(
                     claim, quantity, "dB", over, OVER_REFERENCE_DB, key="doppler", says=says
                 )
 
 
 def beyond(velocity: Array, least: float, most: float, ambiguity: float) -> NDArray[np.bool_]:
-    """Cells outside [least, most], which may go over the end of the axis and come in at the other."""
+    """Cells outside the interval [least, most], which may wrap around the ends of the axis."""
     away = (velocity - (least + most) / 2 + ambiguity / 2) % ambiguity - ambiguity / 2
     return np.abs(away) > (most - least) / 2
 
@@ -274,7 +281,7 @@ def beyond(velocity: Array, least: float, most: float, ambiguity: float) -> NDAr
 def measure(quick: bool) -> list[Row]:
     rows: list[Row] = []
     for preset in ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz"):
-        # All of the Tx, and of the Rx of each line the two at its ends.
+        # All Tx, and of the Rx of each line the two at its ends.
         whole = rt.Radar.preset(preset)
         ends = (whole.rx_y - 1) * whole.rx_spacing_wavelengths
         radar = dataclasses.replace(whole, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)

@@ -1,9 +1,10 @@
-"""The closed form of the ellipsoid's cross-section against curvature, and both closed-form models against that far away.
+"""The closed-form cross-section of the ellipsoid against curvature, and two models far away.
 
-The reference is pi R1 R2 = pi / K, with the Gaussian curvature K from the first and second fundamental forms of the surface
-(a sin u cos v, b sin u sin v, c cos u): E, F, G, L, M, N. It knows nothing of the support function, with which the closed
-form and the model `analytic` are written, nor of the path's Hessian, with which `specular` is. Two antennas far apart see
-the point whose normal halves their angle, and the same pi / K; co-polar, less what the mirror turns of the field,
+The reference is pi R1 R2 = pi / K, where the Gaussian curvature K comes from the first and second
+fundamental forms E, F, G, L, M, N of the surface (a sin u cos v, b sin u sin v, c cos u). It uses
+neither the support function, on which the closed form and the model `analytic` are based, nor the
+Hessian of the path, on which `specular` is based. Two antennas far apart see the point whose normal
+bisects their directions, with the same pi / K, times the co-polar fraction of the reflected field
 E_r = 2 (n.E) n - E.
 
     python validation/closed_forms/ellipsoid.py [--quick] [--json FILE]
@@ -27,7 +28,7 @@ FREQUENCY_HZ = 14e9
 
 
 def gaussian_curvature(axes: Array, u: Array, v: Array) -> Array:
-    """K [1/m^2] of the surface at its parameters, from both fundamental forms."""
+    """Gaussian curvature K [1/m^2] at surface parameters, from both fundamental forms."""
     a, b, c = axes
     s, t, p, q = np.sin(u), np.cos(u), np.cos(v), np.sin(v)
     along_u = np.stack([a * t * p, b * t * q, -c * s], axis=-1)
@@ -46,7 +47,7 @@ def gaussian_curvature(axes: Array, u: Array, v: Array) -> Array:
 
 
 def normal_at(axes: Array, u: Array, v: Array) -> Array:
-    """Outward unit normal there."""
+    """Outward unit normal at surface parameters."""
     a, b, c = axes
     gradient = np.stack(
         [np.sin(u) * np.cos(v) / a, np.sin(u) * np.sin(v) / b, np.cos(u) / c], axis=-1
@@ -82,8 +83,11 @@ def formula_rows(quick: bool) -> Iterator[Row]:
             )
             ratio = rt.rcs.ellipsoid(*axes, theta, phi) * gaussian_curvature(axes, u, v) / np.pi
             worst = max(worst, float(np.abs(10 * np.log10(ratio)).max()))
-        # Rounding of the angles weighs (1000)^2 times at the tip of a needle.
-        says = "closed form of an ellipsoid's cross-section against pi R1 R2, over aspect and shape, to 1000:1"
+        # At the tip of a needle, the rounding errors of the angles are multiplied by 1000^2.
+        says = (
+            "closed form of an ellipsoid's cross-section against pi R1 R2, "
+            "over aspect and shape, to 1000:1"
+        )
         cases = 400 * len(group)
         yield judged(
             f"rcs.ellipsoid, {name}",
@@ -97,7 +101,7 @@ def formula_rows(quick: bool) -> Iterator[Row]:
 
 
 def mirror_polarization(to_tx: Array, to_rx: Array, normal: Array) -> Array:
-    """Share of the field that stays in v, which is z drawn across each line of sight."""
+    """Fraction of the field that stays in v, which is z projected across each line of sight."""
     up = np.array([0.0, 0.0, 1.0])
     across = []
     for way in (to_tx, to_rx):
@@ -114,7 +118,7 @@ def far_rows(quick: bool) -> Iterator[Row]:
         errors: dict[str, list[float]] = {"analytic": [], "specular": []}
         for name, group in shapes(3 if quick else 20, rng).items():
             if "needles" in name:
-                continue  # their radius of curvature of a kilometre is not small beside the distance
+                continue  # their radius of curvature, a kilometre, is not small beside the distance
             for axes in group:
                 n = 10 if quick else 40
                 u, v = np.arccos(rng.uniform(-0.999, 0.999, n)), rng.uniform(-np.pi, np.pi, n)
@@ -130,7 +134,7 @@ def far_rows(quick: bool) -> Iterator[Row]:
                 reference = np.sqrt(np.pi / gaussian_curvature(axes, u, v))
                 turned = {"analytic": 1.0, "specular": mirror_polarization(to_tx, to_rx, normal)}
                 for fidelity, error in errors.items():
-                    # Where the mirror turns the field across, nothing is left to compare.
+                    # Where the reflection is cross-polar, nothing is left to compare.
                     clear = np.broadcast_to(turned[fidelity] > 0.1, n)
                     field = rt.scattering_length(
                         target, FAR_M * to_tx, FAR_M * to_rx, FREQUENCY_HZ, fidelity
@@ -138,8 +142,11 @@ def far_rows(quick: bool) -> Iterator[Row]:
                     ratio = np.abs(field) / (reference * turned[fidelity])
                     error.append(float(np.abs(20 * np.log10(ratio[clear])).max(initial=0.0)))
         for fidelity, error in errors.items():
-            # Radii up to 25 m seen from 1000 km: the bent wavefront takes 2e-4 dB.
-            says = f"ellipsoids by `{fidelity}` from afar against pi R1 R2, Tx and Rx 0 to 140 degrees apart"
+            # Radii up to 25 m seen from 1000 km: the wavefront's curvature accounts for 2e-4 dB.
+            says = (
+                f"ellipsoids by `{fidelity}` from afar against pi R1 R2, "
+                "Tx and Rx 0 to 140 degrees apart"
+            )
             claim = f"{fidelity}, 1000 km, {bistatic_deg:g} deg apart"
             yield judged(
                 claim,

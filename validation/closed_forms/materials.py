@@ -1,14 +1,16 @@
-"""Reflection and transmission of walls, and the permittivity of skin, against what does not know them.
+"""Reflection and transmission of walls, and the permittivity of skin, against other sources.
 
-Slabs: Maxwell's equations at the two faces, as vectors. Incident, reflected, inner and transmitted plane waves with
-their electric and magnetic fields written out in x, y and z; the tangential fields of both kinds must be continuous; four
-linear equations give all amplitudes, signs included, for no coefficient of Fresnel's is used. Measured over the materials
-of ITU-R P.2040-3 that hold at 12 and 77 GHz.
+Slabs: Maxwell's equations at the two faces, as vectors. The incident, reflected, inner and
+transmitted plane waves have their electric and magnetic fields written out in x, y and z. The
+tangential fields of both kinds must be continuous: four linear equations give all amplitudes with
+their signs, and no Fresnel coefficient is used. The figures are over those materials of
+ITU-R P.2040-3 that are valid at 12 and 77 GHz.
 
-Skin: published tables of the model of Gabriel et al. (1996). From 10 kHz to 1 MHz, where its slow terms show: table 3 of
-doi:10.1186/s12938-018-0473-9. From 1 GHz: D. Andreuccetti, R. Fossi, C. Petrucci, "Calculation of the
-dielectric properties of body tissues", IFAC-CNR, 1997, "SkinDry"; at 60 GHz also T. Wu, T. S. Rappaport, C. M. Collins,
-"Safe for generations to come", IEEE Microwave Magazine 16 (2015): 7.98 - j 10.90.
+Skin: published tables of the model of Gabriel et al. (1996). From 10 kHz to 1 MHz, where its slow
+terms matter: table 3 of doi:10.1186/s12938-018-0473-9. From 1 GHz: D. Andreuccetti, R. Fossi,
+C. Petrucci, "Calculation of the dielectric properties of body tissues", IFAC-CNR, 1997, "SkinDry";
+at 60 GHz also T. Wu, T. S. Rappaport, C. M. Collins, "Safe for generations to come", IEEE Microwave
+Magazine 16 (2015): 7.98 - j 10.90.
 """
 
 from __future__ import annotations
@@ -30,9 +32,9 @@ SKIN = ((1e9, 40.94, 0.900), (2.45e9, 38.01, 1.464), (10e9, 31.29, 8.014), (60e9
 def _fields(
     wave: NDArray[np.complex128], eta: complex, polarization: str
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
-    """E and (times the impedance of air) H of a plane wave exp(-j k0 wave.r); y is across the plane of incidence."""
+    """E, and H times the impedance of air, of a wave exp(-j k0 wave.r); the incidence is in xz."""
     across = np.array([0.0, 1.0, 0.0], dtype=np.complex128)
-    # e_TM = e_TE x k, of unit length in the sense of v.v = 1; H = k x E in units of air, for mu = 1.
+    # e_TM = e_TE x k has unit length in the sense of v.v = 1; H = k x E in units of air, mu = 1.
     electric = across if polarization == "te" else np.cross(across, wave) / np.sqrt(eta)
     return electric, np.cross(wave, electric)
 
@@ -40,14 +42,14 @@ def _fields(
 def _boundary(
     eta: complex, depth: float, cosine: float, polarization: str
 ) -> tuple[complex, complex]:
-    """Reflection and transmission of a slab of k0 d = ``depth`` by continuity of the tangential fields at z = 0 and d."""
+    """Reflection and transmission of a slab of k0 d = ``depth``, by continuity at z = 0 and d."""
     sine = np.sqrt(1 - cosine**2)
     inner = np.sqrt(complex(eta - sine**2))
     inner = -inner if inner.imag > 0 else inner
     incident, reflected = np.array([sine, 0, cosine + 0j]), np.array([sine, 0, -cosine + 0j])
     down, up = np.array([sine, 0, inner]), np.array([sine, 0, -inner])
     decay = np.exp(-1j * depth * inner)
-    # Inner waves have their amplitude at the face that they leave, transmitted ones at the far face.
+    # Inner waves have their amplitude at the face that they leave, the transmitted at the far face.
     waves = (
         (reflected, 1.0, 1.0, 0.0, -1),
         (down, eta, 1.0, decay, 1),
@@ -86,7 +88,7 @@ def _slabs(frequency_hz: float, quick: bool) -> list[Row]:
                 excess = max(excess, float((np.abs(ours[0]) ** 2 + np.abs(ours[1]) ** 2).max() - 1))
             deep = -complex(np.sqrt(eta)).imag * 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
             if deep > 0:
-                # Thick enough for the far face to be 40 nepers away.
+                # The slab is so thick that the far face is 40 nepers away.
                 thick = slab(eta, 40 / deep, frequency_hz, cosines, polarization)[0]
                 half_space = max(
                     half_space, float(np.abs(thick - reflection(eta, cosines, polarization)).max())

@@ -1,15 +1,19 @@
-"""TDM, FDM and Doppler division: the velocity each reaches, and a foot that is too fast for one of them.
+"""TDM, FDM and DDM: the unambiguous velocity of each, and a foot that is too fast for one of them.
 
-limits   the unambiguous velocity of the paper's 12 GHz radar under each, against lambda / (4 T) worked out here, T the time until
-         the same Tx transmits again; and what FDM costs in bandwidth
-point    a point that recedes at 11 m/s: where the map's maximum is
-walk     the same walk under all three, window by window: the mean velocity of all echoes in the map, by the phase of its power so
-         that it can turn round the axis, and the share of power beyond 7 m/s, which a walk does not reach
-kick     the foot of the synthetic kick, replayed 1.7 times as fast, as trained people kick, when it is fastest: alone, its mean
-         velocity in the map against the range rate of its surface point nearest to the radar, worked out here from the poses;
-         under TDM it must be the folded one
+limits   the unambiguous velocity of the paper's 12 GHz radar with each, against lambda / (4 T) as
+         computed here, where T is the time until the same Tx transmits again; and the bandwidth
+         that FDM costs
+point    a point that recedes at 11 m/s: the position of the map's maximum
+walk     the same walk with all three, frame by frame: the mean velocity of all echoes in the map,
+         from the phase of its power so that it can wrap around the axis, and the fraction of power
+         beyond 7 m/s, a velocity that a walk does not have
+kick     the foot of the synthetic kick, replayed 1.7 times as fast, as trained people kick, at its
+         fastest: its mean velocity in the map, alone, against the range rate of the point of its
+         surface that is nearest to the radar, computed here from the poses; with TDM it must be
+         the folded velocity
 
-Windows are 25 ms, in which a foot changes speed little; noise 20 dB below the person's echoes in the IF.
+Frames last 25 ms, in which a foot changes its speed little. The noise is 20 dB below the person's
+echoes in the IF samples.
 """
 
 from __future__ import annotations
@@ -45,7 +49,7 @@ def radar(kind: str) -> rt.Radar:
     return rt.Radar(
         name=f"12 GHz {kind}",
         frame_duration_s=FRAME_S,
-        multiplexing=kind,  # type: ignore[arg-type]
+        multiplexing=kind,
         channels="all" if kind == "ddm" else "pairs",
     )
 
@@ -110,11 +114,14 @@ def point_rows() -> Iterator[Row]:
             tx=tx,
             part=one,
             bounces=one + 1,
-        )  # type: ignore[arg-type]
+        )
         power = maps(echoes, made, 0.0)
         found = made.velocity_mps(power.shape[1])[int(power.max(axis=0).argmax())]
         expected = folded(true) if kind == "tdm" else true
-        says = "a point at 11 m/s in the map: folded under TDM, where it is under FDM and Doppler division"
+        says = (
+            "a point at 11 m/s in the map: "
+            "folded under TDM, where it is under FDM and Doppler division"
+        )
         yield judged(
             "point",
             NAMES[kind],
@@ -128,13 +135,13 @@ def point_rows() -> Iterator[Row]:
 
 
 def folded(velocity: float) -> float:
-    """Where TDM shows it."""
+    """Velocity at which TDM shows an echo [m/s]."""
     whole = WAVELENGTH / (2 * CHIRP_S * TX)
     return (velocity + whole / 2) % whole - whole / 2
 
 
 def maps(echoes: rt.Echoes, made: rt.Radar, noise_m2: float) -> NDArray[np.floating]:
-    """Power (range, velocity) of one window."""
+    """Power (range, velocity) of one frame."""
     rows = synthesize(echoes, made, made.chirp_times(len(echoes.tx)), dtype=np.complex64)
     received = receive(rows, made, 0)
     Noise(noise_m2, 0).add(received, made, 0)
@@ -168,7 +175,7 @@ def body_of(activity: str) -> rt.Body:
 
 
 def window(activity: str, kind: str, middle_s: float) -> rt.Echoes:
-    """Echoes of one window with its middle there."""
+    """Echoes of the frame whose middle is at a time [s]."""
     made = radar(kind)
     cycle = round(
         (middle_s - made.cycles_per_frame * made.cycle_duration_s / 2) / made.cycle_duration_s
@@ -179,14 +186,14 @@ def window(activity: str, kind: str, middle_s: float) -> rt.Echoes:
 
 
 def mean_velocity(power: NDArray[np.floating], made: rt.Radar) -> float:
-    """Of the power in a map, round the axis."""
+    """Mean velocity of the power in a map, around the axis [m/s]."""
     turns = made.velocity_mps(power.shape[1]) / (2 * made.max_velocity_mps)
     total = (power.sum(axis=0) * np.exp(2j * np.pi * turns)).sum()
     return float(np.angle(total) / np.pi * made.max_velocity_mps)
 
 
 def noise_of(echoes: rt.Echoes) -> float:
-    """20 dB below all echoes together."""
+    """Noise power 20 dB below all echoes together [m^2]."""
     return float((np.abs(echoes.amplitude[0]) ** 2).sum(axis=-1).mean()) / 100
 
 
@@ -205,7 +212,9 @@ def walk_rows(quick: bool) -> Iterator[Row]:
             beyond[kind].append(float(above[:, fast].sum() / above.sum()))
     for kind in KINDS[1:]:
         error = float(np.abs(np.subtract(found[kind], found["tdm"])).max())
-        says = "mean velocity in the maps of a walk: FDM and Doppler division against TDM, worst window"
+        says = (
+            "mean velocity in the maps of a walk: FDM and Doppler division against TDM, worst frame"
+        )
         yield judged(
             "walk",
             f"{NAMES[kind]} less TDM",
@@ -215,7 +224,10 @@ def walk_rows(quick: bool) -> Iterator[Row]:
             says=says,
             cases=2 * len(times),
         )
-        says = "power beyond 7 m/s in the maps of a walk that reaches 5 m/s: FDM and Doppler division, worst window"
+        says = (
+            "power beyond 7 m/s in the maps of a walk that reaches 5 m/s: "
+            "FDM and Doppler division, worst frame"
+        )
         yield judged(
             "walk",
             f"beyond 7 m/s, {NAMES[kind]}",
@@ -228,7 +240,7 @@ def walk_rows(quick: bool) -> Iterator[Row]:
 
 
 def foot_rate(body: rt.Body, part: int, times: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Range rate of the foot's surface point that faces the radar [m/s], by differences over a millisecond."""
+    """Range rate of the foot's surface point that faces the radar [m/s], by differences of 1 ms."""
 
     def distance(at: NDArray[np.float64]) -> NDArray[np.float64]:
         centres, frames, axes = body.at(at)
@@ -245,7 +257,7 @@ def foot_rate(body: rt.Body, part: int, times: NDArray[np.float64]) -> NDArray[n
 
 @lru_cache
 def fastest() -> tuple[int, float, float]:
-    """Part and time at which a foot of the kick is fastest, and its mean range rate over the window there."""
+    """Part and time at which a foot of the kick is fastest, and its mean range rate there."""
     body = body_of("kick")
     feet = [number for number, name in enumerate(body.part_names) if "foot" in name]
     times = np.arange(0.1, body.duration_s - 0.1, 1e-3)
@@ -264,7 +276,10 @@ def kick_rows() -> Iterator[Row]:
         made = radar(kind)
         power = maps(of_parts(window("kick", kind, middle), [foot]), made, 0.0)
         expected = folded(rate) if kind == "tdm" else rate
-        says = "a foot that kicks faster than 7.14 m/s, alone: folded under TDM, at its range rate under FDM and Doppler division"
+        says = (
+            "a foot that kicks faster than 7.14 m/s, alone: "
+            "folded under TDM, at its range rate under FDM and Doppler division"
+        )
         found = mean_velocity(power, made)
         yield judged(
             "kick",
@@ -292,7 +307,7 @@ def kick_rows() -> Iterator[Row]:
 
 @lru_cache
 def kicked(kind: str) -> NDArray[np.floating]:
-    """Map of the whole body at the foot's fastest, with noise."""
+    """Map of the whole body when the foot is fastest, with noise."""
     echoes = window("kick", kind, fastest()[1])
     return maps(echoes, radar(kind), noise_of(echoes))
 
@@ -336,4 +351,4 @@ def measure(quick: bool) -> list[Row]:
 
 if __name__ == "__main__":
     assert math.isclose(WAVELENGTH, 0.0214137, rel_tol=1e-5)
-    sys.exit(main("TDM, FDM and Doppler division: the velocity each reaches", measure, figure))
+    sys.exit(main("TDM, FDM and Doppler division: their unambiguous velocities.", measure, figure))

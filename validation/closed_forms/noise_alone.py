@@ -1,8 +1,9 @@
-"""Noise alone for 3 s through the whole chain: how many voxels of the RDT volume are false alarms at the default rate.
+"""Noise alone for 3 s through the whole chain: false alarms in the RDT volume at the default rate.
 
-The person stands 150 dB below the noise. At most 20 voxels are allowed for the default radar. What is expected is the
-asked rate times the cells of all windows, and 1.35 times that on Hann-windowed maps (``validation/closed_forms/cfar.py``); at 77 GHz,
-with five times the cells, 20 is what even the exact rate would give, so there the count is reported, not judged.
+The person is 150 dB below the noise. At most 20 voxels are allowed for the default radar. Expected
+are the rate asked for times the cells of all frames, and 1.35 times as many on maps with Hann
+windows (``validation/closed_forms/cfar.py``). At 77 GHz, with five times the cells, even the exact
+rate would give 20 voxels, so there the count is reported and not judged.
 
     python validation/closed_forms/noise_alone.py [--quick] [--json FILE]
 """

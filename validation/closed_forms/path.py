@@ -1,12 +1,14 @@
 """Lengths of specular paths in float64 against a solution to 60 digits, near by and 10 km away.
 
-Where two antennas see each other in a sphere is Alhazen's problem; in an ellipsoid it is harder. Here the shortest path
-Tx..surface..Rx is found by Newton's method in decimal arithmetic, derivatives by differences of 1e-15 that 60 digits bear,
-begun from a general minimiser. Nothing of it is the library's. The law of reflection must hold at the point that is found,
-and seen from one place a sphere's path must be twice the distance less the radius: that judges the judge.
+The point at which two antennas see each other in a sphere is Alhazen's problem; an ellipsoid is
+harder. Here the shortest path Tx-surface-Rx is found by Newton's method in decimal arithmetic, with
+derivatives from differences of 1e-15, for which 60 digits suffice, starting from a general
+minimiser. Nothing of it comes from the library. The reference is tested itself: the law of
+reflection must hold at the point that is found, and the path of a sphere seen from one place must
+be twice the distance less the radius.
 
-Lengths are read from `mirror`, which solves for every Tx, Rx and part, and from whole models for a radar that stands far away
-and a scene that stands far from its own origin.
+Lengths are those of `mirror`, which solves for every Tx, Rx and part, and those of whole models for
+a radar that is far away and a scene that is far from its own origin.
 
     python validation/closed_forms/path.py [--quick] [--json FILE]
 """
@@ -33,7 +35,7 @@ from rtradar.validate.rows import Row, judged, main
 
 Array = NDArray[np.float64]
 Vector = list[Decimal]
-# All but `analytic-paper`, whose length is that of the centre.
+# All models but `analytic-paper`, whose path goes to the centre of the ellipsoid.
 MODELS = ("analytic", "specular", "fresnel", "physical-optics", "rays", "reference")
 TOLERANCE_M = 1e-6
 STEP = Decimal("1e-15")
@@ -50,7 +52,7 @@ def norm(vector: Vector) -> Decimal:
 
 @dataclass(frozen=True)
 class Surface:
-    """An ellipsoid before two antennas, exactly as the float64 numbers have it."""
+    """An ellipsoid before two antennas, exactly as the float64 numbers describe it."""
 
     tx: Array
     rx: Array
@@ -59,7 +61,7 @@ class Surface:
     axes: Array
 
     def roughly(self) -> Array:
-        """Direction on the unit sphere near that of the shortest path, by a general minimiser."""
+        """Direction on the unit sphere near the point of the shortest path, by a minimiser."""
         local_t, local_r = (
             (self.tx - self.centre) @ self.frame,
             (self.rx - self.centre) @ self.frame,
@@ -90,7 +92,7 @@ class Surface:
         )
 
     def solve(self) -> tuple[Decimal, Decimal]:
-        """Shortest path [m], and by how much the law of reflection is missed (sine of the angle)."""
+        """Shortest path [m], and the error of the law of reflection (sine of the angle)."""
         start = self.roughly()
         pole = int(np.argmax(np.abs(start)))
         side = 1 if start[pole] > 0 else -1
@@ -100,7 +102,7 @@ class Surface:
         frame = [exact(row) for row in self.frame]
 
         def point(s: Decimal, t: Decimal) -> Vector:
-            """Stereographic from the pole opposite, so that the point lies exactly on the surface."""
+            """Stereographic from the opposite pole, so that the point is exactly on the surface."""
             size = 1 + s * s + t * t
             local = [Decimal(0)] * 3
             local[pole] = side * (1 - s * s - t * t) / size * axes[pole]
@@ -131,7 +133,8 @@ class Surface:
             ]
         s, t = at
         p = point(s, t)
-        # The bisector has no part along the surface where path is stationary; along both parameters, as a sine.
+        # Where the path is stationary, the bisector has no component along the surface. Its
+        # components along both parameters are taken as sines.
         sight = [Decimal(0)] * 3
         for antenna in (tx, rx):
             way = [a - b for a, b in zip(antenna, p, strict=True)]
@@ -151,7 +154,7 @@ class Surface:
 
 
 def antennas(distance: float, apart: str, rng: np.random.Generator) -> tuple[Array, Array]:
-    """Places about the origin: in one place, as far apart as the array's, or anywhere but behind each other."""
+    """Positions about the origin: in one place, the array's length apart, or anywhere in front."""
     first, second = rng.normal(size=(2, 3))
     first *= distance / np.linalg.norm(first)
     if apart == "monostatic":
@@ -159,7 +162,7 @@ def antennas(distance: float, apart: str, rng: np.random.Generator) -> tuple[Arr
     if apart == "array":
         return first, first + second / np.linalg.norm(second) * 0.3
     second *= distance * rng.uniform(0.5, 1.0) / np.linalg.norm(second)
-    # More than 100 degrees apart the path grazes: turned over to the same side.
+    # More than 100 degrees apart the path would be grazing: the antenna goes to the same side.
     return first, second if first @ second > -0.17 * distance**2 else -second
 
 
@@ -179,7 +182,7 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                         else rng.uniform(0.03, 0.3, 3)
                     )
                     frame = Rotation.random(random_state=int(rng.integers(1 << 30))).as_matrix()
-                    # Half of them far from the origin of the coordinates as well.
+                    # Half of the cases are far from the origin of the coordinates as well.
                     centre = rng.normal(size=3) * (distance if rng.uniform() < 0.5 else 1.0)
                     tx, rx = (centre + place for place in antennas(distance, apart, rng))
                     reference, sine = Surface(tx, rx, centre, frame, axes).solve()
@@ -192,7 +195,10 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                     )[0]
                     worst = max(worst, abs(float(Decimal(float(length[0, 0, 0])) - reference)))
                 claim = f"mirror, {distance:g} m, {shape}, {apart}"
-                says = "path over the specular point against 60 digits, 4 m to 10 km, one place to bistatic"
+                says = (
+                    "path over the specular point against 60 digits, "
+                    "4 m to 10 km, one place to bistatic"
+                )
                 quantity = f"worst error of the path, {count} cases"
                 yield judged(claim, quantity, "m", worst, TOLERANCE_M, says=says, cases=count)
     yield judged(
@@ -201,18 +207,23 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
         "rad",
         float(missed),
         1e-20,
-        says="the judge of paths: law of reflection missed by",
+        says="the reference of paths: error of the law of reflection",
     )
-    # The frame is orthonormal to 1e-16 only, and the sphere round to as much.
+    # The frame is orthonormal to 1e-16 only, and the sphere is round to the same accuracy.
     quantity = "sphere from one place, against 2 (|T - O| - a)"
     yield judged(
-        "the reference", quantity, "m", float(own), 1e-15, says=f"the judge of paths: {quantity}"
+        "the reference",
+        quantity,
+        "m",
+        float(own),
+        1e-15,
+        says=f"the reference of paths: {quantity}",
     )
 
 
 @dataclass(frozen=True)
 class Shifted:
-    """A moving body elsewhere."""
+    """A moving body at another place."""
 
     body: Moving
     by_m: Array
@@ -246,9 +257,8 @@ def model_rows(quick: bool) -> Iterator[Row]:
                 radar = dataclasses.replace(whole, position_m=tuple(place.tolist()))
                 for fidelity in MODELS:
                     if fidelity == "rays" and (quick or away > 1e3):
-                        continue  # a minute
-                    # The model asks a body for its poses, its parts and its duration: this one has them.
-                    echoes = build_model(fidelity, radar, there).echoes(chirps)  # type: ignore[arg-type]
+                        continue  # it takes a minute
+                    echoes = build_model(fidelity, radar, there).echoes(chirps)
                     poses = there.at((chirps + 0.5) * radar.chirp_duration_s)
                     worst = 0.0
                     for index, chirp in enumerate(chirps):
@@ -266,7 +276,10 @@ def model_rows(quick: bool) -> Iterator[Row]:
                                 abs(float(Decimal(float(echoes.length[index, rx, 0])) - reference)),
                             )
                     claim = f"{fidelity}, radar {away / 1e3:g} km away, {name} {where}"
-                    says = f"path of a moving body by every model, radar {away / 1e3:g} km away, scene up to 10 km from its origin"
+                    says = (
+                        f"path of a moving body by every model, radar {away / 1e3:g} km away, "
+                        "scene up to 10 km from its origin"
+                    )
                     yield judged(
                         claim,
                         "worst error of the path",

@@ -1,11 +1,12 @@
-"""A point echo at a known place and velocity reads back, from path lengths through IF and spectra to the map.
+"""Range and velocity of a point echo, read back from the map that the whole chain makes of it.
 
-Both presets; places 3 to 5 m away, on the boresight and off it; standing, receding, approaching, and too fast, where
-the reading is the known alias. Every length is exact, of that Tx and that Rx at the centre of that chirp. Reference:
-range over the array's centre in the middle of the window, range rate with the wavelength of the sweep centre. Reading:
-the centroid of the summed power of all channels, for a point at 2 m/s goes through five range bins in 0.1 s and, from the
-low to the high end of the sweep, through as many Doppler bins: the map has a plateau there, and its highest cell
-(reported, no claim) says little.
+Both presets; places 3 to 5 m away, on the boresight and off it; standing, receding, approaching,
+and so fast that the reading is the known alias. Every length is exact for its Tx and Rx at the
+middle of its chirp. The reference is the range over the array's centre in the middle of the frame,
+and the range rate with the wavelength of the sweep's centre. The reading is the centroid of the
+power summed over all channels: a point at 2 m/s crosses five range bins in 0.1 s and, from the low
+to the high end of the sweep, as many Doppler bins, so the map has a plateau there, on which the
+position of the highest cell means little. That cell is reported and not judged.
 
     python validation/closed_forms/point_target.py [--quick] [--json FILE]
 """
@@ -35,7 +36,7 @@ MOVING_TOLERANCE = 1 / 3  # bins
 
 
 def summed_power(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> Array:
-    """Map (range, velocity) of one window, in the middle of which the point is at ``place``."""
+    """Map (range, velocity) of one frame, in the middle of which the point is at ``place``."""
     chirps = radar.chirps_per_frame
     times = radar.chirp_times(chirps)
     tx = radar.tx_of_chirp(np.arange(chirps))
@@ -58,14 +59,14 @@ def summed_power(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> Array:
 
 
 def centroid(power: Array, reach: int) -> float:
-    """Mean bin of the power within ``reach`` of its peak, across the ends of the axis where need be."""
+    """Mean bin of the power within ``reach`` bins of its peak; the axis is cyclic."""
     bins = power.argmax() + np.arange(-reach, reach + 1)
     weights = power[bins % len(power)]
     return float(weights @ bins / weights.sum())
 
 
-def nearest_turn(bins: float, cycles: int) -> float:
-    """A number of Doppler bins, less whole turns of the axis."""
+def nearest_alias(bins: float, cycles: int) -> float:
+    """Fold a number of Doppler bins into the axis."""
     return (bins + cycles / 2) % cycles - cycles / 2
 
 
@@ -76,13 +77,13 @@ def case_rows(preset: str, place: str, speed: float) -> Iterator[Row]:
     power = summed_power(radar, PLACES_M[place], speed * way / range_m)
 
     cycles = radar.cycles_per_frame
-    seen = nearest_turn(
+    seen = nearest_alias(
         speed / radar.velocity_bin_mps, cycles
     )  # bins; not the speed itself where it aliases
-    # 12 bins beside the plateau: a Hann-windowed tone has 1e-6 of its power beyond.
+    # 12 bins beside the plateau: a tone with a Hann window has 1e-6 of its power beyond them.
     reach = 12 + int(abs(speed) * radar.frame_duration_s / radar.range_bin_m)
     read_range = centroid(power.sum(axis=1), reach)
-    read_velocity = seen + nearest_turn(
+    read_velocity = seen + nearest_alias(
         centroid(power.sum(axis=0), reach) - cycles // 2 - seen, cycles
     )
 
@@ -119,7 +120,7 @@ def case_rows(preset: str, place: str, speed: float) -> Iterator[Row]:
         float(peak[0]) - range_m / radar.range_bin_m,
         key="point",
     )
-    off = nearest_turn(float(peak[1]) - cycles // 2 - seen, cycles)
+    off = nearest_alias(float(peak[1]) - cycles // 2 - seen, cycles)
     yield reported(claim, f"highest cell, {velocity} off", "bins", off, key="point")
 
 

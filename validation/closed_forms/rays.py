@@ -1,21 +1,23 @@
-"""Shooting and bouncing rays against closed forms: sphere, plate, dihedral, trihedral, two spheres that see each other.
+"""Shooting and bouncing rays against closed forms: sphere, plate, dihedral, trihedral, two spheres.
 
-Closed forms of perfectly conducting targets far away, lambda the wavelength (Knott, Shaeffer, Tuley, *Radar Cross
-Section*, chapter 6; Skolnik, *Radar Handbook*):
+Closed forms of perfectly conducting targets far away, where lambda is the wavelength (Knott,
+Shaeffer, Tuley, *Radar Cross Section*, chapter 6; Skolnik, *Radar Handbook*):
 
     sphere      physical optics of `rtradar.rcs.sphere`, amplitude and phase
     plate       broadside 4 pi A^2 / lambda^2
-    dihedral    two plates w x h at a right angle, seen along the middle between them: 8 pi (w h)^2 / lambda^2
-    trihedral   three right triangles with legs a, seen along the middle: 4 pi a^4 / (3 lambda^2)
+    dihedral    two plates w x h at a right angle, seen from their bisector: 8 pi (w h)^2 / lambda^2
+    trihedral   three right triangles with legs a, seen along the axis: 4 pi a^4 / (3 lambda^2)
 
-The corner reflectors' forms hold the last bounce alone, for geometric optics fills their aperture; each is judged alone and
-with the bounces before it, edges and all. What two spheres send each other is held against the stationary phase of the
-fourfold integral over both,
+The closed forms of the corner reflectors are of the last bounce alone, for which geometric optics
+fills their aperture; it is judged alone, and also together with the bounces before it and the
+edges. The double bounce of two spheres is compared with the stationary phase of the fourfold
+integral over both,
 
     |F| = 2 sqrt(pi) cos(i1) cos(i2) |T| |R| / (R1 d R2 sqrt|det H|),
 
-H the second derivatives of the path R1 + d + R2 over the four surface coordinates, found here by differences. The Doppler
-floor is that of a sphere in flight whose tubes fly with it, under Chebyshev windows of 160 dB.
+where H has the second derivatives of the path R1 + d + R2 over the four surface coordinates, found
+here by differences. The Doppler floor is that of a sphere in flight whose ray tubes fly with it,
+with Chebyshev windows of 160 dB.
 
     python validation/closed_forms/rays.py [--quick] [--json FILE]
 """
@@ -41,8 +43,8 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
 SPEED_OF_LIGHT = 299_792_458.0
-FAR = 1e6  # [m]; its wavefront bends by 1e-7 m across the largest target
-EDGE = 0.4  # [m], of the corner reflectors
+FAR = 1e6  # [m]; its wavefront deviates by 1e-7 m from a plane across the largest target
+EDGE = 0.4  # edge of the corner reflectors [m]
 
 
 def decibels(field: complex, reference: float) -> float:
@@ -58,7 +60,7 @@ def field_of(
 ) -> complex:
     one = rays_scattering(
         target, np.atleast_2d(tx), np.atleast_2d(rx), np.array([frequency]), **options
-    )  # type: ignore[arg-type]
+    )
     return complex(one[0])
 
 
@@ -72,7 +74,7 @@ def spheres(*places: tuple[float, float, float], radius: float) -> rt.Ellipsoids
     )
 
 
-# -- one bounce -----------------------------------------------------------------------------------------------------
+# -- one bounce ------------------------------------------------------------------------------------
 
 
 def sphere_rows(quick: bool) -> Iterator[Row]:
@@ -102,7 +104,7 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
             what = f"radius {radius} m, {frequency / 1e9:.0f} GHz, {density:g} rays per wavelength"
             error = 100 * abs(field / reference - 1)
             if density == 3:
-                # 0.1 dB is what was asked of traced physical optics.
+                # 0.1 dB was asked for of traced physical optics.
                 says = "a sphere by `rays`, 3 per wavelength, against physical optics' closed form"
                 power = abs(decibels(field, abs(reference)))
                 yield judged("sphere", f"{what}: power", "dB", power, 0.1, key="sphere", says=says)
@@ -137,18 +139,19 @@ def plate_rows(quick: bool) -> Iterator[Row]:
             yield judged(
                 "plate", what, "dB", abs(decibels(field, reference)), 0.01, key="plate", says=says
             )
-        # Turned about z: sinc(k w sin(a)) cos(a), the sides of the pattern and their zeros.
+        # Rotated about z: sinc(k w sin(a)) cos(a), the sides of the pattern and its zeros.
         for angle in np.radians([3.0, 10.0, 25.0]):
             tx = FAR * np.array([np.cos(angle), np.sin(angle), 0])
             along = 2 * width * np.sin(angle) * frequency / SPEED_OF_LIGHT
             pattern = reference * np.cos(angle) * np.sinc(along)
-            what = f"{width} x {height} m, {frequency / 1e9:g} GHz, {np.degrees(angle):.0f} deg off: share of broadside"
+            where = f"{frequency / 1e9:g} GHz, {np.degrees(angle):.0f} deg off"
+            what = f"{width} x {height} m, {where}: share of broadside"
             error = abs(abs(field_of(plate, tx, tx, frequency)) - abs(pattern)) / reference
             says = "plates by `rays`, 3 to 25 degrees off, against sinc, over broadside"
             yield judged("plate", what, "1", error, 1e-3, key="plate", says=says)
 
 
-# -- corner reflectors ----------------------------------------------------------------------------------------------
+# -- corner reflectors -----------------------------------------------------------------------------
 
 
 def dihedral_rows(quick: bool) -> Iterator[Row]:
@@ -177,7 +180,7 @@ def dihedral_rows(quick: bool) -> Iterator[Row]:
                 key="dihedral",
                 says=f"{against}: second bounce alone",
             )
-            # Each plate seen alone, at 45 degrees, sends 38 dB less: 0.1 dB.
+            # Each plate alone, at 45 degrees, returns 38 dB less, which is 0.1 dB.
             error = abs(decibels(two, reference))
             yield judged(
                 "dihedral",
@@ -188,7 +191,7 @@ def dihedral_rows(quick: bool) -> Iterator[Row]:
                 key="dihedral",
                 says=f"{against}: all bounces",
             )
-            # The field's component along the crease turns over at each bounce like a mirror's, that across it does not.
+            # Each bounce reverses the field's component along the crease, and not that across it.
             sign = np.cos(np.angle(two - one) - np.angle(-1j if polarization == "v" else 1j))
             yield judged(
                 "dihedral",
@@ -233,14 +236,15 @@ def trihedral_rows(quick: bool) -> Iterator[Row]:
 
 
 def small_trihedral_rows(quick: bool) -> Iterator[Row]:
-    # Of a few wavelengths, what each plate sends back by itself is no longer small beside the corner's return.
+    # At a few wavelengths the single bounce of each plate is not small beside the corner's return.
     along = np.ones(3) / np.sqrt(3)
     for frequency in (12e9,) if quick else (12e9, 24e9, 77e9):
         for a in (0.1, 0.05):
             corner = sheet(
                 [[0, 0, 0], [a, 0, 0], [0, a, 0], [0, 0, a]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
             )
-            # Three reflections at conductors and the focus between turn the field to -j of its length.
+            # Three reflections at conductors and the focus between them make the field -j times its
+            # length.
             whole = -1j * np.sqrt(
                 4 * np.pi / 3
             ) * a * a * frequency / SPEED_OF_LIGHT + single_bounces(a, frequency, along)
@@ -250,12 +254,15 @@ def small_trihedral_rows(quick: bool) -> Iterator[Row]:
                 )
             )
             what = f"edge {a} m, {frequency / 1e9:.0f} GHz"
-            says = "smaller trihedrals by `rays`, edge 0.1 and 0.05 m, against closed form and the plates' own single bounce"
+            says = (
+                "smaller trihedrals by `rays`, edge 0.1 and 0.05 m, "
+                "against closed form and the plates' own single bounce"
+            )
             yield judged("trihedral", what, "dB", error, 0.3, key="trihedral", says=says)
 
 
 def single_bounces(a: float, frequency: float, along: Array) -> complex:
-    """What the three plates of a trihedral send back by themselves: F = jk / sqrt(pi) (n.s) Int exp(2jk s.r) dS [m]."""
+    """Single bounces of a trihedral's three plates: jk / sqrt(pi) (n.s) Int exp(2jk s.r) dS [m]."""
     k = 2 * np.pi * frequency / SPEED_OF_LIGHT
     x, w = np.polynomial.legendre.leggauss(120)
     u, v = np.meshgrid((x + 1) / 2, (x + 1) / 2, indexing="ij")
@@ -269,7 +276,7 @@ def single_bounces(a: float, frequency: float, along: Array) -> complex:
     return complex(1j * k / np.sqrt(np.pi) * found)
 
 
-# -- two bounces between curved surfaces ----------------------------------------------------------------------------
+# -- two bounces between curved surfaces -----------------------------------------------------------
 
 
 def two_sphere_rows(quick: bool) -> Iterator[Row]:
@@ -285,10 +292,11 @@ def two_sphere_rows(quick: bool) -> Iterator[Row]:
                 )
                 reference = 2 * between_spheres(tx, pair.centres, radius)
                 what = f"{polarization}, radius {radius} m, {apart} m apart, from {distance:g} m"
-                # Stationary phase leaves terms of the order 1 / (k a) out, 2 % here; a sphere far behind the other's glint is
-                # lit by some twenty tubes across, and those on its outline count whole or not at all.
+                # Stationary phase omits terms of the order 1 / (k a), 2 % here. A sphere far behind
+                # the glint of the other is lit by some twenty ray tubes across, and those on its
+                # outline count as a whole or not at all.
                 says, error = (
-                    "what two spheres send each other against stationary phase",
+                    "double bounce of two spheres against stationary phase",
                     abs(decibels(two - one, reference)),
                 )
                 yield judged(
@@ -297,9 +305,9 @@ def two_sphere_rows(quick: bool) -> Iterator[Row]:
 
 
 def between_spheres(tx: Array, centres: Array, radius: float) -> float:
-    """Scattering length of the way Tx, one sphere, the other, and back: by the stationary path and its Hessian [m]."""
+    """Scattering length of the path Tx, one sphere, the other, Rx, by stationary phase [m]."""
     poles = [np.array([1.0, 1.0, 0.0]), np.array([1.0, -1.0, 0.0])]
-    # From a pole 45 degrees towards the other sphere; east and north span the tangent plane.
+    # The pole is 45 degrees towards the other sphere; east and north span the tangent plane.
     start = [pole / np.sqrt(2) for pole in poles]
     easts = [np.cross([0, 0, 1], pole) for pole in start]
 
@@ -318,7 +326,7 @@ def between_spheres(tx: Array, centres: Array, radius: float) -> float:
 
     q = np.asarray(minimize(path, np.zeros(4), method="BFGS", options={"gtol": 1e-9}).x)
     p, r = points(q)
-    # Coordinates in metres along the surface at the stationary points: a fresh tangent plane there.
+    # Coordinates in metres along the surface at the stationary points, on a new tangent plane.
     start = [(point - centre) / radius for point, centre in zip((p, r), centres, strict=True)]
     frames = [np.linalg.svd(pole[None])[2][1:] for pole in start]
 
@@ -348,7 +356,7 @@ def between_spheres(tx: Array, centres: Array, radius: float) -> float:
     return float(2 * np.sqrt(np.pi) * cosines[0] * cosines[1] * (tx @ tx) / spread)
 
 
-# -- laws -----------------------------------------------------------------------------------------------------------
+# -- laws ------------------------------------------------------------------------------------------
 
 
 def law_rows(quick: bool) -> Iterator[Row]:
@@ -368,7 +376,7 @@ def law_rows(quick: bool) -> Iterator[Row]:
             for pair in ((tx, rx), (rx, tx))
         )
         error = 100 * float(np.linalg.norm(there - back) / np.linalg.norm(there))
-        # One bounce swaps exactly; of two bounces one end is cut into tubes and the other is not.
+        # A single bounce is exactly reciprocal. Of a double bounce, only one end has ray tubes.
         if bounces == 1:
             says = "Tx and Rx swapped, one bounce: change"
             yield judged(
@@ -397,7 +405,7 @@ def law_rows(quick: bool) -> Iterator[Row]:
     alone, both = (
         field_of(target, antenna, antenna, 14e9, bounces=1) for target in (front, shadowed)
     )
-    says = "what a sphere straight behind another adds"
+    says = "a sphere straight behind another: change of the field"
     yield judged(
         "hidden",
         "a sphere behind another adds",
@@ -411,7 +419,7 @@ def law_rows(quick: bool) -> Iterator[Row]:
 
 def doppler_rows(quick: bool) -> Iterator[Row]:
     whole = rt.Radar.preset("paper-12ghz")
-    # One Tx and one Rx with the timing of twelve: every chirp is traced anew, and one channel tells.
+    # One Tx and one Rx with the timing of twelve: every chirp is traced anew, one channel suffices.
     radar = rt.Radar(
         name="one channel",
         start_frequency_hz=whole.start_frequency_hz,
@@ -433,7 +441,7 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
         for density, anchors in (
             ((3.0, 10e-3),) if quick else ((1.0, 0.0), (3.0, 0.0), (3.0, 10e-3))
         ):
-            model = Rays(radar, body, rays_per_wavelength=density, bounces=1, anchor_s=anchors)  # type: ignore[arg-type]
+            model = Rays(radar, body, rays_per_wavelength=density, bounces=1, anchor_s=anchors)
             x = rt.signal.synthesize(model.echoes(np.arange(n)), radar, radar.chirp_times(n))
             spectrum = rt.process.range_doppler(x, radar, window_functions=chebyshev)
             power = np.abs(spectrum.values[:, :, 0]) ** 2
@@ -447,7 +455,7 @@ def doppler_rows(quick: bool) -> Iterator[Row]:
                 says = "Doppler floor of `rays` by its options: sphere in flight, highest cell"
                 yield judged(name, what, "dB", floor, -80.0, key="doppler", says=says)
             else:
-                # The terminator of a turning body moves over it: a wave that physical optics has, and no other model.
+                # The terminator of a rotating body moves, a wave that only physical optics has.
                 yield reported(name, what, "dB", floor, key="doppler")
 
 

@@ -1,13 +1,16 @@
-"""Static clutter of a room: images, walls against physical optics of plates, corner reflectors in a scene, and stillness.
+"""Static clutter of a room: images, walls, corner reflectors in a scene, and stillness.
 
-images      all mirror paths of an empty box room, orders 1 and 2: lengths against images written down here axis by axis
-wall        the return of a large wall, bistatic, against physical optics of the rectangle: currents 2 n x H times the slab's
-            coefficient (Airy's sum, written down here), summed by the midpoint rule
-reflectors  a dihedral and a triangular trihedral of 0.4 m that stand in a scene, against 8 pi a^4 / lambda^2 and
-            4 pi a^4 / (3 lambda^2)
-still room  living room and corridor through IF and range-Doppler spectra under Chebyshev windows of 160 dB, no noise
+images      all specular paths of an empty box room, orders 1 and 2: their lengths against images
+            that are computed here axis by axis
+wall        the return of a large wall, bistatic, against physical optics of the rectangle: currents
+            2 n x H times the slab's coefficient (Airy's sum, computed here), summed by the midpoint
+            rule
+reflectors  a dihedral and a triangular trihedral of 0.4 m in a scene, against 8 pi a^4 / lambda^2
+            and 4 pi a^4 / (3 lambda^2)
+still room  living room and corridor through IF samples and range-Doppler spectra with Chebyshev
+            windows of 160 dB, without noise
 
-python validation/closed_forms/room_clutter.py [--quick] [--json FILE]
+    python validation/closed_forms/room_clutter.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -59,7 +62,8 @@ def image_rows() -> Iterator[Row]:
         ]
         order = len(names)
         worst[order] = max(worst[order], float(error.max()))
-        # Over an edge two orders of reflection share one image; to and fro between opposite walls they are two.
+        # Over an edge, both orders of the two walls share one image; between opposite walls they
+        # are two images.
         key = (
             echoes.name
             if order == 2 and PLACES[names[0]][0] == PLACES[names[1]][0]
@@ -67,16 +71,16 @@ def image_rows() -> Iterator[Row]:
         )
         shares[order][key] = shares[order].get(key, 0.0) + strength
     for order, count in ((1, 6), (2, 6 + 12)):
-        # float32 would be 0.3 um off; the limit is asked for.
+        # Float32 would err by 0.3 um; the limit is the one asked for.
         yield judged(
             f"images, order {order}",
             "length, worst",
             "m",
             worst[order],
             1e-6,
-            says="lengths of mirror paths in a box room",
+            says="lengths of specular paths in a box room",
         )
-        says = "mirror paths in a box room: how many"
+        says = "specular paths in a box room: their number"
         yield judged(
             f"images, order {order}",
             "how many",
@@ -86,21 +90,16 @@ def image_rows() -> Iterator[Row]:
             reference=count,
             says=says,
         )
-        # A conductor mirrors v into v exactly, whatever the angles: rounding.
+        # A conductor reflects v into v exactly, whatever the angles: what is left is rounding.
         missing = max(float(np.abs(strength - 1).max()) for strength in shares[order].values())
-        says = "mirror paths in a box room of perfect mirrors: each once, and whole"
+        says = "specular paths in a box room of conductors: each once, with its whole field"
         yield judged(
-            f"images, order {order}",
-            "each once, of a perfect mirror",
-            "1",
-            missing,
-            1e-9,
-            says=says,
+            f"images, order {order}", "each once, of a conductor", "1", missing, 1e-9, says=says
         )
 
 
 def airy(eta: complex, thickness: float, k: float, cosine: Array, te: bool) -> Array:
-    """Reflection of a slab: r - r (1 - r^2) q^2 + ..., Airy's sum; the field, TM with the sign of a conductor's +1."""
+    """Reflection of a slab by Airy's sum r - r (1 - r^2) q^2 + ..., with a conductor's TM as +1."""
     inner = np.sqrt(eta - 1 + cosine**2 + 0j)
     r = (
         (cosine - inner) / (cosine + inner)
@@ -112,7 +111,7 @@ def airy(eta: complex, thickness: float, k: float, cosine: Array, te: bool) -> A
 
 
 def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str) -> complex:
-    """Physical optics of the front of a wall across x: scattering length over R1 R2, by the midpoint rule."""
+    """Scattering length over R1 R2 of a wall across x, by physical optics and the midpoint rule."""
     k = 2 * np.pi * frequency / C
     step = 2 * np.pi / k / 6
     (_, y0, z0), (_, y1, z1) = wall.corners.min(axis=0), wall.corners.max(axis=0)
@@ -131,7 +130,7 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
         d, s = going / r1[:, None], coming / r2[:, None]
         sent, received = (_vector(way, polarization) for way in (-d, s))
         cosine = -d @ normal
-        # v is TE and h TM for antennas in one horizontal plane, as they are here.
+        # v is TE and h is TM for antennas in one horizontal plane, as these are.
         eta = complex(wall.material.eta(frequency))
         if np.isinf(eta):
             mirror = np.ones(len(d))
@@ -141,7 +140,7 @@ def plate(wall: Wall, tx: Array, rx: Array, frequency: float, polarization: str)
             )
         current = 2 * np.cross(normal, np.cross(d, sent)) * mirror[:, None]
         total += ((current * received).sum(axis=1) / (r1 * r2) * np.exp(-1j * k * (r1 + r2))).sum()
-    # The field is -jk / (4 pi) of this; a scattering length counts it against what a conductor turns round.
+    # The field is -jk / (4 pi) of this; a conductor's reflection counts as a positive length.
     return complex(1j * k / np.sqrt(4 * np.pi) * total * area)
 
 
@@ -152,7 +151,7 @@ def _vector(way: Array, polarization: str) -> Array:
 
 
 def wall_rows(quick: bool) -> Iterator[Row]:
-    """A wall whose Fresnel zone fits in it many times."""
+    """A wall that is many Fresnel zones wide."""
     cases = [("perfect-conductor", "v"), ("plasterboard", "v"), ("concrete", "h")]
     for made, polarization in cases if not quick else cases[1:2]:
         wall = Wall(
@@ -163,7 +162,7 @@ def wall_rows(quick: bool) -> Iterator[Row]:
             material=material(made),
             thickness_m=0.0125,
         )
-        # Antennas 3 m apart: 37 degrees on the wall.
+        # Antennas 3 m apart: 37 degrees at the wall.
         spacing = 3.0 / (C / 12e9)
         radar = rt.Radar(
             tx_y=2,
@@ -194,7 +193,8 @@ def wall_rows(quick: bool) -> Iterator[Row]:
                 max(single, float(np.abs(phase / exact - 1).max())),
             )
         case = f"wall of {made}, {polarization}, bistatic"
-        # Waves of the four edges, which images leave out, are up to 3 % each at one frequency, and part over the sweep.
+        # The waves of the four edges, which images omit, are up to 3 % each at one frequency, and
+        # they average out over the sweep.
         yield judged(
             case,
             "power over the sweep, worst channel",
@@ -207,11 +207,11 @@ def wall_rows(quick: bool) -> Iterator[Row]:
 
 
 def reflector_rows(quick: bool) -> Iterator[Row]:
-    """Reflectors that stand in a scene, far away."""
+    """Corner reflectors in a scene, far away."""
     closed = {"trihedral": (4 / 3, 0.3), "dihedral": (8.0, 0.1)}
     for frequency in (12e9,) if quick else (12e9, 24e9, 77e9):
         wavelength = C / frequency
-        # Ten times 2 a^2 / lambda: closed forms are of plane waves.
+        # Ten times 2 a^2 / lambda, because the closed forms are of plane waves.
         away = round(20 * 0.4**2 / wavelength) + 20.0
         radar = rt.Radar(
             start_frequency_hz=frequency - 0.05e9,
@@ -243,19 +243,19 @@ def reflector_rows(quick: bool) -> Iterator[Row]:
                 "dB",
                 abs(error),
                 limit,
-                says=f"a {mesh} that stands in a scene",
+                says=f"a {mesh} in a scene",
             )
 
 
 def still_rows(quick: bool) -> Iterator[Row]:
-    """Energy beside zero Doppler over the strongest cell."""
+    """Energy beside zero Doppler over that of the strongest cell."""
     for preset, name in (
         [("paper-12ghz", "living-room")]
         if quick
         else [("paper-12ghz", "living-room"), ("paper-77ghz", "corridor")]
     ):
         scene = rt.Scene.load(name)
-        # Four Tx: windows of 400 and 2000 cycles at a third of the memory.
+        # Four Tx: frames of 400 and 2000 cycles with a third of the memory.
         radar = scene.place(replace(rt.Radar.preset(preset), tx_y=2, tx_z=2, rx_y=2, rx_z=2))
         n = min(radar.cycles_per_frame, 400)
         clutter = Clutter(radar, scene)
@@ -265,8 +265,9 @@ def still_rows(quick: bool) -> Iterator[Row]:
         power = (np.abs(spectra.values) ** 2).max(axis=(0, 2))
         beside = np.abs(np.arange(n) - n // 2) > np.ceil(main_lobe_bins(n + 1))
         floor = 10 * np.log10(max(power[beside].max(), 1e-300) / power.max())
-        case = f"still room: {name}, {radar.start_frequency_hz / 1e9:.0f} GHz, {clutter.n_echoes} echoes"
-        # The windows' side lobes are at -160 dB, the rounding of complex64 spectra at -140 dB.
+        radio = f"{radar.start_frequency_hz / 1e9:.0f} GHz"
+        case = f"still room: {name}, {radio}, {clutter.n_echoes} echoes"
+        # The side lobes of the windows are at -160 dB, the rounding of complex64 spectra at -140.
         yield judged(
             case,
             "highest beside zero Doppler",

@@ -1,10 +1,12 @@
-"""A walk in free space, a living room and a corridor: what clutter is there, what each removal leaves of it, and what it costs.
+"""A walk in free space, a living room and a corridor: clutter, its removal, and the cost of a room.
 
-Each is a whole run of `specular` at 12 GHz with noise 20 dB below the person in free space. Truth is the person alone: a cell is
-a target where a run in free space without noise stands 13 dB above the mean noise power of the cell. In the room the person's
-ghosts are therefore false alarms, and what walls and furniture hide of the person is missed. The cloud is compared with that
-of free space by the Chamfer distance in bins of range, velocity and hop. Cost is the wall time after warm-up over that of free
-space in the same run of this script: twice is wanted, and not reached.
+Each case is a whole run of `specular` at 12 GHz with noise 20 dB below the person in free space.
+The truth is the person alone: a cell is a target where a run in free space without noise exceeds
+the mean noise power of the cell by 13 dB. In the room the person's ghosts are therefore false
+alarms, and what walls and furniture occlude of the person is missed. The cloud is compared with
+that of free space by the Chamfer distance in bins of range, velocity and hop. The cost is the wall
+time after warm-up over that of free space in the same run of this script; twice is wanted, and not
+reached.
 
     python validation/closed_forms/rooms.py [--quick] [--json FILE]
 """
@@ -30,7 +32,7 @@ ROOMS = ("living-room", "corridor")
 
 
 def scored(out: Path, truth: np.ndarray[Any, Any]) -> DetectionScore:
-    """All windows of a run against the truth (time, range, velocity)."""
+    """Score all frames of a run against the truth (time, range, velocity)."""
     with h5py.File(out / "maps.h5") as maps:
         return score(maps["detections"][:].astype(bool), truth)
 
@@ -42,7 +44,7 @@ def measure(quick: bool) -> list[Row]:
     motion = rt.synthetic_motion(ACTIVITY, seed=0, duration_s=duration_s)
     with tempfile.TemporaryDirectory() as folder:
         for name in ("free-space", *rooms):
-            # The room may have a place of its own for the radar: free space is then seen from there.
+            # The scene may place the radar; free space is then seen from the same position.
             scene = rt.Scene.load(name)
             radar = scene.place(rt.Radar.preset("paper-12ghz"))
             free = Path(folder, name, "free")
@@ -75,10 +77,7 @@ def measure(quick: bool) -> list[Row]:
                 once = found.summary["stages"]["room"] / alone.summary["wall_s"]
                 rows.append(
                     reported(
-                        claim,
-                        "of it what is done once a capture: tracing the room, choosing paths",
-                        "",
-                        once,
+                        claim, "of it once a capture: tracing the room, choosing paths", "", once
                     )
                 )
                 rows += detection_rows(claim, scored(out, truth))

@@ -1,8 +1,9 @@
-"""How far the points of the spatial cloud lie from the body that they are of.
+"""Distance of the points of the spatial cloud from the body that they belong to.
 
-The distance of each point to the nearest centre of a body part at any of five instants of its window. Points more than 0.3 m
-off are of no part: side lobes in range and angle of stronger echoes, noise, and echoes faster than the radar can tell.
-Reported for the number of decibels below a cell's highest peak to which further peaks are taken.
+The distance of each point is that to the nearest centre of a body part at any of five instants of
+its frame. Points that are more than 0.3 m off belong to no part: they are side lobes of stronger
+echoes in range and angle, noise, and echoes too fast for the radar. The figures are reported for
+several levels, in decibels below a cell's highest peak, down to which further peaks are kept.
 
     python validation/closed_forms/spatial_cloud.py [--quick] [--json FILE]
 """
@@ -50,12 +51,12 @@ def measure(quick: bool) -> list[Row]:
                 )
             )
             rows.append(
-                reported(claim, "share of points more than 0.3 m off", "", float(far.mean()))
+                reported(claim, "fraction of points more than 0.3 m off", "", float(far.mean()))
             )
             rows.append(
                 reported(
                     claim,
-                    "their share of the power",
+                    "their fraction of the power",
                     "",
                     float(cloud["power"][far].sum() / cloud["power"].sum()),
                 )

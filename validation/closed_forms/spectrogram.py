@@ -1,21 +1,26 @@
 """The spectrogram follows a pendulum's closed form, and shows torso and both legs of a real walk.
 
-Pendulum: a point on a rod of 1 m that swings freely by +-47 degrees, sin(theta / 2) = k sn(w t, k^2), up to 2.5 m/s. The IF
-is written out here in NumPy with the exact way of every chirp over its own Tx and Rx. It goes through range spectra and the
-stream in blocks that cut cycles. What the velocity of a column should be: the range rate averaged over its window with
-the square of the window, which is where the centroid of the power of a tone of changing frequency lies. Highest cell: half
-a bin off at most, by the raster alone. It is not the speed's change within a window (5.5 bins at 12 GHz, 1.2 at 77 GHz)
-that limits it, nor that the same velocity has 14 % less Doppler at the low end of a 12 GHz sweep than in its middle and 14 %
-more at the high end: both widen the ridge, evenly. What is left in the centroid is the returning wave, lower by the beat
-frequency (1e-4).
+Pendulum: a point on a rod of 1 m swings freely by +-47 degrees, sin(theta / 2) = k sn(w t, k^2), at
+up to 2.5 m/s. The IF samples are computed here in NumPy, with the exact path of every chirp over
+its own Tx and Rx. They go through range spectra and the stream, in blocks that cut cycles. The
+velocity of a column is compared with the mean of the range rate over its window, weighted by the
+square of the window, because there lies the centroid of the power of a tone of changing frequency.
+The highest cell may be half a bin off, by the spacing of the bins alone. Neither the change of
+speed within a window (5.5 bins at 12 GHz, 1.2 at 77 GHz) limits the accuracy, nor that one velocity
+has 14 % less Doppler at the low end of a 12 GHz sweep than in its middle, and 14 % more at the high
+end: both widen the ridge evenly. What is left in the centroid is the beat frequency, by which the
+returning wave is lower (1e-4).
 
-Walk: a recording of CMU, SNR 20 dB, one channel. The torso's line is the highest cell of each column, against the mean
-range rate of the three torso parts. A swing of a leg is when a foot comes at 2.4 m/s and more; its line is the highest cell
-among those faster than the middle between the foot and the next fastest part of the body, wherever these are 6 bins apart.
-The foot's range rate is that of its specular point, found by a general minimiser: a foot turns while it swings, and its
-middle is up to 0.2 m/s slower or faster.
+Walk: a recording of CMU, SNR 20 dB, one channel. The line of the torso is the highest cell of each
+column, compared with the mean range rate of the three torso parts. A leg swings when its foot
+approaches at 2.4 m/s or more; its line is the highest cell among those faster than the middle
+between the foot and the next fastest part of the body, wherever these are 6 bins apart. The range
+rate of the foot is that of its specular point, found by a general minimiser: a foot rotates while
+it swings, and its centre is up to 0.2 m/s slower or faster.
 
-    RTRADAR_MOCAP=folder python validation/closed_forms/spectrogram.py [--quick] [--json FILE]     # without it, the pendulum alone
+    RTRADAR_MOCAP=folder python validation/closed_forms/spectrogram.py [--quick] [--json FILE]
+
+Without RTRADAR_MOCAP, the folder of recordings, only the pendulum is measured.
 """
 
 from __future__ import annotations
@@ -61,17 +66,17 @@ def gathered(radar: rt.Radar, blocks: Iterable[NDArray[np.complex64]], channel: 
 
 
 def over_window(radar: rt.Radar, middles: Array) -> tuple[Array, Array]:
-    """Instants of each window's samples (time, cycle) [s], and the square of the window (cycle,), of sum 1."""
+    """Instants (time, cycle) [s] of each window, and the window's square (cycle,), of sum 1."""
     cycles = np.arange(WINDOW)
     weight = np.sin(np.pi * cycles / WINDOW) ** 4
     return middles[:, None] + (cycles - WINDOW / 2) * radar.cycle_duration_s, weight / weight.sum()
 
 
-# -- pendulum ----------------------------------------------------------------------------------------------------------
+# -- pendulum --------------------------------------------------------------------------------------
 
 
 def pendulum(times: Array) -> tuple[Array, Array]:
-    """Place [m] and velocity [m/s] of the point, (..., 3)."""
+    """Position [m] and velocity [m/s] of the point, (..., 3)."""
     rate = np.sqrt(GRAVITY / ROD_M)
     sn, cn, _, _ = ellipj(rate * times + 0.3, MODULUS**2)
     angle, turning = 2 * np.arcsin(MODULUS * sn), 2 * MODULUS * rate * cn
@@ -81,14 +86,14 @@ def pendulum(times: Array) -> tuple[Array, Array]:
 
 
 def range_rate(times: Array, tx: Array, rx: Array) -> Array:
-    """Of the pendulum, half of that of the way Tx..point..Rx [m/s]."""
+    """Range rate of the pendulum, half that of the path Tx-point-Rx [m/s]."""
     at, velocity = pendulum(times)
     units = ((at - end) / np.linalg.norm(at - end, axis=-1, keepdims=True) for end in (tx, rx))
     return np.asarray(sum((unit * velocity).sum(axis=-1) for unit in units) / 2)
 
 
 def pendulum_if(radar: rt.Radar) -> Iterator[NDArray[np.complex64]]:
-    """Samples in blocks of 413 chirps, which is no whole number of cycles."""
+    """IF samples in blocks of 413 chirps, which is no whole number of cycles."""
     chirps = round(PENDULUM_S / radar.chirp_duration_s)
     instants = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
     slope = radar.bandwidth_hz / radar.chirp_duration_s
@@ -104,7 +109,7 @@ def pendulum_if(radar: rt.Radar) -> Iterator[NDArray[np.complex64]]:
 
 
 def pendulum_rows(radar: rt.Radar) -> Iterator[Row]:
-    # Of the Rx of each line the two at its ends.
+    # Of the Rx of each line, the two at its ends.
     ends = (radar.rx_y - 1) * radar.rx_spacing_wavelengths
     radar = dataclasses.replace(radar, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)
     for channel in (0, radar.n_channels - 1):
@@ -116,7 +121,8 @@ def pendulum_rows(radar: rt.Radar) -> Iterator[Row]:
             2 * radar.centre_frequency_hz * WINDOW * radar.n_tx * radar.chirp_duration_s
         )
         ridge = seen.velocity[seen.power.argmax(axis=1)]
-        # Within 20 bins of the highest cell: 14 % of 25 bins, 3 for the speed's change, and the window's skirts.
+        # Within 20 bins of the highest cell: 14 % of 25 bins, 3 for the change of speed, and the
+        # skirts of the window.
         near = np.abs(seen.velocity - ridge[:, None]) < 20.5 * width
         centroid = (seen.power * near * seen.velocity).sum(axis=1) / (seen.power * near).sum(axis=1)
         claim = f"{radar.name}, pendulum, channel {channel}"
@@ -127,14 +133,15 @@ def pendulum_rows(radar: rt.Radar) -> Iterator[Row]:
             "bins",
             steepest(radar, seen.time, truth) / width,
         )
-        # One bin: the claim. A hundredth: a shift of a quarter of a cycle in time is 0.01 bins at 12 GHz.
+        # One bin is the claim. A hundredth: a shift of a quarter cycle is 0.01 bins at 12 GHz.
         columns, says = len(truth), "spectrogram of a pendulum against elliptic functions"
         for name, found, limit in (("highest cell", ridge, 1.0), ("centroid", centroid, 0.01)):
             quantity, error = f"{name}, worst of {columns} columns", worst(found - truth, width)
             yield judged(
                 claim, quantity, "bins", error, limit, says=f"{says}: {name}", cases=columns
             )
-        # By Parseval's theorem 1.5 in range times 1.5 in velocity, for an echo of amplitude 1, in every column.
+        # By Parseval's theorem 1.5 in range times 1.5 in velocity in every column, for an echo of
+        # amplitude 1.
         total = seen.power.sum(axis=1)
         error = float(np.abs(total / 2.25 - 1).max())
         yield judged(
@@ -156,7 +163,7 @@ def worst(error: Array, width: float) -> float:
     return float(np.abs(error).max() / width)
 
 
-# -- walk --------------------------------------------------------------------------------------------------------------
+# -- walk ------------------------------------------------------------------------------------------
 
 
 def walk(folder: Path) -> Body:
@@ -167,7 +174,7 @@ def walk(folder: Path) -> Body:
 def walk_spectrogram(
     radar: rt.Radar, body: Body, fidelity: str, snr_db: float = 20.0
 ) -> Spectrogram:
-    """Channel 0, through the pieces of the chain."""
+    """Channel 0 of a walk, by the single steps of the chain."""
     model = build_model(fidelity, radar, body)
     n_chirps = int(body.duration_s / radar.cycle_duration_s) * radar.n_tx
     noise = Noise.for_snr(survey(model, radar, body, n_chirps).power, snr_db, seed=0)
@@ -193,7 +200,7 @@ class Gait:
     """Range rates of the body for channel 0, every 5 ms [m/s]."""
 
     times: Array
-    parts: Array  # (time, part), of the middles
+    parts: Array  # (time, part), of the centres
     feet: dict[str, Array]  # of the specular points
 
     @classmethod
@@ -214,13 +221,13 @@ class Gait:
         return cls(times, np.gradient(ways, times, axis=0) / 2, feet)
 
     def seen(self, rate: Array, radar: rt.Radar, middles: Array) -> Array:
-        """As a spectrogram's columns see it."""
+        """Range rates as the columns of a spectrogram average them."""
         times, weight = over_window(radar, middles)
         return np.asarray(np.interp(times, self.times, rate) @ weight)
 
 
 def swings(rate: Array, times: Array) -> Iterator[slice]:
-    """Runs of at least 0.1 s in which a foot comes fast."""
+    """Intervals of at least 0.1 s in which a foot approaches fast."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (rate < SWING_MPS).astype(int), [0]])))
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         if times[end - 1] - times[first] >= 0.1:
@@ -231,13 +238,13 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
     found = walk_spectrogram(radar, body, fidelity)
     claim = f"{radar.name}, walk, {fidelity}"
     width = found.velocity[1] - found.velocity[0]
-    noise = float(np.median(found.power[:, found.velocity > 3.5]))  # nothing goes away so fast
+    noise = float(np.median(found.power[:, found.velocity > 3.5]))  # nothing recedes so fast
 
     torso = gait.seen(
         gait.parts[:, [PART_NAMES.index(name) for name in TORSO]].mean(axis=1), radar, found.time
     )
     away = np.abs(found.velocity[found.power.argmax(axis=1)] - torso) / width
-    # An arm or a thigh outshines the torso now and then: of the line in the picture the median column speaks.
+    # An arm or a thigh sometimes outshines the torso, so the median over the columns is judged.
     says = "spectrogram of a recorded walk against the motion: torso, legs; median of the columns"
     yield judged(
         claim,
@@ -247,7 +254,7 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
         1.0,
         says=says,
     )
-    yield reported(claim, "torso: columns within 3 bins", "share", float((away < 3).mean()))
+    yield reported(claim, "torso: fraction of columns within 3 bins", "", float((away < 3).mean()))
 
     count = 0
     for side, rate in gait.feet.items():
@@ -269,7 +276,7 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
             )
             yield judged(claim, quantity, "bins", middle, 1.0, says=says)
             yield reported(
-                claim, f"{case}: columns within 3 bins", "share", float((away < 3).mean())
+                claim, f"{case}: fraction of columns within 3 bins", "", float((away < 3).mean())
             )
             yield reported(
                 claim,
@@ -280,7 +287,7 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
             level = np.median(power.max(axis=1) / found.power[apart].max(axis=1))
             yield reported(claim, f"{case}: re the highest cell, median", "dB", decibels(level))
             count += 1
-    # The right foot swings as the recording begins, then left, right, left.
+    # The right foot swings when the recording begins, then the left, right and left one.
     yield judged(
         claim,
         "swings of the legs",
@@ -288,7 +295,7 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
         count,
         0.0,
         reference=4,
-        says="swings of the legs in it, of 4: missed",
+        says="swings of the legs in that spectrogram, of 4: missed",
     )
 
 

@@ -1,8 +1,9 @@
-"""Spheres: the closed forms against miepython for ka from 0.01 to 10 000, and `specular` against both from 5 on.
+"""Spheres: closed forms against miepython for ka from 0.01 to 10 000, `specular` from ka = 5 on.
 
-The exact series is held against miepython with a metal's huge index, in size and, up to a constant of convention, in phase.
-Geometric optics is held against miepython where it is claimed valid: 0.45 dB from ka = 12.6 on, 0.02 dB from 60 on. The
-closed form of physical optics is held against its own integral over the lit half, by composite Gauss-Legendre rules.
+The exact series is compared with miepython for a metal's very large index, in magnitude and, up to
+a constant of convention, in phase. Geometric optics is compared with miepython in its range of
+validity: 0.45 dB from ka = 12.6 on, and 0.02 dB from 60 on. The closed form of physical optics is
+compared with its own integral over the lit half, by composite Gauss-Legendre rules.
 
     python validation/closed_forms/sphere.py [--quick] [--json FILE]
 """
@@ -15,7 +16,7 @@ from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 
-os.environ["MIEPYTHON_USE_JIT"] = "1"  # read as it is imported
+os.environ["MIEPYTHON_USE_JIT"] = "1"  # read when it is imported
 
 import miepython
 import numpy as np
@@ -32,21 +33,21 @@ judged, reported = (partial(kind, key="sphere") for kind in (rows.judged, rows.r
 FREQUENCY_HZ = 14e9
 WAVE_NUMBER = 2 * np.pi * FREQUENCY_HZ / 299_792_458.0
 LEAST_KA, LARGEST_KA, LEAST_OPTICAL_KA = 0.01, 1e4, 5.0
-# Geometric optics misses the creeping wave and terms of order 1/(ka)^2.
+# Geometric optics omits the creeping wave and terms of order 1/(ka)^2.
 GO_DB = {(12.6, 60.0): 0.45, (60.0, LARGEST_KA): 0.02}
 FAR_M = 1e7
 
 
 def spread(least: float, largest: float, n: int) -> Array:
-    """ka on a logarithmic scale, a little off any pattern."""
+    """Values of ka on a logarithmic scale, a little off any pattern."""
     return np.geomspace(least, largest, n)
 
 
 def exact(ka: Array) -> Complex:
-    """Backscattered F [m] at the frequency of this script, by miepython; the phase up to a constant factor."""
+    """Backscattered F [m] at the frequency of this script by miepython, up to a constant phase."""
     fields = []
     for x in ka:
-        # A skin of 1e-8 of the radius, or 1e-7 of a wavelength: thinner ones take miepython ever longer.
+        # A skin of 1e-8 of the radius or 1e-7 of a wavelength; thinner skins take miepython longer.
         metal = 1 - 1j * max(1e6, 1e8 / x)
         power = miepython.efficiencies_mx(metal, float(x))[2] * np.pi * (x / WAVE_NUMBER) ** 2
         amplitude = complex(miepython.S1_S2(metal, float(x), [-1.0])[0][0])
@@ -78,7 +79,7 @@ def closed_rows(quick: bool) -> Iterator[Row]:
     radius, reference = ka / WAVE_NUMBER, exact(ka)
     mie = rt.rcs.sphere(radius, FREQUENCY_HZ, "mie")
     claim = f"ka {LEAST_KA:g} to {LARGEST_KA:g}"
-    # The index of 1e6 turns the phase by 2e-6; otherwise both series have rounding only.
+    # The index of 1e6 shifts the phase by 2e-6; apart from that both series have rounding only.
     about = {
         "says": f"Mie's series against miepython, {claim}: power and phase, relative",
         "cases": len(ka),
@@ -92,7 +93,7 @@ def closed_rows(quick: bool) -> Iterator[Row]:
     )
     optics = rt.rcs.sphere(radius, FREQUENCY_HZ, "po")
     integral = np.array([optics_integral(float(x)) for x in ka])
-    # Phases up to 2e4 rad, whose rounding alone is 4e-12.
+    # Phases reach 2e4 rad, and their rounding alone is 4e-12.
     about["says"] = f"physical optics' closed form against its integral, {claim}: complex, relative"
     yield judged(
         claim,
@@ -125,10 +126,14 @@ def specular_rows(quick: bool) -> Iterator[Row]:
     ka = spread(LEAST_OPTICAL_KA, LARGEST_KA, n)
     go = rt.rcs.sphere(ka / WAVE_NUMBER, FREQUENCY_HZ, "go")
     claim = f"specular, ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}"
-    # From 10 000 km: the largest sphere is 34 m, whose bent wavefronts take 3.4e-6 of the field; the path of 2e7 m has
-    # rounding of 4e-9 m, 1e-6 rad. Both a hundred times below what is claimed of optics.
+    # From 10 000 km: the largest sphere has a radius of 34 m, and the curvature of the wavefronts
+    # accounts for 3.4e-6 of the field; the path of 2e7 m is rounded to 4e-9 m, 1e-6 rad. Both are a
+    # hundred times below what is claimed of optics.
     error = float(np.abs(specular(ka) / go - 1).max())
-    says = f"a sphere by `specular` against geometric optics, ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}: complex, relative"
+    says = (
+        "a sphere by `specular` against geometric optics, "
+        f"ka {LEAST_OPTICAL_KA:g} to {LARGEST_KA:g}: complex, relative"
+    )
     yield judged(claim, "against GO, worst complex", "", error, 1e-4, says=says, cases=n)
     some = spread(LEAST_OPTICAL_KA, 12.6, n)
     yield reported(

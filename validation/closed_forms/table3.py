@@ -1,23 +1,28 @@
-"""Precision and missing rate of CFAR on one channel and on the sum of all (the paper's Table 3), for four activities.
+"""Precision and missing rate of CFAR on one channel and on the sum of all (the paper's Table 3).
 
-Precision is the share of detected cells that are targets, the missing rate the share of targets that are not detected.
+Precision is the fraction of detected cells that are targets, and the missing rate the fraction of
+targets that are not detected, both for four activities.
 
-Truth from the noise-free map: a cell is a target where its noise-free power stands 13 dB above its mean noise power. At
-that margin a detector that knows the noise, of one channel and at the default rate of 1e-6, finds nine in ten steady cells
-(13.2 dB). One margin serves one channel and the sum, for both then look for the same cells; other margins are shown too.
-``known noise`` is that detector, a fixed threshold: what it finds and CFAR does not is hidden by the body itself, whose
+The truth is the noise-free map: a cell is a target where its noise-free power exceeds its mean
+noise power by 13 dB. At that margin a detector that knows the noise, on one channel and at the
+default rate of 1e-6, finds nine in ten steady cells (13.2 dB). One margin serves one channel and
+the sum, so that both look for the same cells; other margins are shown too. ``known noise`` is that
+detector, a fixed threshold: what it finds and CFAR does not is masked by the body itself, whose
 echo fills the training cells.
 
-The paper's own rule: a target is what stands above 50 dB (one channel) or 85 dB (sum of 96 magnitudes) in the same noisy
-map. Its units: spectra not divided by their windows, 0.01 m^2 of noise for each body part, so 20.0 dB and 15.3 dB above
-the noise. Our maps are judged at these heights above their own noise. ``paper as coded`` keeps units and levels, with the
-other faults of the paper's code: no spreading, range of the ellipsoid's centre, the sum of magnitudes treated as one
-exponential variable, OS multiplier 5.0003, and a CA threshold that is the largest of all cells looked at so far. Then one
-fault at a time is mended, to see what each does. Not the paper's even there: its recordings, which windows it judged, and
-its cross-section, 14 to 26 dB low end-on.
+The paper's own rule: a target exceeds 50 dB (one channel) or 85 dB (sum of 96 magnitudes) in the
+same noisy map. In the paper's units spectra are not divided by their windows and the noise is
+0.01 m^2 for each body part, so these levels are 20.0 dB and 15.3 dB above the noise. Our maps are
+judged at these levels above their own noise. ``paper as coded`` keeps units and levels, with the
+other faults of the paper's code: no spreading, range of the ellipsoid's centre, the sum of
+magnitudes treated as one exponential variable, OS multiplier 5.0003, and a CA threshold that is the
+largest of all cells so far. Then one fault at a time is corrected, to see its effect. What still
+differs from the paper are its recordings, the frames that it judged, and its cross-section, which
+is 14 to 26 dB low end-on.
 
-The detectors must also agree with theory: given the thresholds from noisy training cells, the detections expected are the
-sum of the survival functions of the noncentral chi-square law, and the count must lie within 4 standard deviations.
+The detectors must also agree with theory. Given the thresholds from noisy training cells, the
+expected number of detections is the sum of survival functions of the noncentral chi-square law, and
+the count must be within 4 standard deviations.
 
     python validation/closed_forms/table3.py [--quick] [--json FILE]
 """
@@ -67,7 +72,7 @@ PAPER = {
 KNOWN = ("SISO-known noise", "MIMO-known noise")
 
 PAPER_LEVELS_DB = {"SISO": 50.0, "MIMO": 85.0}
-PAPER_NOISE_M2 = 21 * 0.01  # added once for each part of the body, whatever its echo
+PAPER_NOISE_M2 = 21 * 0.01  # added once for each part of the body, whatever its echo is
 PAPER_PFA, PAPER_OS_SCALE = 0.1, 5.0003
 GUARD, REACH = 2, 6
 
@@ -88,7 +93,7 @@ class Capture(NamedTuple):
         return cls(model, RADAR.window_starts(n_chirps)[::every], power)
 
     def samples(self, start: int) -> NDArray[np.complex64]:
-        """Noise-free IF of the window that starts at this cycle."""
+        """Noise-free IF samples of the frame that starts at this cycle."""
         chirps = np.arange(RADAR.chirps_per_frame) + start * RADAR.n_tx
         times = RADAR.chirp_times(len(chirps), int(chirps[0]))
         return np.asarray(
@@ -100,21 +105,21 @@ class Capture(NamedTuple):
 def noisy(
     samples: NDArray[np.complex64], power: float, seed: int, start: int
 ) -> NDArray[np.complex64]:
-    """The samples of the window that starts at this cycle, with noise."""
+    """IF samples of the frame that starts at this cycle, with noise."""
     copy = samples.copy()
     Noise(power, seed).add(copy, RADAR, start * RADAR.n_tx)
     return copy
 
 
 def power_maps(samples: NDArray[np.complex64]) -> dict[str, Map]:
-    """Power of the first channel, and of all summed."""
+    """Power of the first channel, and of the sum of all."""
     cube = range_spectrum(samples, RADAR).reshape(
         -1, RADAR.n_tx, RADAR.n_rx, RADAR.samples_per_chirp
     )
     return {"SISO": power_map(cube, RADAR, channel=0), "MIMO": power_map(cube, RADAR)}
 
 
-# -- our detectors -----------------------------------------------------------------------------------------------------
+# -- our detectors ---------------------------------------------------------------------------------
 
 
 def our_masks(maps: dict[str, Map], noise: dict[str, float]) -> dict[str, Mask]:
@@ -140,12 +145,12 @@ def paper_heights_db() -> dict[str, float]:
 
 
 def paper_gain_db() -> float:
-    """What a tone of amplitude 1 reads in the paper's spectra, which are not divided by their windows."""
+    """Level of a tone of amplitude 1 in the paper's spectra, which are not divided by windows."""
     return 20 * math.log10(hann(RADAR.samples_per_chirp).sum() * hann(RADAR.cycles_per_frame).sum())
 
 
 class Tally:
-    """Scores by rule of truth (or recipe) and scheme: for each window a list over seeds."""
+    """Scores by rule of truth (or recipe) and scheme: a list over seeds for each frame."""
 
     def __init__(self) -> None:
         self.scores: dict[tuple[str, str], list[list[DetectionScore]]] = {}
@@ -161,7 +166,7 @@ class Tally:
             self.scores.setdefault(key, []).extend(windows)
 
     def rows(self, claim: str, rule: str, scheme: str, *, spread: bool = False) -> Iterator[Row]:
-        """Precision and missing rate of all together; a detector that found nothing has no precision, and no row of it."""
+        """Precision and missing rate of all; without detections there is no row of a precision."""
         windows = self.scores[rule, scheme]
         whole = [total(seeds) for seeds in windows]
         values = rates(total(whole))
@@ -225,11 +230,11 @@ def tally_of(activity: str, fidelity: str, every: int, seeds: int) -> tuple[Tall
     return tally, laws
 
 
-# -- theory ------------------------------------------------------------------------------------------------------------
+# -- theory ----------------------------------------------------------------------------------------
 
 
 class Law(NamedTuple):
-    """Detections of one map: counted, expected, and the variance of the count were the cells independent."""
+    """Detections of one map: counted, expected, and their variance for independent cells."""
 
     scheme: str
     counted: int
@@ -240,10 +245,10 @@ class Law(NamedTuple):
 def expected(
     kind: str, clean: Map, power: Map, noise: float, masks: dict[str, Mask]
 ) -> Iterator[Law]:
-    """Survival of each cell above the threshold that its own noisy training cells set.
+    """Survival probability of each cell, above the threshold from its own noisy training cells.
 
-    A cell in units of half the noise of a channel is noncentral chi-square of 2 looks; guard cells keep it independent of
-    its threshold, for spectra through Hann windows are alike only as far as two bins.
+    A cell in units of half the noise of a channel is noncentral chi-square of 2 looks. The guard
+    cells make it independent of its threshold, because Hann windows correlate two bins at most.
     """
     looks = LOOKS[kind]
     unit = noise / looks
@@ -255,7 +260,7 @@ def expected(
         chance = gammaincc(looks, threshold)
         some = (signal > 1e-3) & (
             threshold < 20 * (signal + looks + 20)
-        )  # farther above, no noise lifts the cell there
+        )  # farther above, no noise lifts the cell over it
         chance[some] = ncx2.sf(2 * threshold[some], 2 * looks, 2 * signal[some])
         scheme = f"{kind}-{name}"
         yield Law(
@@ -267,7 +272,7 @@ def expected(
 
 
 def law_rows(laws: list[Law]) -> Iterator[Row]:
-    """Count against expectation; Hann windows make neighbours alike: powers by 4/9 and 1/36 one and two bins away."""
+    """Count against expectation; Hann windows correlate the power of neighbours by 4/9 and 1/36."""
     alike = (1 + 2 * (4 / 9 + 1 / 36)) ** 2
     for scheme in PAPER:
         own = [law for law in laws if law.scheme == scheme]
@@ -293,23 +298,19 @@ def law_rows(laws: list[Law]) -> Iterator[Row]:
         )
 
 
-# -- the paper's chain ---------------------------------------------------------------------------------------------------
+# -- the paper's chain -----------------------------------------------------------------------------
 
 
 @dataclass(frozen=True, kw_only=True)
 class Recipe:
-    """The paper's chain as its code has it; a recipe with another value has that fault mended."""
+    """The paper's chain as in its code; a recipe with another value has that fault corrected."""
 
     name: str
     fidelity: str = "analytic-paper"
     snr_db: float | None = None  # None: noise of fixed power for each part
     truth: str = "noisy"
-    own_threshold: bool = (
-        False  # CA: each cell against its own training cells, not the largest threshold so far
-    )
-    pfa: float | None = (
-        None  # OS and CA multipliers solved for it; None: 5.0003, and CA's for the asked 0.1
-    )
+    own_threshold: bool = False  # CA: its own training cells, not the largest threshold so far
+    pfa: float | None = None  # for both multipliers; None: OS 5.0003, CA for the asked 0.1
     power_sum: bool = False  # with the law of its looks
 
 
@@ -337,7 +338,7 @@ RECIPES = (
 
 
 def paper_maps(samples: NDArray[np.complex64]) -> dict[str, Map]:
-    """In the paper's units, all as power: one channel, the square of the sum of magnitudes, and the sum of powers."""
+    """Power in the paper's units: one channel, the squared sum of magnitudes, the sum of powers."""
     magnitude = np.abs(range_doppler(samples, RADAR).values) * np.float32(
         10 ** (paper_gain_db() / 20)
     )
@@ -350,7 +351,7 @@ def paper_maps(samples: NDArray[np.complex64]) -> dict[str, Map]:
 
 
 def growing_ca(power: Map) -> Mask:
-    """The paper code's CA-CFAR: a cell must exceed the largest threshold up to it, range bin by range bin; no edges."""
+    """CA-CFAR of the paper's code: a cell must exceed the largest threshold of all cells so far."""
     n_train = (2 * REACH + 1) ** 2 - (2 * GUARD + 1) ** 2
     sums = [
         np.lib.stride_tricks.sliding_window_view(power, (2 * half + 1,) * 2).sum(axis=(2, 3))
@@ -373,7 +374,7 @@ def recipe_scores(
     for kind in LOOKS:
         summed = recipe.power_sum and kind == "MIMO"
         chosen, looks = ("powers", LOOKS[kind]) if summed else (kind, 1)
-        # 85 dB for the magnitudes is less by the number of channels for their powers, where all are alike.
+        # 85 dB for magnitudes is less by the number of channels for powers, if all are alike.
         level = 10 ** (PAPER_LEVELS_DB[kind] / 10) / (LOOKS[kind] if summed else 1)
         power = maps[chosen]
         if recipe.truth == "margin":
@@ -390,7 +391,7 @@ def recipe_scores(
 
 
 def tally_of_recipes(activity: str, every: int, chosen: Sequence[Recipe]) -> Tally:
-    """Scores of each recipe in the windows of one activity."""
+    """Scores of each recipe in the frames of one activity."""
     tally = Tally()
     for fidelity in dict.fromkeys(recipe.fidelity for recipe in chosen):
         capture = Capture.of(activity, fidelity, every, spreading=False)
@@ -410,7 +411,7 @@ def tally_of_recipes(activity: str, every: int, chosen: Sequence[Recipe]) -> Tal
 
 
 def rebuilt_rows() -> Iterator[Row]:
-    """The CA of the paper's code against masks that it made, where they lie beside the recordings."""
+    """CA of the paper's code against masks that it made, if they lie beside the recordings."""
     mocap = os.environ.get("RTRADAR_MOCAP")
     path = Path(mocap).parent / "reference" / "cfar_crops_octave.npz" if mocap else None
     if path and path.is_file():
@@ -429,7 +430,7 @@ def rebuilt_rows() -> Iterator[Row]:
         )
 
 
-# -- rows --------------------------------------------------------------------------------------------------------------
+# -- rows ------------------------------------------------------------------------------------------
 
 
 def measure(quick: bool) -> list[Row]:

@@ -1,12 +1,14 @@
-"""Walls of any thickness against exact slabs: a sphere behind them, its ghosts off them, static clutter, a walk behind brick.
+"""Walls of any thickness against exact slabs: a sphere behind them, ghosts, clutter, and a walk.
 
-The slab is solved here, by the transfer matrix of its tangential fields, at 401 frequencies of the sweep; materials come in
-by their permittivity alone. A sphere that conducts has one specular point, found by iterating on the bisector of its legs, and
-in closed form the curvature of what it sends back. Fields are vectors: each slab multiplies their TE and TM parts. A leg goes
-straight on through a wall, as the package has it; waves bent by the edges or the curvature of the wavefront are not judged.
+The slab is solved here, by the transfer matrix of its tangential fields, at 401 frequencies of the
+sweep; materials enter by their permittivity alone. A conducting sphere has one specular point,
+found by iterating on the bisector of its legs, and the curvature of what it reflects has a closed
+form. Fields are vectors: each slab multiplies their TE and TM parts. A leg goes straight on through
+a wall, as in the package; waves from edges, or from the curvature of the wavefront, are not judged.
 
-Errors of a complex spectrum are the largest over the sweep and all channels, over the rms of the exact one; those of clutter
-over its largest magnitude, as promised. The range of the sphere is read off the range spectrum, as a user would.
+Errors of a complex spectrum are the largest over the sweep and all channels, over the rms of the
+exact spectrum; those of clutter are over its largest magnitude, as promised. The range of the
+sphere is read from the range spectrum, as a user would.
 
     python validation/closed_forms/thick_walls.py [--quick] [--json FILE]
 """
@@ -61,7 +63,7 @@ PRESETS = ("paper-12ghz", "paper-77ghz")
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere that goes straight on; at 0 s it is at ``centre``."""
+    """A sphere in straight flight; at 0 s it is at ``centre``."""
 
     centre: tuple[float, float, float]
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -78,7 +80,7 @@ class Ball:
 
 
 def made_of(name: str, radar: rt.Radar) -> Material:
-    """By name; beyond 40 GHz brick keeps the constants that ITU-R P.2040-3 gives below."""
+    """Material by name; beyond 40 GHz brick keeps the constants of ITU-R P.2040-3 for 40 GHz."""
     if name == "brick" and radar.start_frequency_hz > 40e9:
         constants = {"a": 3.91, "c": 0.0238, "d": 0.16}
         return own_material(
@@ -92,7 +94,7 @@ def made_of(name: str, radar: rt.Radar) -> Material:
 
 
 def across_x(name: str, made: Material, thickness: float, x: float) -> Wall:
-    """A large wall whose front, at x, looks back at the radar."""
+    """A large wall whose front, at x, faces the radar."""
     edges = {"edge_u_m": (0.0, 0.0, 40.0), "edge_v_m": (0.0, 40.0, 0.0)}
     return Wall(
         name=name, corner_m=(x, -20.0, -20.0), material=made, thickness_m=thickness, **edges
@@ -100,31 +102,31 @@ def across_x(name: str, made: Material, thickness: float, x: float) -> Wall:
 
 
 def across_y(name: str, made: Material, thickness: float, y: float) -> Wall:
-    """A large wall whose front, at y, looks to the right, where the radar is."""
+    """A large wall whose front, at y, faces right, where the radar is."""
     edges = {"edge_u_m": (40.0, 0.0, 0.0), "edge_v_m": (0.0, 0.0, 40.0)}
     return Wall(
         name=name, corner_m=(-20.0, y, -20.0), material=made, thickness_m=thickness, **edges
     )
 
 
-# -- the exact slab ---------------------------------------------------------------------------------------------------
+# -- the exact slab --------------------------------------------------------------------------------
 
 
 def exact_slab(
     eta: Field, thickness: float, frequency: Array, cosine: float, te: bool
 ) -> tuple[Field, Field]:
-    """Reflection, and transmission in place of as much air, by the transfer matrix of the tangential fields (frequency,)."""
+    """Reflection (frequency,), and transmission in place of air, by the transfer matrix."""
     k = 2 * np.pi * frequency / C
     normal = np.sqrt(eta - (1 - cosine**2) + 0j)
     normal = np.where(normal.imag > 0, -normal, normal)
     depth = k * thickness * normal
-    # Magnetic over electric tangential field, in air and inside, in units of air's admittance.
+    # Ratio of magnetic to electric tangential field, in air and inside, in units of air's.
     air, inner = (cosine, normal) if te else (1 / cosine, eta / normal)
     a, b, c = np.cos(depth), 1j * np.sin(depth) / inner, 1j * np.sin(depth) * inner
     total = (a + b * air) * air + c + a * air
     reflected = ((a + b * air) * air - c - a * air) / total
     transmitted = 2 * air / total * np.exp(1j * k * thickness * cosine)
-    # TM unit vectors turn with the wave: the tangential field of the reflected one points the other way.
+    # TM unit vectors follow the wave: the reflected one has the opposite tangential field.
     return (reflected if te else -reflected), transmitted
 
 
@@ -133,7 +135,7 @@ def unit(vectors: Array) -> Array:
 
 
 def sent(way: Array) -> Array:
-    """Vertical polarisation: world z, projected across the way."""
+    """Vertical polarisation: world z, projected across the direction."""
     up = np.array([0.0, 0.0, 1.0])
     return unit(up - way[2] * way)
 
@@ -141,7 +143,7 @@ def sent(way: Array) -> Array:
 def met(
     wall: Wall, field: Field, way: Array, frequency: Array, mirrored: bool
 ) -> tuple[Field, Array]:
-    """Field (frequency, 3) behind a wall or reflected by it, and the way on."""
+    """Field (frequency, 3) behind a wall or reflected by it, and its direction."""
     normal = unit(np.cross(wall.edge_u_m, wall.edge_v_m))
     cosine = abs(float(way @ normal))
     if wall.material.conducts:
@@ -163,7 +165,7 @@ def met(
 
 
 def over(wall: Wall, point: Array) -> Array:
-    """Image in the front."""
+    """Image of a point in the front."""
     normal = unit(np.cross(wall.edge_u_m, wall.edge_v_m))
     return point - 2 * ((point - np.array(wall.corner_m)) @ normal) * normal
 
@@ -171,7 +173,7 @@ def over(wall: Wall, point: Array) -> Array:
 def arrived(
     antenna: Array, point: Array, wall: Wall, mirrored: bool, frequency: Array
 ) -> tuple[Field, Array, float]:
-    """Field at a point, the way on which it comes, and how far it went."""
+    """Field at a point, the direction in which it arrives, and the distance that it went."""
     source = over(wall, antenna) if mirrored else antenna
     onward = unit(point - source)
     normal = unit(np.cross(wall.edge_u_m, wall.edge_v_m))
@@ -191,7 +193,7 @@ def exact_echo(
     back: tuple[Wall, bool],
     frequency: Array,
 ) -> Field:
-    """Spectrum of the sphere's specular echo (frequency,), each leg through a wall or, where True, over it."""
+    """Spectrum (frequency,) of the sphere's specular echo; each leg through a wall, or over it."""
     starts = [
         over(wall, antenna) if mirrored else antenna
         for antenna, (wall, mirrored) in ((tx, out), (rx, back))
@@ -214,12 +216,12 @@ def exact_echo(
         / (r1 * r2)
     )
     turned = 2 * (field @ normal)[:, None] * normal - field
-    # A conductor that sends the field straight back counts as +1.
+    # A conductor that returns the field straight back counts as +1.
     share = -(turned * received).sum(axis=1)
     return np.asarray(strength * share * np.exp(-2j * np.pi * frequency / C * (r1 + r2)))
 
 
-# -- the package's ----------------------------------------------------------------------------------------------------
+# -- the package's ---------------------------------------------------------------------------------
 
 
 def through_nodes(nodes: Array, places: Array) -> Array:
@@ -232,7 +234,7 @@ def through_nodes(nodes: Array, places: Array) -> Array:
 
 
 def spectrum(length: Array, amplitude: Field, nodes: Array, frequency: Array) -> Field:
-    """Sum of echoes with its phases (frequency, ...), of lengths (..., echo) and amplitudes (node, ..., echo)."""
+    """Spectrum (frequency, ...) of echoes, lengths (..., echo) and amplitudes (node, ..., echo)."""
     values = np.tensordot(through_nodes(nodes, frequency), amplitude, axes=1)
     k = (2 * np.pi * frequency / C).reshape(-1, *(1,) * length.ndim)
     return np.asarray((np.conj(values) * np.exp(-1j * k * length)).sum(axis=-1))
@@ -253,11 +255,11 @@ def relative(ours: Field, exact: Field) -> float:
     return float((np.abs(ours - exact) / np.sqrt((np.abs(exact) ** 2).mean(axis=0))).max())
 
 
-# -- a sphere behind a wall -------------------------------------------------------------------------------------------
+# -- a sphere behind a wall ------------------------------------------------------------------------
 
 
 def peak_m(samples: NDArray[np.complexfloating], radar: rt.Radar) -> float:
-    """Range of the highest peak of a channel's spectrum under a Hann window, between bins by zeros and a parabola [m]."""
+    """Range of the highest peak of a channel [m], between bins by zero-padding and a parabola."""
     n, finer = len(samples), 32
     power = np.log(np.abs(np.fft.fft(samples * np.hanning(n + 1)[:-1], n * finer)) + 1e-300)
     top = int(power.argmax())
@@ -266,7 +268,7 @@ def peak_m(samples: NDArray[np.complexfloating], radar: rt.Radar) -> float:
 
 
 def behind_rows(quick: bool) -> Iterator[Row]:
-    """It walks obliquely, and is looked at in the middle of the 20 ms between which walls are evaluated, for every Tx."""
+    """Every Tx, in the middle of the 20 ms between which walls are evaluated; oblique flight."""
     places = {"straight on": (2.0, 0.0, 1.0), "35 degrees": (1.6, 2.6, 0.7)}
     for preset in PRESETS:
         radar = at_walls(preset)
@@ -283,7 +285,7 @@ def behind_rows(quick: bool) -> Iterator[Row]:
                 places.items() if not quick else [("35 degrees", places["35 degrees"])]
             ):
                 body = Ball(centre, velocity=(0.5, 1.5, 0.0))
-                model = Multipath(radar, body, Scene(walls=(wall,)), order=0)  # type: ignore[arg-type]
+                model = Multipath(radar, body, Scene(walls=(wall,)), order=0)
                 echoes = model.echoes(chirps)
                 ours = spectrum(echoes.length, echoes.amplitude, echoes.frequency, frequency)
                 rx = radar.rx[radar.rx_of_tx]
@@ -340,7 +342,7 @@ def behind_rows(quick: bool) -> Iterator[Row]:
                 )
 
 
-# -- its ghosts off a wall --------------------------------------------------------------------------------------------
+# -- its ghosts off a wall -------------------------------------------------------------------------
 
 
 def ghost_rows(quick: bool) -> Iterator[Row]:
@@ -354,7 +356,7 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                 "53 degrees": (2.0, -0.3, 1.2),
                 "32 degrees": (0.0, 0.1, 0.8),
             }.items():
-                model = Multipath(radar, Ball(centre), Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
+                model = Multipath(radar, Ball(centre), Scene(walls=(wall,)), order=2)
                 echoes = model.echoes(chirps)
                 names = np.array(model.path_names)
                 for path, sides in {
@@ -393,16 +395,16 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                     yield reported(claim, "echoes", "", count)
 
 
-# -- static clutter ---------------------------------------------------------------------------------------------------
+# -- static clutter --------------------------------------------------------------------------------
 
 
 def mirrored_field(walls: list[tuple[Wall, bool]], tx: Array, rx: Array, frequency: Array) -> Field:
-    """Spectrum of the one mirror reflection of a list of walls: each is passed, or mirrors where True, in turn."""
+    """Spectrum of one specular path: each wall of a list is passed, or reflects where True."""
     source = tx
     for wall, mirrored in walls:
         source = over(wall, source) if mirrored else source
     way = unit(rx - source)
-    # Back to the way on which the wave set out.
+    # Back to the direction in which the wave set out.
     for wall, mirrored in reversed(walls):
         normal = unit(np.cross(wall.edge_u_m, wall.edge_v_m))
         way = way - 2 * (way @ normal) * normal if mirrored else way
@@ -426,7 +428,7 @@ def of_strongest(ours: Field, exact: Field) -> float:
 def received(
     radar: rt.Radar, walls: tuple[Wall, ...], furniture: tuple[Furniture, ...] = ()
 ) -> tuple[RoomEchoes, ...] | str:
-    """Clutter of a room, or the one line by which it is refused."""
+    """Clutter of a room, or the one-line message by which it is refused."""
     try:
         return Clutter(radar, Scene(walls=walls, furniture=furniture), order=1).objects
     except InputError as refusal:
@@ -450,7 +452,7 @@ def clutter_row(claim: str, kind: str, error: float | str) -> Row:
 def clutter_rows(quick: bool) -> Iterator[Row]:
     few = {"tx_y": 2, "tx_z": 2, "rx_y": 1, "rx_z": 1}
     for preset in PRESETS:
-        # As many samples as reach what is behind 24 cm of brick.
+        # As many samples as it takes to reach what is behind 24 cm of brick.
         radar = at_walls(preset, samples_per_chirp=512, **few)
         frequency = sweep(radar)
         kept = radar.rx[radar.rx_of_tx]
@@ -462,9 +464,9 @@ def clutter_rows(quick: bool) -> Iterator[Row]:
             side = across_y("side", made_of(name, radar), thickness, 1.6)
             far = across_x("far", metal, 0.1, 1.5)
             behind = [(pane, False), (far, True), (pane, False)]
-            # What loses over 60 dB in the wall is not judged.
+            # A loss of over 60 dB in the wall is not judged.
             for label, room, object_name, course in (
-                ("a mirror reflection off a wall", (side,), "side", [(side, True)]),
+                ("a specular reflection off a wall", (side,), "side", [(side, True)]),
                 ("a conductor behind a wall", (pane, far), "far", behind),
             ):
                 claim = f"{preset}, {name} of {1e3 * thickness:g} mm"
@@ -495,7 +497,7 @@ def clutter_rows(quick: bool) -> Iterator[Row]:
 
 
 def passed(antennas: Array, points: Array, wall: Wall, frequency: Array) -> Field:
-    """What a wall leaves of the co-polar field from antennas to points, (frequency, antenna, point)."""
+    """Co-polar transmission of a wall from antennas to points, (frequency, antenna, point)."""
     out = np.empty((len(frequency), len(antennas), len(points)), dtype=np.complex128)
     for i, antenna in enumerate(antennas):
         for j, point in enumerate(points):
@@ -508,7 +510,7 @@ def passed(antennas: Array, points: Array, wall: Wall, frequency: Array) -> Fiel
 
 
 def furniture_rows(quick: bool) -> Iterator[Row]:
-    """Furniture and rough walls behind a pane: what they return without it, times the exact pane on both legs."""
+    """Furniture and rough walls behind a pane: their return without it, times the pane's loss."""
     few = {"tx_y": 2, "tx_z": 0, "rx_y": 1, "rx_z": 0}
     for preset in PRESETS[: 1 if quick else 2]:
         radar = at_walls(preset, samples_per_chirp=512, **few)
@@ -564,11 +566,11 @@ def furniture_rows(quick: bool) -> Iterator[Row]:
                 )
 
 
-# -- a walk behind brick ----------------------------------------------------------------------------------------------
+# -- a walk behind brick ---------------------------------------------------------------------------
 
 
 def walk_rows(quick: bool) -> Iterator[Row]:
-    """Whole runs, with and without a wall of brick between, static clutter taken out: where the person's power lies."""
+    """Whole runs with and without a brick wall, clutter removed: where the person's power is."""
     radar = rt.Radar.preset("paper-12ghz")
     radar = replace(
         radar, tx_y=2, tx_z=0, rx_y=2, rx_z=0, chirp_duration_s=radar.cycle_duration_s / 2

@@ -1,15 +1,17 @@
-"""Received power and noise in watts: the whole chain against the radar equation and kTBF, worked out here.
+"""Received power and noise in watts: the whole chain against the radar equation and k T B F.
 
-reflector  a triangular trihedral of 0.5 m, its return by `rays`, through IF samples and a range spectrum: watts at the peak
-           against P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R^4) (Skolnik, Introduction to Radar Systems, 3rd ed., section 1.2)
-           with sigma = 4 pi a^4 / (3 lambda^2)
-small      the same of 0.3 m, where what the three plates send back by themselves counts more: the closed form leaves it out,
-           so this is reported
+reflector  a triangular trihedral of 0.5 m by `rays`, through IF samples and a range spectrum: watts
+           at the peak against P_t G_t G_r lambda^2 sigma / ((4 pi)^3 R^4) (Skolnik, Introduction to
+           Radar Systems, 3rd ed., section 1.2), with sigma = 4 pi a^4 / (3 lambda^2)
+small      the same with 0.3 m, where the single bounces of the three plates count more; the closed
+           form omits them, so this is reported
 point      the same chain with a known cross-section
-noise      mean power of IF samples without an echo against k (T + 290 K (F - 1)) Fs (Friis, Proc. IRE 32, 1944), within five
-           standard deviations of that mean, at antenna temperatures T of 290, 20 and 0 K, and through the range-Doppler map
+noise      mean power of IF samples without an echo against k (T + 290 K (F - 1)) Fs (Friis, Proc.
+           IRE 32, 1944), within five standard deviations of that mean, at antenna temperatures T of
+           290, 20 and 0 K, and through the range-Doppler map
 
-A trihedral is asked far away, where its cross-section is one, and then set at its range.
+The return of a trihedral is computed far away, where it has its cross-section, and then set at its
+range.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ POWER_DBM, TX_GAIN_DBI, RX_GAIN_DBI, FIGURE_DB = 12.0, 9.0, 7.0, 11.0
 
 
 def radar(centre_hz: float) -> rt.Radar:
-    """One Tx and two Rx that look ahead, 1 GHz about the centre."""
+    """One Tx and two Rx that point ahead, 1 GHz about the centre."""
     return rt.Radar(
         start_frequency_hz=centre_hz - 0.5e9,
         bandwidth_hz=1e9,
@@ -51,14 +53,14 @@ def radar(centre_hz: float) -> rt.Radar:
 
 
 def equation_dbm(centre_hz: float, sigma: float, distance: float) -> float:
-    """The radar equation by decibels."""
+    """Received power by the radar equation, in decibels."""
     wavelength = LIGHT / centre_hz
     gains = POWER_DBM + TX_GAIN_DBI + RX_GAIN_DBI
     return gains + 10 * math.log10(wavelength**2 * sigma / ((4 * math.pi) ** 3 * distance**4))
 
 
 def received_dbm(centre_hz: float, scattering: complex, distance: float) -> float:
-    """Through the chain, for what scatters so many metres, on the boresight."""
+    """Received power through the chain of a scattering length [m] on the boresight [dBm]."""
     made = radar(centre_hz)
     length = np.linalg.norm(made.rx - [distance, 0, 0], axis=1)[None, :, None] + np.linalg.norm(
         made.tx[0] - [distance, 0, 0]
@@ -94,7 +96,10 @@ def reflector_rows(quick: bool) -> Iterator[Row]:
             expected = equation_dbm(centre, sigma, distance)
             what = f"power of a trihedral of {edge} m at {distance:.2f} m, {centre / 1e9:.0f} GHz"
             if edge == 0.5:
-                says = "received power of a corner reflector of 0.5 m in watts, by `rays`, against the radar equation"
+                says = (
+                    "received power of a corner reflector of 0.5 m in watts, by `rays`, "
+                    "against the radar equation"
+                )
                 yield judged("reflector", what, "dBm", found, 0.1, reference=expected, says=says)
             else:
                 yield reported("small", what, "dBm", found, reference=expected)
@@ -139,14 +144,14 @@ def noise_rows(quick: bool) -> Iterator[Row]:
     )
     says = "noise power of IF samples in watts against k T F Fs, in standard deviations of the mean"
     yield judged("noise", f"of {count} samples, off by", "sigma", sigmas, 5.0, says=says)
-    # Two channels, and a Hann window in each transform takes 1.5 bins of it.
+    # Two channels, and a Hann window in each transform, of 1.5 bins.
     mapped = expected * 2 * 1.5**2 / (256 * made.cycles_per_frame)
     error = abs(10 * math.log10(float(np.mean(maps)) / mapped))
     says = "noise power in range-Doppler maps in watts against k T F Fs over the windows' gain"
     yield judged("noise", "in the map", "dB", error, 0.02, says=says)
     says = (
-        "noise power of IF samples with antennas that see 0, 20 and 1000 K against k (T + 290 K (F - 1)) Fs, in standard "
-        "deviations of the mean"
+        "noise power of IF samples with antennas that see 0, 20 and 1000 K against "
+        "k (T + 290 K (F - 1)) Fs, in standard deviations of the mean"
     )
     for antenna_k in (0.0, 20.0, 1000.0):
         samples = noise_samples(dataclasses.replace(made, noise_temperature_k=antenna_k), 8)
@@ -158,7 +163,7 @@ def noise_rows(quick: bool) -> Iterator[Row]:
 
 
 def noise_w(antenna_k: float) -> float:
-    """Of one IF sample: what the antennas see, and what the receiver adds to a source of 290 K by its noise figure [W]."""
+    """Noise of one IF sample [W]: that of the antennas, and the receiver's, by its noise figure."""
     return BOLTZMANN * (antenna_k + 290 * (10 ** (FIGURE_DB / 10) - 1)) * 256 / 62.5e-6
 
 

@@ -1,14 +1,15 @@
-"""llvm against scalar, and cuda where there is one: the same rays on the same bodies must meet the same parts.
+"""llvm against scalar, and cuda where it exists: the same rays on the same bodies.
 
-All trace float32 triangles, so rays that graze an edge may differ. For every ray that does, the edge is looked for in
-float64 and in closed form on the same triangles: the outline of a part is the convex hull of its vertices along the ray,
-and where two parts cross, the distances along the ray at which their planes are met differ by their slope times the
-distance to the crossing. The side of a triangle is an edge as well: Embree tries neighbours one by one in float32, and a
-ray within some nanometres of their common side may slip through.
+All backends trace float32 triangles, so rays that graze an edge may differ. For every ray that
+does, the edge is sought in float64 and in closed form on the same triangles: the outline of a part
+is the convex hull of its vertices along the ray, and where two parts cross, the distances along the
+ray to their planes differ by their slope times the distance to the crossing. The side of a triangle
+is an edge as well: Embree tries neighbours one by one in float32, and a ray within some nanometres
+of their common side may slip through.
 
-On the CPU both backends hand their rays to that one library and may well agree to the last bit, so each is also held
-against the same triangles intersected one by one in float64. Told as well is how often the first part differs from that
-of the smooth ellipsoids: that is the triangles' share of the error, not the backend's.
+On the CPU both backends use Embree and may well agree to the last bit, so each is also compared
+with the same triangles intersected one by one in float64. How often the first part differs from
+that of the smooth ellipsoids is reported: that is the error of the triangles, not of the backend.
 
     python validation/other_methods/backends.py [--quick] [--json FILE]
 """
@@ -52,7 +53,7 @@ def scenes(quick: bool) -> dict[str, rt.Ellipsoids]:
 
 
 def rays(body: rt.Ellipsoids, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """From around the radar, near and far, through places at and a little beside the parts: outlines are met often."""
+    """Rays from around the radar, near and far, through the parts and beside their outlines."""
     origins = np.array([-4.0, 1.0, 1.0]) + rng.uniform(-0.3, 0.3, (n, 3))
     origins[: n // 5] -= [60.0, 0.0, 0.0]
     part = rng.integers(len(body.centres), size=n)
@@ -65,11 +66,11 @@ def rays(body: rt.Ellipsoids, n: int, rng: np.random.Generator) -> tuple[Array, 
 
 
 def grazing(body: rt.Ellipsoids, n: int, rng: np.random.Generator) -> tuple[Array, Array]:
-    """From the radar through places some 0.1 mm from the outline of a part: where backends differ, if they do at all."""
+    """Rays from the radar within some 0.1 mm of a part's outline, where backends may differ."""
     origins = np.array([-4.0, 1.0, 1.0]) + rng.uniform(-0.3, 0.3, (n, 3))
     part = rng.integers(len(body.centres), size=n)
     axes = body.semi_axes[part]
-    # Stretched to the unit sphere, the outline seen from o' is the circle u.o' = 1.
+    # In coordinates where the part is the unit sphere, the outline seen from o' is u.o' = 1.
     seen_from = np.einsum("nji,nj->ni", body.frames[part], origins - body.centres[part]) / axes
     distance = np.linalg.norm(seen_from, axis=1)
     pole = seen_from / distance[:, None]
@@ -86,11 +87,11 @@ def trace(kind: str, body: rt.Ellipsoids, origins: Array, targets: Array) -> Hit
     return tracer.first_hits(origins, targets)
 
 
-# -- the judge ------------------------------------------------------------------------------------------------------
+# -- the reference ---------------------------------------------------------------------------------
 
 
 def first_of_smooth(body: rt.Ellipsoids, origins: Array, targets: Array) -> NDArray[np.int64]:
-    """Part first met of the smooth ellipsoids: |A^-1 (o + t d - c)| = 1."""
+    """First part that each ray meets, of the smooth ellipsoids: |A^-1 (o + t d - c)| = 1."""
     directions = targets - origins
     best, part = np.full(len(origins), np.inf), np.full(len(origins), -1)
     for index, (centre, frame, axes) in enumerate(
@@ -107,7 +108,7 @@ def first_of_smooth(body: rt.Ellipsoids, origins: Array, targets: Array) -> NDAr
 
 
 def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> NDArray[np.int64]:
-    """Part first met, every triangle tried in float64 (Moeller and Trumbore, 1997)."""
+    """First part that each ray meets, by every triangle in float64 (Moeller and Trumbore, 1997)."""
     vertices, faces = unit_sphere(SUBDIVISIONS)
     part = np.empty(len(origins), dtype=np.int64)
     _first(
@@ -117,11 +118,11 @@ def first_of_triangles(body: rt.Ellipsoids, origins: Array, targets: Array) -> N
 
 
 @compiled(parallel=True)
-def _first(origins, directions, centres, frames, semi_axes, vertices, faces, found):  # type: ignore[no-untyped-def]
+def _first(origins, directions, centres, frames, semi_axes, vertices, faces, found):
     for ray in prange(len(origins)):
         best, found[ray] = np.inf, -1
         for part in range(len(centres)):
-            # In the axes of the part, stretched to its unit sphere, where the fraction of the way stays what it is.
+            # In the axes of the part, scaled to its unit sphere; fractions of the length stay.
             o = frames[part].T @ (origins[ray] - centres[part]) / semi_axes[part]
             d = frames[part].T @ directions[ray] / semi_axes[part]
             along = -(o @ d) / (d @ d)
@@ -153,13 +154,13 @@ def _first(origins, directions, centres, frames, semi_axes, vertices, faces, fou
 
 
 class Triangles:
-    """The triangles of a posed body in float64, and how far from an edge a ray goes."""
+    """The triangles of a posed body in float64, and the distance of a ray from their edges."""
 
     def __init__(self, body: rt.Ellipsoids) -> None:
         self.vertices, self.faces = ellipsoid_meshes(body, SUBDIVISIONS)
 
     def outline(self, part: int, origin: Array, direction: Array) -> float:
-        """Distance of the ray from the outline of a part, measured across it at the depth of the part [m]."""
+        """Distance of the ray from the outline of a part, across it at the part's depth [m]."""
         away = self.vertices[part] - origin
         depth = away @ direction
         middle = float(depth.mean())
@@ -170,14 +171,17 @@ class Triangles:
             * (middle / depth)[:, None]
         )
         equations = ConvexHull(seen).equations
-        # Inside: the nearest side counts. Outside: the farthest half-plane, which is a lower bound, exact beside a side.
+        # Inside, the nearest side counts. Outside, the farthest half-plane is a lower bound, which
+        # is exact beside a side.
         return float(abs(equations[:, 2].max()))
 
     def plane(
         self, part: int, origin: Array, direction: Array
     ) -> tuple[float, Array, float] | None:
-        """Where the ray meets the part first, the slope of that distance when the ray is moved across (3,), and how far that is
-        from a side of the triangle, seen along the ray [m].
+        """Where a ray first meets the part.
+
+        Returns the distance along the ray, the slope of that distance when the ray is shifted
+        (3,), and the distance from a side of the triangle, across the ray [m].
         """
         corners = self.vertices[part][self.faces]
         a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
@@ -203,12 +207,12 @@ class Triangles:
                 start - (start @ direction) * direction,
                 side - (side @ direction) * direction,
             )
-            share = np.clip(-(start @ side) / (side @ side), 0, 1)
-            sides.append(float(np.linalg.norm(start + share * side)))
+            fraction = np.clip(-(start @ side) / (side @ side), 0, 1)
+            sides.append(float(np.linalg.norm(start + fraction * side)))
         return float(distance[nearest]), -across / facing[nearest], min(sides)
 
     def clearance(self, first: int, second: int, origin: Array, direction: Array) -> float:
-        """How far the ray would have to move for its answer to go from one part (or -1, nothing) to the other [m]."""
+        """Shift of the ray that would change its answer from one part (or -1, none) to another."""
         named = [part for part in (first, second) if part >= 0]
         found = [self.outline(part, origin, direction) for part in named]
         planes = [
@@ -221,7 +225,7 @@ class Triangles:
         return min(found)
 
 
-# -- rows -----------------------------------------------------------------------------------------------------------
+# -- rows ------------------------------------------------------------------------------------------
 
 
 def measure(quick: bool) -> list[Row]:
@@ -250,7 +254,7 @@ def compared_on(
     what: str,
     judge: bool,
 ) -> Iterator[Row]:
-    # One backend after the other: scenes belong to theirs.
+    # One backend after the other, because scenes belong to their backend.
     answers = {
         kind: {name: trace(kind, body, *queries[name]) for name, body in bodies.items()}
         for kind in kinds
@@ -288,7 +292,7 @@ def compared_on(
     ]
     yield reported(
         "triangles against smooth ellipsoids",
-        "share of rays that meet another part",
+        "fraction of rays that meet another part",
         "",
         float(np.mean(smooth)),
     )
@@ -317,16 +321,17 @@ def differences(
                     int(ours[name][ray]), int(others[name][ray]), origin, direction
                 ),
             )
-    share = different / sum(len(parts) for parts in ours.values())
-    # Asked for: one in ten thousand, and those within 10 um of an edge: float32 keeps 0.1 um of a metre, a few times over.
-    quantity = "share of rays that meet another part"
+    fraction = different / sum(len(parts) for parts in ours.values())
+    # The limits asked for are one ray in ten thousand, and those within 10 um of an edge; float32
+    # resolves 0.1 um of a metre.
+    quantity = "fraction of rays that meet another part"
     rays = sum(len(parts) for parts in ours.values())
-    says = f"{versus}: share of rays that meet another part"
+    says = f"{versus}: fraction of rays that meet another part"
     if judge:
-        yield judged(claim, quantity, "", share, MOST_DIFFERENT, says=says, cases=rays)
+        yield judged(claim, quantity, "", fraction, MOST_DIFFERENT, says=says, cases=rays)
     else:
-        yield reported(claim, quantity, "", share)
-    says = f"{versus}: how far those pass from an edge"
+        yield reported(claim, quantity, "", fraction)
+    says = f"{versus}: distance of those rays from an edge"
     yield judged(
         claim,
         f"farthest from an edge of these {different}",

@@ -1,13 +1,16 @@
-"""`analytic` against `specular` on whole bodies: where no part is hidden they differ by near-field spreading alone.
+"""`analytic` against `specular` on whole bodies: unoccluded parts differ by near-field spreading.
 
-The far-field formula takes wavefronts as plane. What their curvature takes away is found here from stationary phase: the path
-Tx..surface..Rx as a function of two parameters of the surface, its minimum by Newton's method and its Hessian, both from
-differences of the path, give |F| = 2 sqrt(pi) cos(i) |dp/ds x dp/dt| / sqrt(det L'') for each Tx, Rx and part, and its
-spreading 1 / (R1 R2). No curvature and no wavefront matrix is written down, so nothing is shared with `specular`. The
-near-field factor is the ratio of that to the same for plane waves, spread over the way to the point that these meet.
+The far-field formula assumes plane wavefronts. The effect of their curvature is found here by
+stationary phase: the path Tx-surface-Rx as a function of two parameters of the surface, its minimum
+by Newton's method and its Hessian, both from differences of the path, give |F| =
+2 sqrt(pi) cos(i) |dp/ds x dp/dt| / sqrt(det L'') for each Tx, Rx and part, and its spreading
+1 / (R1 R2). No curvature and no wavefront matrix is written down, so nothing is shared with
+`specular`. The near-field factor is the ratio of this to the same for plane waves, with the
+spreading of the path to the point that these meet.
 
-A standing person goes through `rtradar.compare`, and those parts are judged that it says are fully seen; four activities are
-looked at instant by instant. What is left between the two models is hidden by other parts, and reported.
+A standing person goes through `rtradar.compare`, and those parts are judged that it reports as
+fully visible. Four activities are compared instant by instant. What is left between the two models
+is occluded by other parts, and reported.
 
     python validation/other_methods/body.py [--quick] [--json FILE]
 """
@@ -35,11 +38,11 @@ Array = NDArray[np.float64]
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
 TOLERANCE_DB = 0.1
 STEP = 1e-4
-FAR = 1e6  # how many times as far away a plane wave comes from
+FAR = 1e6  # distance of the source of a plane wave, over that of the radar
 
 
 def path(points: Array, antennas: tuple[Array, Array]) -> Array:
-    """Tx..point..Rx less that over the origin, without cancellation (...,) [m]; antennas (..., 3)."""
+    """Path Tx-point-Rx less that over the origin, without cancellation (...,) [m]."""
     total = np.zeros(points.shape[:-1])
     for antenna in antennas:
         lengths = np.linalg.norm(points - antenna, axis=-1) + np.linalg.norm(antenna, axis=-1)
@@ -55,7 +58,7 @@ def tangents(unit: Array) -> tuple[Array, Array]:
 
 
 def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
-    """|F|^2 (n,) and specular point (n, 3) of ellipsoids about the origin for antennas (n, 3), axes (n, 3)."""
+    """|F|^2 (n,) and specular point (n, 3) of ellipsoids about the origin for antennas (n, 3)."""
 
     def on_surface(unit: Array, s: float, t: float) -> Array:
         east, north = tangents(unit)
@@ -87,7 +90,7 @@ def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
         east, north = tangents(unit)
         unit = unit + step[:, :1] * east + step[:, 1:] * north
         unit /= np.linalg.norm(unit, axis=1, keepdims=True)
-    # Differences of the path are good to 1e-9 of it: Newton's last steps dither by that.
+    # Differences of the path are accurate to 1e-9 of it, by which Newton's last steps vary.
     assert size.max() < 1e-5, size.max()
     east, north = tangents(unit)
     across = np.cross(axes * east, axes * north)
@@ -103,7 +106,7 @@ def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
 
 
 def near_and_far(radar: rt.Radar, body: rt.Body, n_chirps: int) -> tuple[Array, Array]:
-    """Power of each part at each instant of the survey by stationary phase, and by that of plane waves (time, part) [m^2]."""
+    """Power (time, part) [m^2] of each part by stationary phase, near by and for plane waves."""
     chirps = np.arange(0, n_chirps, anchor_step(radar))
     poses = body.at(np.minimum((chirps + 0.5) * radar.chirp_duration_s, body.duration_s))
     index = radar.tx_of_chirp(chirps)
@@ -128,7 +131,7 @@ def near_and_far(radar: rt.Radar, body: rt.Body, n_chirps: int) -> tuple[Array, 
 
 
 def still(motion: rt.Motion, frame: int) -> rt.Motion:
-    """A person who stands as in one frame, for a second."""
+    """A person who stands as in one frame of the motion, for a second."""
     return dataclasses.replace(
         motion,
         name=f"{motion.name}, standing",
@@ -145,7 +148,7 @@ def decibels(ratio: Array) -> Array:
 
 
 def compared_rows(preset: str) -> Iterator[Row]:
-    """Through `compare`: each part of a standing person that no channel misses."""
+    """Each part of a standing person that no channel misses, by `compare`."""
     radar = rt.Radar.preset(preset)
     motion, duration = still(rt.synthetic_motion("jumping_jack", seed=0), 0), 0.15
     with tempfile.TemporaryDirectory() as folder:
@@ -163,7 +166,7 @@ def compared_rows(preset: str) -> Iterator[Row]:
     factor = dict(zip(body.part_names, near.mean(axis=0) / far.mean(axis=0), strict=True))
     claim = f"compare, standing, {preset}"
     hidden = by_fidelity["specular"]["part_hidden_share"]
-    seen = [part for part, share in hidden.items() if share == 0]
+    seen = [part for part, fraction in hidden.items() if fraction == 0]
     for part in seen:
         ratio = (
             by_fidelity["specular"]["part_power_m2"][part]
@@ -171,7 +174,10 @@ def compared_rows(preset: str) -> Iterator[Row]:
         )
         expected = float(decibels(factor[part]))
         quantity = f"{part}: specular over analytic, ref. near field"
-        says = "`compare` of `analytic` with `specular`, standing: parts fully seen, echo power once near field is counted"
+        says = (
+            "`compare` of `analytic` with `specular`, standing: "
+            "fully visible parts, echo power corrected for the near field"
+        )
         yield judged(
             claim,
             quantity,
@@ -181,10 +187,10 @@ def compared_rows(preset: str) -> Iterator[Row]:
             reference=expected,
             says=says,
         )
-    says = "`compare` of `analytic` with `specular`, standing: parts that are hidden, of 21"
+    says = "`compare` of `analytic` with `specular`, standing: parts that are occluded, of 21"
     yield judged(
         claim,
-        "parts that are hidden, of 21",
+        "parts that are occluded, of 21",
         "",
         len(hidden) - len(seen),
         len(hidden) - 1,
@@ -193,7 +199,7 @@ def compared_rows(preset: str) -> Iterator[Row]:
 
 
 def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row]:
-    """Instant by instant: parts that no channel misses, and what the others make of the frame's power."""
+    """Parts that no channel misses at each instant, and the effect of the others on frame power."""
     radar = rt.Radar.preset(preset)
     body = rt.Body.from_motion(
         place(rt.synthetic_motion(activity, seed=0), start_s=0.5, duration_s=duration_s)
@@ -212,8 +218,8 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     claim = f"{activity}, {preset}, {duration_s:g} s"
     error = decibels(specular[seen] / analytic[seen]) - decibels(near[seen] / far[seen])
     count = f"{seen.sum()} of {seen.size} parts and instants"
-    quantity = f"fully seen, {count}: worst |dB| once near field is counted"
-    says = "`analytic` against `specular`, four activities: the same of parts fully seen, at each instant"
+    quantity = f"fully visible, {count}: worst |dB| after the near field"
+    says = "`analytic` against `specular`, four activities: the same of visible parts, each instant"
     worst = float(abs(error).max())
     yield judged(claim, quantity, "dB", worst, TOLERANCE_DB, says=says, cases=int(seen.sum()))
     yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
@@ -223,15 +229,15 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     yield reported(
         claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min())
     )
-    # What the models' frame powers differ by: near field of all parts, then occlusion of some.
+    # The frame powers of the models differ by the near field of all parts and occlusion of some.
     whole = decibels(specular.sum(axis=1) / analytic.sum(axis=1))
     bent = decibels((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
     yield reported(claim, "frame power, specular over analytic, mean", "dB", float(whole.mean()))
-    yield reported(claim, "of that near field", "dB", float(bent.mean()))
-    yield reported(claim, "of that occlusion", "dB", float((whole - bent).mean()))
+    yield reported(claim, "of that, near field", "dB", float(bent.mean()))
+    yield reported(claim, "of that, occlusion", "dB", float((whole - bent).mean()))
     left = decibels(specular.sum(axis=1) / (analytic * near / far * (1 - hidden)).sum(axis=1))
     yield reported(
-        claim, "left where hidden shares are taken off, rms", "dB", float(np.sqrt(np.mean(left**2)))
+        claim, "left after occluded fractions, rms", "dB", float(np.sqrt(np.mean(left**2)))
     )
 
 
@@ -249,7 +255,5 @@ def measure(quick: bool) -> list[Row]:
 
 if __name__ == "__main__":
     sys.exit(
-        main(
-            "`analytic` against `specular` on whole bodies, near-field spreading counted.", measure
-        )
+        main("`analytic` against `specular` on whole bodies, with near-field spreading.", measure)
     )

@@ -1,9 +1,10 @@
-"""Physical optics over facets against closed forms, against a quadrature that converges, and against the laws it must keep.
+"""Physical optics over facets against closed forms, a convergent quadrature, and symmetries.
 
-Spheres: the closed form of the same integral, ka 5 to 400, from several sides. A square plate of 5 m: 4 pi A^2 / lambda^2 and
-the lobes beside it. Ellipsoids of the body at 4 m, one antenna and pairs: the quadrature of ``physical_optics.py``, which
-knows of no mesh; behind a sphere, that of ``occlusion.py``, whose shadow is exact. And Tx for Rx, all things turned, parts
-added up.
+Spheres: the closed form of the same integral, ka 5 to 400, from several directions. A square plate
+of 5 m: 4 pi A^2 / lambda^2 and the lobes beside it. Ellipsoids of the body at 4 m, one antenna and
+pairs: the quadrature of ``physical_optics.py``, which uses no mesh; behind a sphere, that of
+``occlusion.py``, whose shadow is exact. Symmetries: Tx and Rx swapped, everything rotated, and
+parts added up.
 
     python validation/other_methods/facets.py [--quick] [--json FILE]
 """
@@ -34,7 +35,7 @@ def field(
     target: object, tx: Array, rx: Array, frequency: float, facets: int | None = None
 ) -> NDArray[np.complex128]:
     tx, rx = np.atleast_2d(tx), np.atleast_2d(rx)
-    return facet_scattering(target, tx, rx, np.full(len(tx), frequency), facets=facets)  # type: ignore[arg-type]
+    return facet_scattering(target, tx, rx, np.full(len(tx), frequency), facets=facets)
 
 
 def alone(axes: Array, frame: Array | None = None) -> rt.Ellipsoids:
@@ -50,7 +51,7 @@ def rms(values: Array | NDArray[np.complex128]) -> float:
     return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
-# -- closed forms -----------------------------------------------------------------------------------------------------
+# -- closed forms ----------------------------------------------------------------------------------
 
 
 def sphere_rows(quick: bool) -> Iterator[Row]:
@@ -106,7 +107,7 @@ def plate_rows() -> Iterator[Row]:
         straight = np.array([[FAR_M, 0.0, 0.0]])
         ours = float(20 * np.log10(np.abs(field(plate, straight, straight, frequency))[0]))
         expected = float(10 * np.log10(4 * np.pi * 25.0**2 / wavelength**2))
-        # The waves bend over it by 2 pi 2.5^2 / (lambda 1e6 m).
+        # The wavefront's curvature is 2 pi 2.5^2 / (lambda 1e6 m) of phase over the plate.
         says = "square plate of 5 m at 1 and 3 GHz by facets against 4 pi A² / λ²"
         yield judged(
             claim,
@@ -141,7 +142,7 @@ def plate_rows() -> Iterator[Row]:
         )
 
 
-# -- quadrature -------------------------------------------------------------------------------------------------------
+# -- quadrature ------------------------------------------------------------------------------------
 
 
 def ellipsoid_rows(quick: bool) -> Iterator[Row]:
@@ -164,9 +165,13 @@ def ellipsoid_rows(quick: bool) -> Iterator[Row]:
                 errors.append(field(alone(axes, frame), tx, rx, frequency, facets)[0] - expected)
                 fields.append(expected)
             claim = f"ellipsoids of the body at 4 m, {frequency / 1e9:g} GHz, {name}"
-            # 2 % is 0.17 dB; the quadrature has no polarisation, of which pairs 0.5 m apart lose 1 - cos(7 degrees).
+            # 2 % is 0.17 dB; the quadrature omits polarisation, by which pairs 0.5 m apart lose
+            # 1 - cos(7 degrees).
             error = rms(np.array(errors)) / rms(np.array(fields))
-            says = "parts of the body by facets at 4 m, 12 to 79 GHz, against physical optics by quadrature: rms complex error"
+            says = (
+                "parts of the body by facets at 4 m, 12 to 79 GHz, "
+                "against physical optics by quadrature: rms complex error"
+            )
             quantity = f"{facets} facets: rms complex error to quadrature"
             yield judged(
                 claim, quantity, "", error, 0.02, key="ellipsoid", says=says, cases=len(errors)
@@ -192,7 +197,10 @@ def shadow_rows(quick: bool) -> Iterator[Row]:
             errors.append((whole - front) / free - target.field(occluder, radius))
         claim = "thigh behind the edge of a sphere, 14 GHz"
         quantity = f"{facets} facets: rms error of the field over the free one"
-        says = "a thigh behind an edge by facets against a geometric shadow: rms error over the free field"
+        says = (
+            "a thigh behind an edge by facets against a geometric shadow: "
+            "rms error over the free field"
+        )
         yield judged(
             claim,
             quantity,
@@ -205,7 +213,7 @@ def shadow_rows(quick: bool) -> Iterator[Row]:
         )
 
 
-# -- laws -------------------------------------------------------------------------------------------------------------
+# -- symmetries ------------------------------------------------------------------------------------
 
 
 def law_rows() -> Iterator[Row]:
@@ -239,9 +247,9 @@ def law_rows() -> Iterator[Row]:
         "parts beside each other, each alone and added": sum(parts),
     }
     for name, there in others.items():
-        # Float64 all through; where shadows are asked for in float32 none of these has any.
+        # All is in float64; were shadows computed in float32, none of these would hold.
         change = float(np.abs(there - here).max()) / rms(here)
-        says = "facets: Tx and Rx swapped, all turned, parts added up: largest change"
+        says = "facets: Tx and Rx swapped, everything rotated, parts added up: largest change"
         yield judged(
             "laws",
             f"{name}: largest change over rms",

@@ -1,12 +1,13 @@
-"""`fresnel` where one part covers another by half: its complex return against physical optics with a geometric shadow.
+"""`fresnel` where one part half covers another, against physical optics with a geometric shadow.
 
-Edges cross a target, at each of three frequencies of the sweep: a flat plate's, a torso's, and a limb's both edges. Then
-arrays: the same before all antennas of both radars, of which the corner channels and two in the middle are compared. And
-time: a sphere passes before an upright ellipsoid, and the power beside the Doppler line of the ellipsoid is compared.
+Edges cross a target, at each of three frequencies of the sweep: that of a flat plate, that of a
+torso, and both edges of a limb. The same is done before all antennas of both radars, of which the
+corner channels and two in the middle are compared. In time, a sphere passes before an upright
+ellipsoid, and the power beside the Doppler line of the ellipsoid is compared.
 
-The reference adds up the points of ``physical_optics.py`` that the occluder does not hide from either antenna, by the
-discriminant of the ray and the occluder; it knows nothing of specular points, of zones or of meshes. Errors are relative to
-the free field.
+The reference adds up the points of ``physical_optics.py`` that the occluder does not hide from
+either antenna, by the discriminant of the ray and the occluder; it uses no specular points, zones
+or meshes. Complex errors are relative to the free field.
 
     python validation/other_methods/fresnel.py [--quick] [--json FILE]
 """
@@ -56,16 +57,16 @@ EDGE_ERROR = 0.05
 SHADOW_RAYS = (16, 64, 256)
 
 
-# -- the reference --------------------------------------------------------------------------------------------------
+# -- the reference ---------------------------------------------------------------------------------
 
 
 def hidden(
     points: Array, antenna: Array, centre: Array, frame: Array, axes: Array
 ) -> NDArray[np.bool_]:
-    """Whether the way from the antenna to each point (n, 3) goes through an ellipsoid."""
+    """Whether the line from the antenna to each point (n, 3) passes through an ellipsoid."""
     a, p = (antenna - centre) @ frame / axes, (points - centre) @ frame / axes
     d = p - a
-    # |a + t d|^2 = 1 has a root between antenna and point.
+    # |a + t d|^2 = 1 has a root between the antenna and the point.
     dd, ad, aa = np.sum(d * d, axis=-1), d @ a, a @ a - 1
     discriminant = ad * ad - dd * aa
     enter = (-ad - np.sqrt(np.maximum(discriminant, 0.0))) / dd
@@ -74,7 +75,7 @@ def hidden(
 
 @dataclass(frozen=True)
 class Lit:
-    """The points of one ellipsoid that a pair of antennas lights, and what each adds at each frequency."""
+    """The points of an ellipsoid that two antennas light, and what each adds at each frequency."""
 
     pair: tuple[Array, Array]
     points: Array  # (point, 3) [m]
@@ -93,12 +94,12 @@ class Lit:
         tx, rx = ((antenna - centre) @ frame for antenna in pair)
         quadrature = lit_points(tx, rx, axes, float(frequencies.max()), density=density)
         k = np.array([wave_number(float(frequency)) for frequency in frequencies])
-        # The factor that all points of one frequency share does not matter.
+        # A factor that is common to all points of one frequency does not matter.
         contribution = quadrature.weight * np.exp(-1j * np.multiply.outer(k, quadrature.path))
         return cls(pair, centre + quadrature.points @ frame.T, contribution)
 
-    def share(self, occluder: rt.Ellipsoids) -> Complex:
-        """Field (frequency,) with an ellipsoid before it, over the free one."""
+    def lit_fraction(self, occluder: rt.Ellipsoids) -> Complex:
+        """Field (frequency,) with an ellipsoid before it, over the free field."""
         shape = occluder.centres[0], occluder.frames[0], occluder.semi_axes[0]
         dark = hidden(self.points, self.pair[0], *shape)
         if self.pair[1] is not self.pair[0]:
@@ -107,7 +108,7 @@ class Lit:
 
 
 def scene(target: Array, occluder: Array, place: Array, turn: Array) -> rt.Ellipsoids:
-    """A target at the origin, turned a little, and the occluder."""
+    """A target at the origin, rotated a little, and the occluder."""
     frames = [Rotation.from_rotvec(turn).as_matrix(), Rotation.from_rotvec(turn[::-1]).as_matrix()]
     return rt.Ellipsoids([np.zeros(3), place], frames, [target, occluder])
 
@@ -118,7 +119,7 @@ def ours(ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = 64) -> 
     return fresnel_scattering(ellipsoids, antenna, antenna, frequency, shadow_rays=shadow_rays)
 
 
-# -- standing -------------------------------------------------------------------------------------------------------
+# -- at rest ---------------------------------------------------------------------------------------
 
 
 def edge_rows(quick: bool) -> Iterator[Row]:
@@ -132,7 +133,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
             errors, rough = [], []
             for target in list(TARGETS.values())[slice(index, index + 1) if quick else slice(None)]:
                 for _ in range(1 if quick else 3):
-                    # Across the target, over the middle of which the edge goes half way, in any direction.
+                    # The edge covers half of the target, in any direction.
                     tilt, turn = rng.uniform(0, np.pi), rng.uniform(-0.4, 0.4, 3)
                     across = np.array([0.0, np.cos(tilt), np.sin(tilt)])
                     extent = float(np.linalg.norm(occluder * across))
@@ -153,7 +154,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                         ellipsoids = scene(
                             target, occluder, np.array([-0.5, 0.0, 0.0]) + shift * across, turn
                         )
-                        optics = lit.share(one(ellipsoids, 1))
+                        optics = lit.lit_fraction(one(ellipsoids, 1))
                         partly = (np.abs(optics) > 1e-9) & (np.abs(optics - 1) > 1e-9)
                         before = ours(one(ellipsoids, 1), frequencies)
                         for rays in counts:
@@ -210,7 +211,7 @@ class Standing:
 
 
 def array_rows(quick: bool) -> Iterator[Row]:
-    """Every channel sees the edge from another place: errors of the polynomial over the array come in."""
+    """Every channel sees the edge from another place, so errors of the array polynomial enter."""
     rng = np.random.default_rng(2)
     for preset, density in (("paper-12ghz", 2.0), ("paper-77ghz", 1.2)):
         radar = rt.Radar.preset(preset)
@@ -221,13 +222,13 @@ def array_rows(quick: bool) -> Iterator[Row]:
                 place = np.array([-0.5, rng.uniform(-1, 1) * 0.6 * target[1], 0.0])
                 place[1] += OCCLUDERS["torso"][1] * rng.choice([-1.0, 1.0])
                 pose = scene(target, OCCLUDERS["torso"], place, rng.uniform(-0.3, 0.3, 3))
-                # Straight before the radar.
+                # Straight in front of the radar.
                 pose = rt.Ellipsoids(
                     pose.centres + np.array([0.0, 1.0, 1.0]), pose.frames, pose.semi_axes
                 )
-                echoes = Fresnel(radar, Standing(pose)).echoes(np.arange(radar.n_tx))  # type: ignore[arg-type]
+                echoes = Fresnel(radar, Standing(pose)).echoes(np.arange(radar.n_tx))
                 alone = Standing(one(pose, 0), part_names=("target",))
-                free = Fresnel(radar, alone).echoes(np.arange(radar.n_tx))  # type: ignore[arg-type]
+                free = Fresnel(radar, alone).echoes(np.arange(radar.n_tx))
                 middle = len(echoes.frequency) // 2
                 got = (echoes.amplitude[middle, ..., 0] / free.amplitude[middle, ..., 0]).conj()
                 spreads.append(np.abs(got - got.mean(axis=(0, 1))).ravel())
@@ -237,7 +238,7 @@ def array_rows(quick: bool) -> Iterator[Row]:
                         lit = Lit.of(
                             pair, pose.centres[0], pose.frames[0], target, middle_hz, density
                         )
-                        errors.append(got[tx, rx] - lit.share(one(pose, 1))[0])
+                        errors.append(got[tx, rx] - lit.lit_fraction(one(pose, 1))[0])
         claim = f"{preset}, edge of a torso before the array"
         quantity, error = f"rms complex error, {len(errors)} channels", rms(np.array(errors))
         says = "an edge before the array by `fresnel`, channel by channel: rms complex error"
@@ -253,7 +254,7 @@ def array_rows(quick: bool) -> Iterator[Row]:
         )
 
 
-# -- in time --------------------------------------------------------------------------------------------------------
+# -- in time ---------------------------------------------------------------------------------------
 
 
 def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
@@ -262,21 +263,21 @@ def passing_rows(band: Band, speed: float, quick: bool) -> Iterator[Row]:
     times = band.radar.chirp_times(band.cycles)
     middle = Passing(speed, float(times.mean()))
     floors, optics_floors, errors = [], [], []
-    # Instants over one interval between anchors.
+    # Instants over one interval between keyframes.
     for late in np.linspace(0, 10e-3, 3 if quick else 6)[:-1]:
         passing = Passing(speed, middle.instant + late)
         optics = np.array(
             [target.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)]
         )
-        echoes = Fresnel(band.radar, passing).echoes(np.arange(band.cycles))  # type: ignore[arg-type]
+        echoes = Fresnel(band.radar, passing).echoes(np.arange(band.cycles))
         amplitude = echoes.amplitude[len(echoes.frequency) // 2, :, 0, 0].conj()
-        free = Fresnel(band.radar, Passing(speed, -1.0)).echoes(np.arange(1))  # type: ignore[arg-type]
+        free = Fresnel(band.radar, Passing(speed, -1.0)).echoes(np.arange(1))
         field = amplitude / np.abs(free.amplitude[len(free.frequency) // 2, 0, 0, 0])
         floors.append(beside_db(field, band))
         optics_floors.append(beside_db(optics, band))
         errors.append(rms(field - optics))
     yield reported(claim, "PO: power beside the line", "dB", db_mean(optics_floors), key="edge")
-    # A floor lower than that of physical optics costs nothing; 3 dB more is what its own ripple differs by.
+    # A lower floor than that of physical optics is no fault; its own ripple differs by 3 dB.
     above = db_mean(floors) - db_mean(optics_floors)
     quantity = f"power beside the line above that of PO, {len(floors)} instants"
     says = "power beside the Doppler line while an edge passes, over that of physical optics"

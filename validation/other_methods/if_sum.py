@@ -1,11 +1,13 @@
-"""The fast IF against the plain sum of its formula: largest relative error and, in the same run, how much faster it is.
+"""The fast IF samples against the plain sum of their formula: relative error and speed.
 
-Plain: x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, an exponential for every echo
-and sample. It is timed with its turns in float64, and compared with them in long double, one chirp in sixteen. 21 echoes
-anywhere in the band: constant amplitudes, the parabola through three frequencies, a third of the echoes on such parabolas
-and the others constant, and the polynomial through five. Then 315 echoes in complex64, which are added up in another way,
-spread over a grid; and how long adding them one by one takes beside that, of more and more echoes.
-Relative to the root mean square of the IF. Speed is reported, not judged: it is the machine's.
+The plain sum is x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as written,
+an exponential for every echo and sample. It is timed with phases in float64, and compared with
+phases in long double, one chirp in sixteen. There are 21 echoes anywhere in the band: with constant
+amplitudes, with the parabola through three frequencies, with a third of the echoes on such
+parabolas and the others constant, and with the polynomial through five. Then 315 echoes in
+complex64, which go through the NUFFT; and the time of the direct sum over that of the NUFFT, for
+growing numbers of echoes. Errors are relative to the root mean square of the IF samples. Speed is
+reported and not judged, because it depends on the machine.
 
     python validation/other_methods/if_sum.py [--quick] [--json FILE]
 """
@@ -31,7 +33,7 @@ Complex = NDArray[np.complex128]
 PARTS = 21
 TOLERANCE = 1e-5
 CASES = ((1, 0), (3, 0), (3, 14), (5, 0))  # nodes, constant echoes
-CROWD, CROWD_CASES = 315, ((1, 0), (3, 0), (5, 0))  # a body and fourteen ways over walls
+MANY, MANY_CASES = 315, ((1, 0), (3, 0), (5, 0))  # a body and fourteen paths over walls
 CROSSINGS = ((1, (150, 300, 600)), (3, (42, 84, 168)))  # nodes, echoes
 COMPARED = slice(None, None, 16)
 REPEATS = 3
@@ -40,7 +42,7 @@ REPEATS = 3
 def block(
     radar: Radar, chirps: int, nodes: int, constant: int, count: int, rng: np.random.Generator
 ) -> Echoes:
-    """Echoes that stand still, so that nothing but the sum is looked at, anywhere in the band; so many of them constant."""
+    """Static echoes anywhere in the band, so that only the sum is measured; some are constant."""
     shape = (chirps, radar.n_rx, count)
     way = rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m
     amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
@@ -56,7 +58,7 @@ def block(
 
 
 def plain_sum(echoes: Echoes, radar: Radar, kind: type[np.floating]) -> Complex:
-    """IF samples (chirp, rx, sample), the turns of the phase in this precision; chirp by chirp, which spares memory."""
+    """IF samples (chirp, rx, sample), phases in this precision; chirp by chirp saves memory."""
     t = (
         np.arange(radar.samples_per_chirp, dtype=kind)
         * kind(radar.chirp_duration_s)
@@ -64,7 +66,7 @@ def plain_sum(echoes: Echoes, radar: Radar, kind: type[np.floating]) -> Complex:
     )
     slope = kind(radar.bandwidth_hz) / kind(radar.chirp_duration_s)
     f = radar.start_frequency_hz + slope * t
-    weights = np.ones((len(echoes.frequency), len(t)))  # Lagrange's polynomials through the nodes
+    weights = np.ones((len(echoes.frequency), len(t)))  # Lagrange polynomials through the nodes
     for j, node in enumerate(echoes.frequency):
         for other in np.delete(echoes.frequency, j):
             weights[j] *= ((f - other) / (node - other)).astype(np.float64)
@@ -92,40 +94,41 @@ def every_sixteenth(echoes: Echoes) -> Echoes:
 def case_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
     radar = Radar.preset(preset)
     chirps = Radar.preset("paper-12ghz").chirps_per_frame
-    claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}{f', {constant} echoes constant' if constant else ''}"
+    nodes_text = f"{nodes} node{'s' if nodes > 1 else ''}"
+    claim = f"{preset}, {nodes_text}{f', {constant} echoes constant' if constant else ''}"
     yield from compared(
         claim, block(radar, chirps, nodes, constant, PARTS, rng), radar, np.complex128
     )
 
 
-def crowd_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
-    """Many echoes in complex64, which are spread over a grid."""
+def many_rows(preset: str, nodes: int, constant: int, rng: np.random.Generator) -> Iterator[Row]:
+    """Many echoes in complex64, by the NUFFT."""
     radar = Radar.preset(preset)
     claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}, complex64"
-    yield from compared(claim, block(radar, 192, nodes, constant, CROWD, rng), radar, np.complex64)
+    yield from compared(claim, block(radar, 192, nodes, constant, MANY, rng), radar, np.complex64)
 
 
 def crossing_rows(
     preset: str, nodes: int, counts: tuple[int, ...], rng: np.random.Generator
 ) -> Iterator[Row]:
-    """Where spreading begins to pay, which `synthesize` has as constants: both ways of the same echoes in turn."""
+    """Where the NUFFT begins to pay, a constant of `synthesize`: the same echoes by both."""
     radar = Radar.preset(preset)
     claim = f"{preset}, {nodes} node{'s' if nodes > 1 else ''}, complex64"
     times = radar.chirp_times(192)
     for count in counts:
         echoes = block(radar, len(times), nodes, 0, count, rng)
         seconds: dict[int, list[float]] = {}
-        for _ in range(1 + 3 * REPEATS):  # compiled before it is timed
+        for _ in range(1 + 3 * REPEATS):  # the first one compiles
             for many in (1, count + 1):
                 with mock.patch.multiple(synthesis, MANY_ECHOES=many, MANY_VARYING_ECHOES=many):
                     took = timed(
                         lambda echoes=echoes: synthesize(echoes, radar, times, dtype=np.complex64)
-                    )  # type: ignore[misc]
+                    )
                 seconds.setdefault(many, []).append(took)
         spread, one_by_one = (float(np.median(own[1:])) for own in seconds.values())
         yield reported(
             claim,
-            f"{count} echoes: one by one over spread, time",
+            f"{count} echoes: direct sum over NUFFT, time",
             "",
             one_by_one / spread,
             key="if-sum",
@@ -137,7 +140,7 @@ def compared(
 ) -> Iterator[Row]:
     chirps, _, count = echoes.length.shape
     times = radar.chirp_times(chirps)
-    fast = synthesize(echoes, radar, times, dtype=dtype)  # compiled before it is timed
+    fast = synthesize(echoes, radar, times, dtype=dtype)  # compiles before it is timed
     fast_s = min(
         timed(lambda: synthesize(echoes, radar, times, dtype=dtype)) for _ in range(REPEATS)
     )
@@ -163,7 +166,7 @@ def timed(work: Callable[[], object]) -> float:
 def measure(quick: bool) -> list[Row]:
     rng = np.random.default_rng(0)
     presets = ("paper-12ghz",) if quick else ("paper-12ghz", "paper-77ghz")
-    kinds = ((CASES, case_rows), (CROWD_CASES, crowd_rows), (CROSSINGS, crossing_rows))
+    kinds = ((CASES, case_rows), (MANY_CASES, many_rows), (CROSSINGS, crossing_rows))
     return [
         row
         for preset in presets

@@ -1,11 +1,12 @@
-"""Whole body: what every model receives, against `reference`, for four activities at 12 and 77 GHz.
+"""Whole body: what every model receives against `reference`, four activities at 12 and 77 GHz.
 
-Compared is the received spectrum H(f, t) of the corner channels, first and last Tx with first and last Rx of the y-line, at the
-first, middle and last frequency of the sweep, in every fourth TDM cycle of one frame of 100 ms: rms |H - Href| over rms |Href|,
-and the power of that frame. Frames are taken where limbs are fast and hide each other; how much is hidden stands beside.
-Physical optics is judged on the walk: 2 % at 12 GHz, 4 % at 77 GHz. A model that keeps a tolerance of frame power is judged by
-it. The others leave out what they leave out, and are reported. `reference` itself is held against itself with four times the
-facets.
+The received spectrum H(f, t) is compared for the corner channels, the first and last Tx with the
+first and last Rx of the y-line, at the first, middle and last frequency of the sweep, in every
+fourth TDM cycle of one frame of 100 ms: rms |H - Href| over rms |Href|, and the power of that
+frame. The frames are those in which limbs are fast and occlude each other; the occluded fraction is
+reported. Physical optics is judged on the walk: 2 % at 12 GHz, 4 % at 77 GHz. A model with a
+tolerance of frame power is judged by it. The others omit effects by design, and are reported.
+`reference` itself is compared with itself with four times the facets.
 
     python validation/other_methods/ladder.py [--quick] [--json FILE]
 """
@@ -32,14 +33,14 @@ from rtradar.validate.rows import Row, main
 
 judged, reported = (partial(kind, key="body") for kind in (rows.judged, rows.reported))
 PRESETS = ("paper-12ghz", "paper-77ghz")
-# activity, start of the frame [s]: where limbs are fast and hide each other
+# Activity and start of the frame [s], in which limbs are fast and occlude each other.
 FRAMES = {"walk": 0.75, "kick": 0.45, "punch": 0.35, "jumping_jack": 0.4}
 EVERY_CYCLES = 4
-# What was asked of physical optics on a walking body.
+# Limits asked for of physical optics on a walking body.
 MOST_ERROR = {("paper-12ghz", "walk"): 0.02, ("paper-77ghz", "walk"): 0.04}
-# The tolerance that this model has where none is given.
+# Tolerance of this model where none is given.
 MOST_DECIBELS = {"auto": 0.5}
-# They find each receiver's echo by itself, so that those between the ends of a line need not be asked.
+# These models evaluate each receiver on its own, so those between the ends of a line are left out.
 BY_RECEIVER = ("reference", "rays")
 
 
@@ -65,7 +66,7 @@ class Scene:
 
     @cached_property
     def chirps(self) -> NDArray[np.int64]:
-        """Of the first and last Tx of the y-line."""
+        """Chirps of the first and last Tx of the y-line."""
         cycles = np.arange(0, self.radar.cycles_per_frame, self.every)
         return np.asarray(
             (
@@ -77,12 +78,12 @@ class Scene:
 
     @cached_property
     def corner_radar(self) -> rt.Radar:
-        """Of the receivers of each line, those at its ends."""
+        """The radar with the receivers at the ends of each line only."""
         ends = (self.radar.rx_y - 1) * self.radar.rx_spacing_wavelengths
         return dataclasses.replace(self.radar, rx_y=2, rx_z=2, rx_spacing_wavelengths=ends)
 
     def spectrum(self, fidelity: str, **options: Any) -> NDArray[np.complex128]:
-        """What a model receives (frequency, chirp, rx)."""
+        """Received spectrum of a model (frequency, chirp, rx)."""
         radar = self.corner_radar if fidelity in BY_RECEIVER else self.radar
         return spectrum(build_model(fidelity, radar, self.body, **options), radar, self.chirps)
 
@@ -104,7 +105,7 @@ def spectrum(
     echoes = model.echoes(chirps)
     frequencies = radar.start_frequency_hz + radar.bandwidth_hz * np.array([0.0, 0.5, 1.0])
     nodes = echoes.frequency
-    # Polynomial through the nodes, as the contract of `Echoes` says.
+    # The polynomial through the nodes, as the contract of `Echoes` says.
     weights = np.ones((len(frequencies), len(nodes)))
     for n, node in enumerate(nodes):
         for other in np.delete(nodes, n):
@@ -122,7 +123,7 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
     hidden = build_model("specular", scene.radar, scene.body).echoes(scene.chirps).amplitude == 0
     yield reported(
         case,
-        "share of part, time and channel whose specular point is hidden",
+        "fraction of part, time and channel whose specular point is occluded",
         "",
         float(hidden.mean()),
     )
@@ -140,7 +141,10 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
         if limit is None:
             yield reported(claim, quantity, "", error)
         else:
-            says = f"a walking body by `{fidelity}` against `reference`, {scene.preset[6:8]} GHz, with occlusion: complex error"
+            says = (
+                f"a walking body by `{fidelity}` against `reference`, {scene.preset[6:8]} GHz, "
+                "with occlusion: complex error"
+            )
             yield judged(claim, quantity, "", error, limit, says=says, cases=found.size)
         if fidelity in MOST_DECIBELS:
             most, says = (
@@ -153,7 +157,7 @@ def scene_rows(scene: Scene) -> Iterator[Row]:
 
 
 def finer_rows(scene: Scene) -> Iterator[Row]:
-    """What the facets of the reference leave: 5120 a part at 12 GHz, against the next finer icosphere."""
+    """Error of the reference's facets: 5120 a part at 12 GHz against the next finer icosphere."""
     error, decibels = scene.compared(scene.spectrum("reference", facets=4 * 5120))
     claim = f"{scene.preset}, {scene.activity}, reference with four times the facets"
     yield reported(claim, "complex error of H(f, t), rms over rms", "", error)

@@ -1,9 +1,10 @@
-"""The person over walls: lengths and returns against mirrored bodies and physical optics, ghosts in the maps.
+"""The person over walls: lengths and returns against other methods, and ghosts in the maps.
 
-Lengths: the body is mirrored in the walls instead of the antennas, and the shortest way over its surface sought by a general
-minimiser. Returns: an ellipsoid beside a conducting plane against vector physical optics, the plane's image source and image
-receiver by hand. Maps: a sphere that moves in a box room, all walls conducting, without noise: every ghost that stands alone is
-looked for at the range, the range rate and the angles that its path predicts.
+Lengths: the body is mirrored in the walls instead of the antennas, and the shortest path over its
+surface is found by a general minimiser. Returns: an ellipsoid beside a conducting plane against
+vector physical optics, with image source and image receiver written out. Maps: a sphere moves in a
+box room of conducting walls, without noise, and every isolated ghost must be found at the range,
+the range rate and the angles that its path predicts.
 
     python validation/other_methods/multipath.py [--quick] [--json FILE]
 """
@@ -52,7 +53,7 @@ SHAPES = {
 
 @dataclass(frozen=True)
 class Mover:
-    """One ellipsoid that goes straight on; at 0 s it is at ``centre``."""
+    """One ellipsoid in straight motion; at 0 s it is at ``centre``."""
 
     centre: tuple[float, float, float]
     axes: tuple[float, float, float]
@@ -71,7 +72,7 @@ class Mover:
 
 
 def box() -> tuple[Wall, ...]:
-    """x from -4.5 to 2.5 m, y from -2.2 to 3 m, z to 2.6 m: of a conductor."""
+    """Conducting walls: x from -4.5 to 2.5 m, y from -2.2 to 3 m, z from 0 to 2.6 m."""
     surface = Surface(material=material("perfect-conductor"), thickness_m=0.1)
     return room_walls(
         (7.0, 5.2, 2.6),
@@ -91,7 +92,7 @@ PLANES = {
 
 
 def mirrored(points: Array, leg: tuple[str, ...]) -> Array:
-    """Images of the body's points in the walls of a leg: the wall met last first."""
+    """Images of the body's points in the walls of a leg; the wall that is met last comes first."""
     out = np.array(points, dtype=np.float64)
     for name in reversed(leg):
         axis, place = PLANES[name]
@@ -110,10 +111,10 @@ def shortest(
     pose: tuple[Array, Array, Array],
     legs: tuple[tuple[str, ...], tuple[str, ...]],
 ) -> float:
-    """Least way from Tx over one mirrored body, and from the same point of the other, to Rx [m]."""
+    """Shortest path [m] from Tx over one mirrored body, and from that point of the other, to Rx."""
     centre, frame, axes = pose
 
-    def way(angles: Array) -> float:
+    def length(angles: Array) -> float:
         theta, phi = angles
         local = axes * np.array(
             [np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)]
@@ -129,10 +130,10 @@ def shortest(
         for theta in np.linspace(0.2, 2.9, 9)
         for phi in np.linspace(0, 6.1, 16)
     ]
-    start = min(grid, key=way)
+    start = min(grid, key=length)
     return float(
         minimize(
-            way,
+            length,
             start,
             method="Nelder-Mead",
             options={"xatol": 1e-10, "fatol": 1e-15, "maxiter": 2000},
@@ -140,7 +141,7 @@ def shortest(
     )
 
 
-# -- lengths ----------------------------------------------------------------------------------------------------------
+# -- lengths ---------------------------------------------------------------------------------------
 
 
 def length_rows(quick: bool) -> Iterator[Row]:
@@ -155,8 +156,8 @@ def length_rows(quick: bool) -> Iterator[Row]:
                 Rotation.random(random_state=seed).as_matrix(),
                 (-1.2, 0.6, 0.1),
             )
-            model = Multipath(radar, body, Scene(walls=box()), order=2)  # type: ignore[arg-type]
-            # Between two anchors, where the specular point is not known beforehand.
+            model = Multipath(radar, body, Scene(walls=box()), order=2)
+            # Between two keyframes, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
             echoes = model.echoes(chirps)
             poses = body.at((chirps + 0.5) * radar.chirp_duration_s)
@@ -180,7 +181,7 @@ def length_rows(quick: bool) -> Iterator[Row]:
                         count[path.order] + 1,
                     )
         for order, error in worst.items():
-            says = "Lengths of the person's paths over one and two walls, to the mirrored body"
+            says = "lengths of the person's paths over one and two walls, against the mirrored body"
             quantity = f"worst length, order {order}, {count[order]} paths"
             yield judged(
                 f"box room, {preset}",
@@ -193,11 +194,11 @@ def length_rows(quick: bool) -> Iterator[Row]:
             )
 
 
-# -- returns ----------------------------------------------------------------------------------------------------------
+# -- returns ---------------------------------------------------------------------------------------
 
 
 class Plane(NamedTuple):
-    """A conducting plane, and how the half-space before it is mirrored."""
+    """A conducting plane, and the reflection of the half-space before it."""
 
     name: str
     turn: Array
@@ -225,7 +226,7 @@ def vector_optics(
     polarization: str,
     sweep: Array,
 ) -> Array:
-    """Co-polar scattering length over R1 R2, with its phase, by the currents 2 n x H on what both antennas light (frequency,)."""
+    """Co-polar scattering length over R1 R2 (frequency,), by currents 2 n x H on what is lit."""
     pose = body.at(np.zeros(1))
     centre, frame, axes = pose.centres[0, 0], pose.frames[0, 0], np.array(body.axes)
     tx, rx = (plane.image(antenna) if image else antenna for image in over)
@@ -240,7 +241,8 @@ def vector_optics(
         ways = points - source
         ranges.append(np.linalg.norm(ways, axis=1))
         ways = ways / ranges[-1][:, None]
-        # The image of a source: its field mirrored, and turned round, so that nothing is left along the plane.
+        # The image of a source has its field mirrored and reversed, so that the tangential field on
+        # the plane vanishes.
         fields.append(
             (
                 ways,
@@ -252,22 +254,23 @@ def vector_optics(
         facing = facing - np.sum(normal * ways, axis=1) / 2
     (way, field), (_, received) = fields
     current = np.cross(normal, np.cross(way, field))
-    # The reference's weights hold scalar obliquity and spreading about the centre; in their place come those of the vectors.
+    # The reference's weights have scalar obliquity and spreading about the centre; those of the
+    # vectors take their place.
     area = quadrature.weight / facing / (np.linalg.norm(tx - centre) * np.linalg.norm(rx - centre))
-    share = np.sum(received * current, axis=1)
+    copolar = np.sum(received * current, axis=1)
     k = np.array([wave_number(f) for f in sweep])[:, None]
     return np.asarray(
         1j
         * k[:, 0]
         / np.sqrt(np.pi)
-        * np.sum(area * share * np.exp(-1j * k * (ranges[0] + ranges[1])), axis=1)
+        * np.sum(area * copolar * np.exp(-1j * k * (ranges[0] + ranges[1])), axis=1)
     )
 
 
 def ours(
     plane: Plane, antenna: Array, body: Mover, polarization: str, sweep: Array
 ) -> dict[tuple[bool, bool], Array]:
-    """The same of `Multipath`, path by path."""
+    """The same by `Multipath`, path by path."""
     u, v = (
         ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0))
         if plane is FLOOR
@@ -284,9 +287,9 @@ def ours(
     )
     radar = rt.Radar(
         tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=tuple(antenna), polarization=polarization
-    )  # type: ignore[arg-type]
-    model = Multipath(radar, body, Scene(walls=(wall,)), order=2)  # type: ignore[arg-type]
-    # Chirp 0 is 31 us late, in which nobody gets far.
+    )
+    model = Multipath(radar, body, Scene(walls=(wall,)), order=2)
+    # Chirp 0 is 31 us late, a time in which nobody moves far.
     echoes = model.echoes(np.zeros(1, dtype=np.int64))
     found = {}
     for number, path in enumerate(model.paths):
@@ -296,7 +299,7 @@ def ours(
 
 
 def k_rho(plane: Plane, antenna: Array, body: Mover, sweep: Array) -> float:
-    """Wave number at the middle of the sweep times the smaller radius of curvature where one way over the plane is reflected."""
+    """Wave number at the sweep's middle times the smaller radius at the one-way specular point."""
     ways = [place - np.array(body.centre) for place in (antenna, plane.image(antenna))]
     normal = body.frame.T @ sum(way / np.linalg.norm(way) for way in ways)
     normal /= np.linalg.norm(normal)
@@ -314,8 +317,8 @@ def optics_rows(quick: bool) -> Iterator[Row]:
     sweep = np.linspace(12e9, 16e9, 9 if quick else 33)
     antenna = np.array([-4.0, 1.0, 1.0])
     ghosts: dict[str, list[float]] = {
-        "one way over the plane": [],
-        "both ways over the plane": [],
+        "one leg over the plane": [],
+        "both legs over the plane": [],
         "all four together": [],
     }
     tight: list[float] = []
@@ -340,13 +343,14 @@ def optics_rows(quick: bool) -> Iterator[Row]:
         if k_rho(plane, antenna, body, sweep) < LEAST_K_RHO:
             tight += one_way
             continue
-        ghosts["one way over the plane"] += one_way
-        ghosts["both ways over the plane"].append(decibel(np.divide(*power[True, True])))
+        ghosts["one leg over the plane"] += one_way
+        ghosts["both legs over the plane"].append(decibel(np.divide(*power[True, True])))
         total = [np.mean(np.abs(sum(fields.values())) ** 2) for fields in (mine, optics)]
         ghosts["all four together"].append(decibel(total[0] / total[1]))
     for name, errors in ghosts.items():
-        # Power is averaged over the sweep, for the wave that physical optics invents at the terminator ripples over it.
-        says = "Image method against bistatic vector PO, an ellipsoid beside a conducting plane"
+        # Power is averaged over the sweep, because the terminator wave of physical optics makes it
+        # ripple.
+        says = "image method against bistatic vector PO, an ellipsoid beside a conducting plane"
         worst = float(np.abs(errors).max())
         claim = "beside a conducting plane"
         yield judged(
@@ -360,12 +364,13 @@ def optics_rows(quick: bool) -> Iterator[Row]:
         )
         yield reported(claim, f"{name}: rms", "dB", float(np.sqrt(np.mean(np.square(errors)))))
     if tight:
-        # Tighter than what `specular` itself is judged for; physical optics is not reciprocal there, v and h differ by 0.2 dB.
-        quantity = f"one way, k rho below {LEAST_K_RHO:g}: worst |dB|, {len(tight)} cases"
+        # This is tighter than the limit of `specular` itself; physical optics is not reciprocal
+        # there, and v and h differ by 0.2 dB.
+        quantity = f"one leg, k rho below {LEAST_K_RHO:g}: worst |dB|, {len(tight)} cases"
         yield reported("beside a conducting plane", quantity, "dB", float(np.abs(tight).max()))
 
 
-# -- maps -------------------------------------------------------------------------------------------------------------
+# -- maps ------------------------------------------------------------------------------------------
 
 
 def map_rows(quick: bool) -> Iterator[Row]:
@@ -376,7 +381,7 @@ def map_rows(quick: bool) -> Iterator[Row]:
         ((0.8, 0.9, 1.0), (-1.0, -1.2, 0.3)),
         ((-0.8, 0.2, 1.5), (1.3, 1.0, -0.3)),
     )
-    # All walls once, and twice the same.
+    # All walls once, and the same one twice.
     rooms = [(box(), 1), *(((wall,), 2) for wall in box() if wall.name not in ("near", "far"))]
     for (walls, order), (start, velocity) in product(rooms, starts[: 1 if quick else 3]):
         mover = Mover(start, (0.12,) * 3, np.eye(3), velocity)
@@ -390,7 +395,7 @@ def map_rows(quick: bool) -> Iterator[Row]:
     }
     for name, errors in found.items():
         unit, limit = limits[name]
-        says = "Ghosts of a moving sphere in a box room, at their predicted places"
+        says = "ghosts of a moving sphere in a box room, at their predicted places"
         quantity = f"worst {name}, {len(errors)} ghosts"
         yield judged(
             "box room, 12 GHz",
@@ -404,7 +409,7 @@ def map_rows(quick: bool) -> Iterator[Row]:
 
 
 class Ghost(NamedTuple):
-    """What a path predicts for the middle of a window."""
+    """Prediction of a path for the middle of a frame."""
 
     legs: tuple[tuple[str, ...], tuple[str, ...]]
     range_m: float
@@ -416,7 +421,7 @@ class Ghost(NamedTuple):
 def ghosts_of(
     radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int
 ) -> dict[str, list[float]]:
-    model = Multipath(radar, body, Scene(walls=walls), order=order)  # type: ignore[arg-type]
+    model = Multipath(radar, body, Scene(walls=walls), order=order)
     chirps = np.arange(radar.chirps_per_frame)
     echoes = model.echoes(chirps)
     x = synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64)
@@ -424,7 +429,7 @@ def ghosts_of(
     power = np.asarray(power_map(spectra, radar))
     middle = radar.chirps_per_frame * radar.chirp_duration_s / 2
     strength = (np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1))
-    # There and back over a wall are one ghost.
+    # A wall on the way out or on the way back gives the same ghost.
     ghosts = [
         predicted(radar, body, walls_of(model.paths[i]), middle, strength[i])
         for i in np.flatnonzero(strength)
@@ -441,7 +446,7 @@ def ghosts_of(
         )
         rows_, columns = slice(row - 3, row + 4), slice(column - 3, column + 4)
         near = power[rows_, columns]
-        # Its centroid, for in 0.1 s a ghost may cross more than a bin.
+        # The centroid of its peak, because a ghost may cross more than a bin in 0.1 s.
         weight = near * (near > near.max() / 10)
         found["range"].append(
             abs(float((weight.sum(axis=1) @ radar.range_m[rows_]) / weight.sum()) - ghost.range_m)
@@ -456,7 +461,7 @@ def ghosts_of(
             apparent(radar, ghost),
             strict=True,
         ):
-            # Sines are ambiguous by the wavelength over the spacing of the virtual line.
+            # Sines are ambiguous by the wavelength over the spacing of the virtual array.
             period = 2 * np.sin(np.radians(radar.max_angle_deg))
             apart = np.abs((sine - peaks + period / 2) % period - period / 2).min()
             found[name].append(float(apart / np.radians(radar.angle_resolution_deg)))
@@ -478,17 +483,17 @@ def predicted(
         local = (pose.centres[0, 0], pose.frames[0, 0], np.array(body.axes))
         ways.append(shortest(place, place, local, legs))
     centre = body.at(np.array([middle])).centres[0, 0]
-    # Of a sphere, but for its radius and a little; over (two, tx, rx), there and back.
+    # Of a sphere, less its radius and a little; over (two, tx, rx), out and back.
     lengths = np.array(
         [
-            ways_over(radar, *(mirrored(centre, leg) for leg in order))
+            paths_over(radar, *(mirrored(centre, leg) for leg in order))
             for order in (legs, legs[::-1])
         ]
     )
     return Ghost(legs, ways[1] / 2, (ways[2] - ways[0]) / (4 * step), lengths, strength)
 
 
-def ways_over(radar: rt.Radar, out: Array, back: Array) -> Array:
+def paths_over(radar: rt.Radar, out: Array, back: Array) -> Array:
     received = radar.rx[radar.rx_of_tx]
     return np.asarray(
         np.linalg.norm(radar.tx - out, axis=1)[:, None] + np.linalg.norm(received - back, axis=2)
@@ -496,7 +501,7 @@ def ways_over(radar: rt.Radar, out: Array, back: Array) -> Array:
 
 
 def alone(ghost: Ghost, others: list[Ghost], radar: rt.Radar) -> bool:
-    """Whether nothing that matters is within four cells: Hann's side lobes are -31 dB, and fall."""
+    """Whether nothing that matters is within four cells: Hann's side lobes are at -31 dB."""
     for other in others:
         if other is ghost:
             continue
@@ -510,10 +515,11 @@ def alone(ghost: Ghost, others: list[Ghost], radar: rt.Radar) -> bool:
 
 
 def apparent(radar: rt.Radar, ghost: Ghost) -> tuple[Array, Array]:
-    """Sines along y and along z at which the lengths over the channels look most like those to one place, to half the power.
+    """Sines along y and z at which the lengths over the channels fit one place best, to half power.
 
-    Over a wall on one way only, Tx and Rx see the ghost in different directions: what is seen lies where the beam of the one
-    meets a grating lobe of the other, and there may be two such places, one for each order of the ways.
+    With a wall on one leg only, Tx and Rx see the ghost in different directions. It then appears
+    where the beam of the one meets a grating lobe of the other, and there may be two such places,
+    one for each order of the legs.
     """
     sines = np.linspace(-0.9, 0.9, 7201)
     found = []
@@ -522,7 +528,7 @@ def apparent(radar: rt.Radar, ghost: Ghost) -> tuple[Array, Array]:
             antennas[..., axis] - radar.position_m[axis]
             for antennas in (radar.tx[line], radar.rx[radar.rx_of_tx[line]])
         ]
-        # |place - antenna| for a place at that range in a plane with the line.
+        # |place - antenna| for a place at that range, in a plane with the line.
         r = ghost.range_m
         ways = [
             np.sqrt(r * r - 2 * r * sines * offset[..., None] + offset[..., None] ** 2)
@@ -540,15 +546,15 @@ def apparent(radar: rt.Radar, ghost: Ghost) -> tuple[Array, Array]:
     return found[0], found[1]
 
 
-def anchor_rows(quick: bool) -> Iterator[Row]:
-    """What is lost between the instants at which ghosts are looked at, for a person who walks in a living room."""
+def keyframe_rows(quick: bool) -> Iterator[Row]:
+    """Error of the interpolation between keyframes of ghosts, for a person in a living room."""
     scene = Scene.load("living-room")
     radar = scene.place(rt.Radar.preset("paper-12ghz"))
     motion = rt.motion.place(
         rt.synthetic_motion("walk", seed=0, duration_s=3.0), heading_deg=scene.heading_deg
     )
     body = rt.Body.from_motion(motion.shifted([*scene.person_position_m, 0.0]))
-    # From the middle of the capture on, a tenth of a second of it.
+    # A tenth of a second from the middle of the capture on.
     chirps = np.arange(radar.chirps_per_frame) + 20_000 // radar.n_tx * radar.n_tx
     fields = {}
     for apart_s in (2.5e-3, multipath.ANCHORS_S):
@@ -557,7 +563,7 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
             echoes = model.echoes(chirps)
         phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
         field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
-        # What slabs delay comes in several echoes of one path and part.
+        # The delays of slabs make several echoes of one path and part.
         owned = list(zip(model.path_names, echoes.part.tolist(), strict=True))
         paths = sorted(
             {own for own, bounces in zip(owned, echoes.bounces, strict=True) if bounces > 1}
@@ -569,7 +575,7 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
     error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported(
         "living room, walk",
-        f"ghosts at anchors {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms",
+        f"ghosts at keyframes {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms",
         "dB",
         error,
     )
@@ -578,7 +584,7 @@ def anchor_rows(quick: bool) -> Iterator[Row]:
 def shadow_rows(
     radar: rt.Radar, scene: Scene, body: rt.Body, chirps: NDArray[np.int64]
 ) -> Iterator[Row]:
-    """The same for the moving shadow in the clutter, over what of it changes in that time."""
+    """The same for the moving shadow in the clutter, over its change in that time."""
     clutter = Clutter(radar, scene, order=1)
     shadows = []
     for apart_s in (2.5e-3, clutter_shadow.ANCHORS_S):
@@ -587,7 +593,7 @@ def shadow_rows(
         cycles = room.reshape(-1, radar.n_tx, *room.shape[1:])
         shadows.append(cycles - cycles.mean(axis=0))
     first, last = shadows
-    quantity = f"shadow at anchors {clutter_shadow.ANCHORS_S * 1e3:g} ms apart against 2.5 ms"
+    quantity = f"shadow at keyframes {clutter_shadow.ANCHORS_S * 1e3:g} ms apart against 2.5 ms"
     error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported("living room, walk", quantity, "dB", error)
     yield reported(
@@ -599,7 +605,7 @@ def shadow_rows(
 
 
 def measure(quick: bool) -> list[Row]:
-    return [*length_rows(quick), *optics_rows(quick), *map_rows(quick), *anchor_rows(quick)]
+    return [*length_rows(quick), *optics_rows(quick), *map_rows(quick), *keyframe_rows(quick)]
 
 
 if __name__ == "__main__":

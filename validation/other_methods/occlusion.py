@@ -1,14 +1,17 @@
-"""Occlusion: what `specular` does where one part hides another, against physical optics with a geometric shadow.
+"""Occlusion by `specular` against physical optics with a geometric shadow, and the tracer itself.
 
-A part straight behind another must return nothing. Half covered it returns all or nothing, by its specular point; how far
-that is from physical optics is reported over the covered share. Then the fade in time: a sphere passes before an upright
-ellipsoid, and the power beside the Doppler line of the ellipsoid is compared for ramps of several lengths, and for the
-model itself with anchors 10 ms apart, whatever the instant between them at which the specular point goes.
+A part straight behind another must return nothing. A half covered part returns all or nothing, by
+its specular point; its error against physical optics is reported over the covered fraction. In
+time, a sphere passes before an upright ellipsoid, and the power beside the Doppler line of the
+ellipsoid is compared for ramps of several lengths, and for the model itself with keyframes 10 ms
+apart, whatever the instant between them at which the specular point disappears.
 
-The reference adds up the points of ``physical_optics.py`` that the occluder, a sphere, does not hide from the antenna, by
-the distance of its centre from each ray; the edge is softened over one cell, so that it converges as the square of it.
+The reference adds up the points of ``physical_optics.py`` that the occluder, a sphere, does not
+hide from the antenna, by the distance of its centre from each ray. The edge is softened over one
+cell, so that the sum converges with the square of the cell.
 
-And the tracer itself: what Mitsuba answers about the lines of sight of moving bodies is held against a closed form in float64.
+What Mitsuba answers about the lines of sight of moving bodies is compared with a closed form in
+float64.
 
     python validation/other_methods/occlusion.py [--quick] [--json FILE]
 """
@@ -40,8 +43,8 @@ from rtradar.validate.rows import Row, main
 
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="edge") for kind in (rows.judged, rows.reported))
-ANTENNA = np.array([-4.0, 0.0, 0.0])  # the target stands at the origin
-BEFORE_M = 0.5  # of the target stands the occluder
+ANTENNA = np.array([-4.0, 0.0, 0.0])  # the target is at the origin
+BEFORE_M = 0.5  # distance of the occluder before the target
 TO_OCCLUDER_M = 3.5
 OCCLUDER_RADIUS_M = 0.06
 TARGET = np.array([0.07, 0.07, 0.2])
@@ -50,7 +53,7 @@ BESIDE_MPS = 1.5
 
 @dataclass(frozen=True)
 class Band:
-    """One of the paper's radars as one of its channels sees it: a chirp each TDM cycle."""
+    """One of the paper's radars as one of its channels sees it: one chirp in each TDM cycle."""
 
     name: str
     start: float
@@ -65,7 +68,7 @@ class Band:
 
     @property
     def radar(self) -> rt.Radar:
-        """One Tx and one Rx in one place; its anchors stay 10 ms apart."""
+        """One Tx and one Rx in one place; the keyframes stay 10 ms apart."""
         return rt.Radar(
             name=self.name,
             start_frequency_hz=self.start,
@@ -84,7 +87,7 @@ BANDS = (
 )
 
 
-# -- the reference --------------------------------------------------------------------------------------------------
+# -- the reference ---------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -114,23 +117,23 @@ class Target:
 
 
 @compiled(parallel=True, fastmath=True)
-def _shadowed(points, contribution, occluder, radius, cell):  # type: ignore[no-untyped-def]
+def _shadowed(points, contribution, occluder, radius, cell):
     total_re, total_im = 0.0, 0.0
     square = occluder[0] ** 2 + occluder[1] ** 2 + occluder[2] ** 2
     for i in prange(points.shape[0]):
         x, y, z = points[i, 0], points[i, 1], points[i, 2]
         length = np.sqrt(x * x + y * y + z * z)
         along = (x * occluder[0] + y * occluder[1] + z * occluder[2]) / length
-        # How far outside the sphere the ray passes, seen at the target.
+        # Distance at which the ray passes outside the sphere, seen at the target.
         clearance = (np.sqrt(max(square - along * along, 0.0)) - radius) * length / along
-        share = min(max(0.5 + clearance / cell, 0.0), 1.0)
-        total_re += share * contribution[i].real
-        total_im += share * contribution[i].imag
+        fraction = min(max(0.5 + clearance / cell, 0.0), 1.0)
+        total_re += fraction * contribution[i].real
+        total_im += fraction * contribution[i].imag
     return complex(total_re, total_im)
 
 
-def covered_share(axes: Array, occluder: Array, radius: float) -> float:
-    """Share of the target's outline that lies in the shadow, by counting."""
+def covered_fraction(axes: Array, occluder: Array, radius: float) -> float:
+    """Fraction of the target's outline that lies in the shadow, by counting."""
     rng = np.random.default_rng(0)
     disc = rng.normal(size=(200_000, 2))
     disc *= np.sqrt(rng.uniform(size=len(disc)) / (disc**2).sum(axis=1))[:, None]
@@ -142,7 +145,7 @@ def covered_share(axes: Array, occluder: Array, radius: float) -> float:
     return float(np.mean(way @ way - along**2 < radius**2))
 
 
-# -- standing -------------------------------------------------------------------------------------------------------
+# -- at rest ---------------------------------------------------------------------------------------
 
 
 def one(ellipsoids: rt.Ellipsoids, part: int) -> rt.Ellipsoids:
@@ -155,7 +158,7 @@ def one(ellipsoids: rt.Ellipsoids, part: int) -> rt.Ellipsoids:
 
 
 def ours(axes: Array, occluder: Array, radius: float, frequency: float) -> complex:
-    """Field of the target with the occluder before it, the occluder's own return taken out, over its free field."""
+    """Field of the target with the occluder before it, less the occluder's, over the free one."""
     both = rt.Ellipsoids(
         [np.zeros(3), occluder], np.tile(np.eye(3), (2, 1, 1)), [axes, np.full(3, radius)]
     )
@@ -167,7 +170,7 @@ def ours(axes: Array, occluder: Array, radius: float, frequency: float) -> compl
 
 
 def hidden_rows(quick: bool) -> Iterator[Row]:
-    """Body parts straight behind a torso, a head, another limb; every pair of antennas of both radars."""
+    """Body parts straight behind a torso, a head or another limb, for every pair of antennas."""
     rng = np.random.default_rng(1)
     actor = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0))
     worst, cases = 0.0, 0
@@ -179,7 +182,7 @@ def hidden_rows(quick: bool) -> Iterator[Row]:
             distance, gap = rng.uniform(2.5, 5.0), rng.uniform(0.05, 0.6)
             direction = np.array([1.0, *rng.uniform(-0.3, 0.3, 2)])
             direction /= np.linalg.norm(direction)
-            # As large as it takes to hide the whole part from the ends of the array too.
+            # As large as it takes to occlude the whole part from the ends of the array too.
             cover = 1.3 * axes.max() + gap / distance * 0.4 + 0.1
             far = distance + cover + gap + axes.max()
             both = rt.Ellipsoids(
@@ -216,15 +219,15 @@ def covered_rows(quick: bool) -> Iterator[Row]:
             errors, crossing = [], []
             for shift in radius + reach * np.linspace(-1.15, 1.15, 9 if quick else 15):
                 occluder = np.array([-BEFORE_M, shift, 0.0])
-                share = covered_share(axes, occluder, radius)
+                fraction = covered_fraction(axes, occluder, radius)
                 optics, got = (
                     target.field(occluder, radius),
                     ours(axes, occluder, radius, band.centre),
                 )
                 errors.append(abs(got - optics))
-                if 0.02 < share < 0.98:
+                if 0.02 < fraction < 0.98:
                     crossing.append(errors[-1])
-                    quantity = f"{share:3.0%} covered: field over the free one"
+                    quantity = f"{fraction:3.0%} covered: field over the free one"
                     yield Row(
                         claim,
                         quantity,
@@ -236,7 +239,7 @@ def covered_rows(quick: bool) -> Iterator[Row]:
                         bool(np.isfinite(errors[-1])),
                         "edge",
                     )
-            # All or nothing where half the field is left is wrong by a half; physical optics swings a little past that.
+            # All or nothing is wrong by half where half of the field is left, and PO overshoots.
             says = "a part half behind an edge by `specular`, seen or not: worst complex error"
             yield judged(
                 claim, "worst complex error", "", max(errors), 0.6, says=says, cases=len(errors)
@@ -249,7 +252,7 @@ def covered_rows(quick: bool) -> Iterator[Row]:
             )
 
 
-# -- in time --------------------------------------------------------------------------------------------------------
+# -- in time ---------------------------------------------------------------------------------------
 
 
 def smooth(x: Array) -> Array:
@@ -266,7 +269,7 @@ RAMPS = {
 
 
 def beside_db(field: Array | NDArray[np.complex128], band: Band) -> float:
-    """Mean power beside the Doppler line relative to its peak."""
+    """Mean power beside the Doppler line over its peak."""
     spectrum = np.abs(np.fft.fft(field * hann(len(field), sym=False))) ** 2
     velocity = np.fft.fftfreq(len(field), band.cycle_s) * 299_792_458.0 / band.centre / 2
     return float(10 * np.log10(spectrum[np.abs(velocity) > BESIDE_MPS].mean() / spectrum.max()))
@@ -274,7 +277,7 @@ def beside_db(field: Array | NDArray[np.complex128], band: Band) -> float:
 
 @dataclass(frozen=True)
 class Passing:
-    """A body of two parts for a model: the ellipsoid stands, the sphere passes before it, and frees it at ``instant``."""
+    """A body of two parts: a static ellipsoid, and a sphere that uncovers it at ``instant``."""
 
     speed: float
     instant: float
@@ -299,7 +302,8 @@ def fade_rows(quick: bool) -> Iterator[Row]:
     for band in BANDS:
         target = Target.upright(TARGET, band.centre, band.density / (2.0 if quick else 1.0))
         times = band.radar.chirp_times(band.cycles)
-        # Instants at which the specular point comes free, over one interval between anchors, in whole cycles.
+        # Instants at which the specular point is uncovered, over one interval between keyframes, in
+        # whole cycles.
         late = (
             np.linspace(0, round(10e-3 / band.cycle_s), 3 if quick else 11)[:-1].round().astype(int)
         )
@@ -313,7 +317,7 @@ def fade_rows(quick: bool) -> Iterator[Row]:
             optics = series[late.max() :]
             yield reported(claim, "PO: power beside the line", "dB", beside_db(optics, band))
             if not quick and speed == 1.5:
-                # The softened edge must not make the floor: half as many points tell.
+                # The softened edge must not determine the floor: half the points would show it.
                 coarse = Target.upright(TARGET, band.centre, band.density / 1.4)
                 check = np.array(
                     [coarse.field(place, OCCLUDER_RADIUS_M) for place in passing.sphere(times)]
@@ -324,7 +328,8 @@ def fade_rows(quick: bool) -> Iterator[Row]:
                     claim, "PO, half the points: rms change of the field", "", rms(check - optics)
                 )
             for name, (length, shape) in RAMPS.items():
-                # Hidden from when the front of the sphere comes, where it does in this window, until its rear frees the point.
+                # Occluded from the arrival of the sphere's front, if it arrives in this frame,
+                # until its rear uncovers the point.
                 gone, back = (passing.instant - 2 * OCCLUDER_RADIUS_M / speed, passing.instant)
                 ramp = (
                     1 - shape((times - gone) / length + 0.5) + shape((times - back) / length + 0.5)
@@ -334,8 +339,7 @@ def fade_rows(quick: bool) -> Iterator[Row]:
             floors, errors = [], []
             for shift in late:
                 moved = Passing(speed, passing.instant + shift * band.cycle_s)
-                # The model asks a body for its poses, its parts and its duration: this one has them.
-                model = build_model("specular", band.radar, moved)  # type: ignore[arg-type]
+                model = build_model("specular", band.radar, moved)
                 amplitude = model.echoes(np.arange(band.cycles)).amplitude[0, :, 0, 0].real
                 floors.append(beside_db(amplitude, band))
                 first = late.max() - shift
@@ -371,7 +375,7 @@ def db_mean(values: list[float]) -> float:
 
 
 class ClosedForm:
-    """Answers in float64 whether a part stands between two points, in place of the tracer's."""
+    """Whether a part is between two points, in float64, in place of the tracer."""
 
     def __init__(self, semi_axes: Array) -> None:
         self._axes = semi_axes
@@ -380,7 +384,7 @@ class ClosedForm:
         self._centres, self._frames = centres, frames
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether each line keeps outside of every part but its own, each stretched to a unit sphere."""
+        """Whether each line stays outside of every part but its own, scaled to a unit sphere."""
         seen = np.ones(len(origins), dtype=bool)
         for part, axes in enumerate(self._axes):
             start = (origins - self._centres[part]) @ self._frames[part] / axes
@@ -392,9 +396,9 @@ class ClosedForm:
 
 
 class Both:
-    """The tracer's answers, counted where the closed form answers otherwise."""
+    """The tracer's answers, with a count of those that the closed form contradicts."""
 
-    def __init__(self, tracer: BodyTracer, judge: ClosedForm) -> None:
+    def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
         self._tracer, self._judge, self.lines, self.different = tracer, judge, 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
@@ -409,7 +413,7 @@ class Both:
 
 
 def tracer_rows(quick: bool) -> Iterator[Row]:
-    """Mitsuba's answers on moving bodies against the closed form, and what follows for the power of the parts."""
+    """Mitsuba's answers on moving bodies against the closed form, and the power of the parts."""
     radar = rt.Radar.preset("paper-12ghz")
     mi = use(select("cpu"))
     lines, different, worst, cases = 0, 0, 0.0, 0
@@ -424,7 +428,7 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
         amplitudes = [free.echoes(chirp).amplitude[0] for chirp in chirps[:, None]]
         powers = []
         for tracer in (traced, ClosedForm(body.semi_axes)):
-            visibility = MirrorVisibility(radar, body, tracer)  # type: ignore[arg-type]
+            visibility = MirrorVisibility(radar, body, tracer)
             fractions = [visibility.at(chirp)[0] for chirp in chirps[:, None]]
             pairs = zip(amplitudes, fractions, strict=True)
             powers.append(np.stack([(np.abs(a) ** 2 * f**2).sum(axis=(0, 1)) for a, f in pairs]))
@@ -443,7 +447,7 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
         "",
         different / lines,
         1e-5,
-        says="lines of sight that Mitsuba and the closed form answer otherwise: fraction",
+        says="fraction of lines of sight on which Mitsuba and the closed form differ",
         cases=lines,
         key="tracer",
     )
@@ -460,12 +464,7 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
 
 
 def measure(quick: bool) -> list[Row]:
-    return [
-        *hidden_rows(quick),
-        *covered_rows(quick),
-        *fade_rows(quick),
-        *tracer_rows(quick),
-    ]
+    return [*hidden_rows(quick), *covered_rows(quick), *fade_rows(quick), *tracer_rows(quick)]
 
 
 if __name__ == "__main__":

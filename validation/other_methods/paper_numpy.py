@@ -1,17 +1,19 @@
-"""The paper's method in plain NumPy, as what `rtradar bench` compares with: one 100 ms frame from poses to detections.
+"""The paper's method in plain NumPy, with which `rtradar bench` compares: one frame of 100 ms.
 
-For each chirp, each receiver that hears it and each ellipsoid: range of the centre and closed-form cross-section, one complex
-exponential for every IF sample (paper, eqs 8 to 11, with the small term that eq. 9 neglects), the sum over the body, noise
-(eq. 12), range FFT (eq. 13), Doppler FFT (eq. 16), the sum of the magnitudes of all channels, and OS-CFAR with the paper's
-multiplier. Each frame is synthesised once, as is each of `rtradar run`; windows do not overlap here, which spares this method
+For each chirp, each receiver of its Tx and each ellipsoid: range of the centre and closed-form
+cross-section, one complex exponential for every IF sample (paper, eqs 8 to 11, with the small term
+that eq. 9 neglects), the sum over the body, noise (eq. 12), range FFT (eq. 13), Doppler FFT
+(eq. 16), the sum of the magnitudes of all channels, and OS-CFAR with the paper's multiplier. Each
+frame is synthesised once, as in `rtradar run`. Frames do not overlap here, which saves this method
 three of four Doppler FFTs. Poses are given, and their interpolation is not timed.
 
-One TDM cycle at once: 96 x 21 x 256 exponentials, which stay in a processor's cache; larger blocks are slower. A cycle costs
-what every other costs, for all have the same shapes, so of ``--cycles N`` the time is that of the frame once scaled; the
-Doppler FFT and CFAR are always of a whole frame. NumPy does all of this in one thread but for BLAS, which is told so, and has
+One TDM cycle is computed at once: 96 x 21 x 256 exponentials, which stay in a processor's cache;
+larger blocks are slower. All cycles cost the same, because they have the same shapes, so with
+``--cycles N`` the time is scaled to a whole frame; the Doppler FFT and CFAR are always of a whole
+frame. NumPy does all of this in one thread except for BLAS, which is limited to one thread, and has
 nothing to do here.
 
-    python validation/other_methods/paper_numpy.py [--radar NAME|TOML] [--cycles N] [--repeats N] [--json FILE]
+    python validation/other_methods/paper_numpy.py [--radar NAME|TOML] [--cycles N] [--json FILE]
 """
 
 from __future__ import annotations
@@ -20,7 +22,7 @@ import os
 
 if __name__ == "__main__":
     for _library in ("OMP", "OPENBLAS", "MKL"):
-        os.environ[f"{_library}_NUM_THREADS"] = "1"  # before NumPy is there
+        os.environ[f"{_library}_NUM_THREADS"] = "1"  # before NumPy is imported
 
 import argparse
 import json
@@ -43,14 +45,14 @@ from rtradar.motion import place
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
-GUARD, REACH = 2, 6  # of the paper's CFAR: 2 guard and 4 training cells on each side
+GUARD, REACH = 2, 6  # the paper's CFAR: 2 guard and 4 training cells on each side
 QUANTILE, OS_SCALE = 0.75, 5.0003
 SNR_DB = 20.0
 NOISE_SEED = 0
 
 
 class Poses(NamedTuple):
-    """Centres (chirp, part, 3), frames (chirp, part, 3, 3) and semi-axes (part, 3) of the body [m]."""
+    """Centres (chirp, part, 3), frames (chirp, part, 3, 3) and semi-axes (part, 3) of the body."""
 
     centres: Array
     frames: Array
@@ -58,32 +60,32 @@ class Poses(NamedTuple):
 
 
 def poses(radar: rt.Radar, cycles: int) -> Poses:
-    """Of a synthetic walk at the centres of the first chirps."""
+    """Poses of a synthetic walk at the centres of the first chirps."""
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0, duration_s=3.0)))
     return Poses(*body.at(radar.chirp_times(cycles * radar.n_tx)))
 
 
 def cross_section(semi_axes: Array, sight: Array) -> Array:
-    """Of ellipsoids (part, 3) seen along unit vectors (..., part, 3) in their own axes [m^2]; paper, ref. 22."""
+    """Cross-section [m^2] of ellipsoids (part, 3) along vectors in their axes; paper, ref. 22."""
     a, b, c = semi_axes.T
     x, y, z = np.moveaxis(sight, -1, 0)
     return np.pi * (a * b * c) ** 2 / ((a * x) ** 2 + (b * y) ** 2 + (c * z) ** 2) ** 2
 
 
 def if_samples(radar: rt.Radar, body: Poses, first: int = 0) -> Complex:
-    """IF samples (chirp, rx, sample) of a few chirps from chirp ``first`` on, one of a cycle's first, without noise."""
+    """IF samples (chirp, rx, sample) without noise of some chirps of a cycle, from ``first`` on."""
     at = np.asarray(radar.position_m)
     tx_index = (first + np.arange(len(body.centres))) % radar.n_tx
     tx, rx = radar.tx[tx_index] - at, radar.rx[radar.rx_of_tx[tx_index]] - at
     sight = body.centres - at
     distance = np.sqrt((sight**2).sum(axis=-1))
     sight /= distance[..., None]
-    # Spreading, which the paper leaves out, costs nothing.
+    # Spreading, which the paper omits, costs nothing.
     amplitude = (
         np.sqrt(cross_section(body.semi_axes, (body.frames * sight[..., None]).sum(axis=-2)))
         / distance**2
     )
-    # Eqs 10 and 11: plane waves reach the elements of the array sooner by their place along the line of sight.
+    # Eqs 10 and 11: a plane wave reaches an element sooner by its place along the line of sight.
     sooner = ((tx[:, None] + rx)[:, :, None] * sight[:, None]).sum(axis=-1)
     tau = (2 * distance[:, None] - sooner) / SPEED_OF_LIGHT_MPS  # (chirp, rx, part)
     t = np.arange(radar.samples_per_chirp) / radar.sample_rate_hz
@@ -98,9 +100,9 @@ def hann(n: int) -> Array:
 
 
 def os_cfar(power: Array) -> NDArray[np.bool_]:
-    """Detected cells (range, velocity): the cell above the multiplier times a quantile of the training cells that exist."""
+    """Detected cells (range, velocity), above a multiple of a quantile of their training cells."""
     rows, columns = power.shape
-    padded = np.pad(power, REACH, constant_values=np.inf)  # sorted behind all that exist
+    padded = np.pad(power, REACH, constant_values=np.inf)  # sorted behind all real cells
     width = 2 * REACH + 1
     trains = np.ones((width, width), dtype=bool)
     trains[REACH - GUARD : REACH + GUARD + 1, REACH - GUARD : REACH + GUARD + 1] = False
@@ -121,14 +123,14 @@ class Stopwatch:
 
     @contextmanager
     def of(self, stage: str, times: float = 1.0) -> Iterator[None]:
-        """Time what is inside, and count it so many times."""
+        """Time a block of code, and count it several times."""
         began = time.perf_counter()
         yield
         self.seconds[stage] = self.seconds.get(stage, 0.0) + times * (time.perf_counter() - began)
 
 
 def frame_seconds(radar: rt.Radar, body: Poses) -> dict[str, float]:
-    """Seconds of one whole frame by stage, from the poses of some of its cycles; the cycles come again till it is full."""
+    """Seconds of a whole frame by stage; the poses of some cycles are repeated to fill it."""
     cycles = len(body.centres) // radar.n_tx
     scale = radar.cycles_per_frame / cycles
     watch = Stopwatch()
@@ -162,18 +164,18 @@ def frame_seconds(radar: rt.Radar, body: Poses) -> dict[str, float]:
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--radar", default="paper-12ghz", help="a preset, or a TOML file")
+    parser.add_argument("--radar", default="paper-12ghz", help="name of a preset, or a TOML file")
     parser.add_argument(
         "--cycles", type=int, help="TDM cycles that are synthesised (default: a whole frame)"
     )
     parser.add_argument(
-        "--repeats", type=int, default=1, help="frames that are timed, after a cycle to warm up"
+        "--repeats", type=int, default=1, help="frames to time, after a cycle for warming up"
     )
     parser.add_argument(
         "--json",
         type=Path,
         metavar="FILE",
-        help="write seconds by stage there, a dictionary a frame",
+        help="write the seconds of each stage to this file, a dictionary for each frame",
     )
     options = parser.parse_args()
     radar = rt.Radar.load(options.radar)

@@ -1,11 +1,13 @@
-"""Scalar physical optics of one conducting ellipsoid by a quadrature that converges: the reference of the scattering claims.
+"""Scalar physical optics of one conducting ellipsoid by a convergent quadrature, as a reference.
 
-    F = jk/sqrt(pi) * Int over what both antennas light of (n.s_T + n.s_R)/2 exp(-jk (R_T + R_R - L_T - L_R)) L_T L_R/(R_T R_R) dS
+    F = jk/sqrt(pi) * Int (n.s_T + n.s_R)/2 exp(-jk (R_T + R_R - L_T - L_R)) L_T L_R/(R_T R_R) dS
 
-with exact spherical path lengths. On p = A u, u on the unit sphere, n dS = det(A) A^-1 u dOmega, and what an antenna at T
-lights is exactly a cap, u.T' > 1 with T' = A^-1 T. So in polar coordinates about the middle of both caps the border is
-known in closed form, and its two corners, where the border goes over from one cap to the other: Gauss-Legendre rules
-between them converge exponentially. Nothing here knows of specular points, of meshes or of rays.
+over what both antennas light, with exact spherical path lengths. On p = A u, with u on the unit
+sphere, n dS = det(A) A^-1 u dOmega, and the part that an antenna at T lights is exactly a cap,
+u.T' > 1 with T' = A^-1 T. In polar coordinates about the middle of both caps the border is
+therefore known in closed form, and so are its two corners, where it changes from one cap to the
+other: Gauss-Legendre rules between them converge exponentially. No specular points, meshes or rays
+are used.
 """
 
 from __future__ import annotations
@@ -23,21 +25,21 @@ SPEED_OF_LIGHT = 299_792_458.0
 
 @dataclass(frozen=True)
 class Quadrature:
-    """Points of one ellipsoid that two antennas light, and what each adds.
+    """Points of one ellipsoid that two antennas light, and their contributions.
 
-    ``points (n, 3)`` [m] in the ellipsoid's axes, ``weight (n,)`` [m^2] with obliquity and spreading, ``path (n,)`` the
-    path Tx..point..Rx less that over the centre [m].
+    ``points (n, 3)`` are in the ellipsoid's axes [m], ``weight (n,)`` includes obliquity and
+    spreading [m^2], and ``path (n,)`` is the path Tx-point-Rx less that over the centre [m].
     """
 
     points: Array
     weight: Array
     path: Array
 
-    def scattering_length(self, frequency: float, share: Array | float = 1.0) -> complex:
-        """F [m]; ``share (n,)`` is how much of each point is not in shadow."""
+    def scattering_length(self, frequency: float, fraction: Array | float = 1.0) -> complex:
+        """F [m]; ``fraction (n,)`` is the lit fraction of each point."""
         k = wave_number(frequency)
         return complex(
-            1j * k / np.sqrt(np.pi) * np.sum(self.weight * share * np.exp(-1j * k * self.path))
+            1j * k / np.sqrt(np.pi) * np.sum(self.weight * fraction * np.exp(-1j * k * self.path))
         )
 
 
@@ -48,9 +50,10 @@ def wave_number(frequency: float) -> float:
 def lit_points(
     tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0
 ) -> Quadrature:
-    """Points and weights for one pair of antennas; ``tx, rx (3,)`` in the axes of the ellipsoid, about its centre.
+    """Points and weights for antennas ``tx, rx (3,)`` in the axes of the ellipsoid.
 
-    ``frequency`` is the highest that the points have to serve, ``density`` multiplies their number along both coordinates.
+    ``frequency`` is the highest that the points must serve, and ``density`` multiplies their number
+    along both coordinates.
     """
     cap_t, cap_r = tx / semi_axes, rx / semi_axes
     pole, east, north = _axes_about(cap_t / np.linalg.norm(cap_t) + cap_r / np.linalg.norm(cap_r))
@@ -59,7 +62,7 @@ def lit_points(
         along, across = cap @ pole, np.cos(azimuth) * (cap @ east) + np.sin(azimuth) * (cap @ north)
         return np.arctan2(across, along) + np.arccos(1 / np.hypot(along, across))
 
-    # Phase that runs over the lit region decides how many points it takes.
+    # The range of the phase over the lit region determines the number of points.
     probe = np.linspace(0, 2 * np.pi, 97)[:-1]
     rim = np.minimum(border(probe, cap_t), border(probe, cap_r))
     mesh = rim[:, None] * np.linspace(0, 1, 49)
@@ -93,11 +96,12 @@ def lit_points(
 def specular_contribution(
     tx: Array, rx: Array, semi_axes: Array, frequency: float, *, density: float = 1.0
 ) -> complex:
-    """What the specular point alone adds to the integral, with all of its higher orders: PO without its terminator [m].
+    """Contribution of the specular point with all its higher orders: PO without its terminator [m].
 
-    The integral along each meridian from the specular point to the border is that down the valley of steepest descent from
-    the specular point less that from the border. The first is taken here, on a straight line into complex polar angles, the
-    second left out: it is the wave of the terminator, which physical optics invents.
+    The integral along each meridian from the specular point to the border is that along the path
+    of steepest descent from the specular point less that from the border. The first is computed
+    here, on a straight line into complex polar angles. The second is omitted: it is the wave of the
+    terminator, an artefact of physical optics.
     """
     k = wave_number(frequency)
     pole, east, north = _axes_about(_shortest(tx, rx, semi_axes))
@@ -126,7 +130,7 @@ def specular_contribution(
 
 
 def _shortest(tx: Array, rx: Array, semi_axes: Array) -> Array:
-    """Direction (3,) on the unit sphere of the point with the shortest path, by Newton's steps on differences."""
+    """Direction (3,) on the unit sphere of the point of the shortest path, by Newton's method."""
     pole = tx * semi_axes / np.linalg.norm(tx) + rx * semi_axes / np.linalg.norm(rx)
     for _ in range(50):
         centre, east, north = _axes_about(pole)
@@ -162,7 +166,7 @@ def _axes_about(direction: Array) -> tuple[Array, Array, Array]:
 
 
 def _density(unit: Any, tx: Array, rx: Array, semi_axes: Array) -> Any:
-    """Obliquity and spreading, times the area of a solid angle; ``unit`` may be complex."""
+    """Obliquity and spreading times the area of a solid angle; ``unit`` may be complex."""
     to_t, to_r = tx - unit * semi_axes, rx - unit * semi_axes
     range_t, range_r = (np.sqrt(np.sum(way * way, axis=-1)) for way in (to_t, to_r))
     normal = np.prod(semi_axes) * unit / semi_axes
@@ -178,7 +182,7 @@ def _points(polar: Any, azimuth: Array, pole: Array, east: Array, north: Array) 
 
 
 def _path(points: Any, tx: Array, rx: Array) -> Any:
-    # |T - p| - |T| without cancellation: what counts is a fraction of a wavelength, the antenna may be a kilometre away.
+    # |T - p| - |T| without cancellation: a fraction of a wavelength counts, a kilometre away.
     path = 0.0
     for antenna in (tx, rx):
         way = points - antenna
@@ -188,7 +192,7 @@ def _path(points: Any, tx: Array, rx: Array) -> Any:
 
 
 def _corners(cap_t: Array, cap_r: Array) -> Array | None:
-    """Where the borders of both caps meet, (2, 3) on the unit sphere: u.T' = u.R' = 1; None where they do not cross."""
+    """Where the borders of both caps meet, u.T' = u.R' = 1, (2, 3); None if they do not cross."""
     apart = cap_t - cap_r
     if np.linalg.norm(apart) < 1e-9 * np.linalg.norm(cap_t):
         return None

@@ -1,9 +1,11 @@
-"""Lengths of the specular paths of an empty box room, orders 0 to 2, against closed-form images and against Sionna RT.
+"""Lengths of the specular paths of an empty box room against closed-form images and Sionna RT.
 
-Closed form: in a box the images of a source make a lattice, so a path has the length of a vector to one of its points. Sionna RT
-(Apache 2.0, https://nvlabs.github.io/sionna) is an independent solver that traces in float32. It is no dependency: where
-`import sionna.rt` fails, one line says so and only the closed form is judged. To have it: ``pip install sionna-rt``, best
-beside the environment of rtradar, for it brings its own Mitsuba.
+Orders 0 to 2 are compared. Closed form: in a box the images of a source form a lattice, so a path
+has the length of a vector to one of its points. Sionna RT (Apache 2.0,
+https://nvlabs.github.io/sionna) is an independent solver that traces in float32. It is no
+dependency: where `import sionna.rt` fails, one line says so and only the closed form is judged. To
+install it: ``pip install sionna-rt``, best beside the environment of rtradar, because it brings its
+own Mitsuba.
 
     python validation/other_methods/sionna_paths.py [--quick] [--json FILE]
 """
@@ -32,7 +34,7 @@ ORDER = 2
 
 
 def ours(tx: Array, rx: Array) -> Array:
-    """Lengths of all valid paths from Tx to Rx [m]; the way out is the whole path, so Rx stands for the body."""
+    """Lengths of all valid paths from Tx to Rx [m]; the whole path is a way out, the body is Rx."""
     surface = Surface(material=material("concrete"), thickness_m=0.2)
     sides = dict.fromkeys(("near", "far", "right", "left", "floor", "ceiling"), surface)
     walls = room_walls(tuple(SIZE), tuple(CORNER[:2]), sides)
@@ -47,7 +49,7 @@ def ours(tx: Array, rx: Array) -> Array:
 
 
 def lattice(tx: Array, rx: Array) -> Array:
-    """Images at 2 n L + x and 2 n L - x along each axis: |2 n| and |2 n - 1| reflections."""
+    """Images at 2 n L + x and 2 n L - x along each axis, after |2 n| and |2 n - 1| reflections."""
     choices = []
     for axis in range(3):
         place, length = tx[axis] - CORNER[axis], SIZE[axis]
@@ -69,7 +71,7 @@ def sionna(pairs: list[tuple[Array, Array]]) -> list[Array] | None:
         import mitsuba as mi
         import sionna.rt as other
     except ImportError as error:
-        print(f"Sionna RT is left out: {error}; pip install sionna-rt brings it")
+        print(f"Sionna RT is skipped: {error}; 'pip install sionna-rt' installs it")
         return None
     scene = other.load_scene()
     middle = CORNER + SIZE / 2
@@ -111,7 +113,7 @@ def _rows(quick: bool) -> Iterator[Row]:
     mine, closed = [ours(*pair) for pair in pairs], [lattice(*pair) for pair in pairs]
     count = sum(len(lengths) for lengths in mine)
     lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, closed, strict=True))
-    says = "Specular paths of an empty box room, orders 0 to 2"
+    says = "specular paths of an empty box room, orders 0 to 2"
     yield judged(
         "box room",
         f"paths more or fewer than of the lattice, {count}",
@@ -136,7 +138,7 @@ def _rows(quick: bool) -> Iterator[Row]:
     if theirs is None:
         return
     lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, theirs, strict=True))
-    says = "Specular paths of an empty box room, to Sionna RT (float32)"
+    says = "specular paths of an empty box room, to Sionna RT (float32)"
     yield judged(
         "box room",
         f"paths more or fewer than of Sionna RT, {count}",

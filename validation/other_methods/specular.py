@@ -1,11 +1,12 @@
 """`specular` against closed forms far away and against physical optics near by.
 
-Far: one kilometre, over shape and aspect, against the cross-section of geometric optics.
-Near: 4 m, monostatic and for each pair of Tx and Rx at the corners of the array, against scalar physical optics by the
-convergent quadrature of ``physical_optics.py``, for every part of the body wherever k times the smaller radius of
-curvature at the specular point is 10 or more. Physical optics adds a wave from the terminator, about 1/(2k h) of the
-return with h the depth of the lit side, that no real body has, so single differences ripple and their rms counts. The
-same integral taken down the valley of steepest descent from the specular point has no terminator, and no ripple.
+Far: at one kilometre, over shape and aspect, against the cross-section of geometric optics.
+Near: at 4 m, monostatic and for each pair of Tx and Rx at the corners of the array, against scalar
+physical optics by the convergent quadrature of ``physical_optics.py``, for every part of the body
+for which k times the smaller radius of curvature at the specular point is 10 or more. Physical
+optics adds a wave from the terminator, about 1/(2k h) of the return with h the depth of the lit
+side, that no real body has, so single differences ripple and their rms is judged. The same integral
+along the path of steepest descent from the specular point has no terminator, and no ripple.
 
     python validation/other_methods/specular.py [--quick] [--json FILE]
 """
@@ -56,7 +57,7 @@ def body() -> rt.Body:
 
 
 def kind(part: str) -> str:
-    """Left is as right, and the torso is of three parts alike."""
+    """Kind of a part: left and right are alike, and so are the three parts of the torso."""
     return "torso" if "torso" in part else part.removeprefix("left ").removeprefix("right ")
 
 
@@ -79,12 +80,12 @@ def alone(axes: Array, frame: Array | None = None, centre: Array | None = None) 
 
 
 def directions(n: int, rng: np.random.Generator) -> Array:
-    """Random ones, and the three axes, where angles degenerate."""
+    """Random directions and the three axes, where angles degenerate."""
     random = rng.normal(size=(n, 3))
     return np.concatenate([np.eye(3), random / np.linalg.norm(random, axis=1, keepdims=True)])
 
 
-# -- far ------------------------------------------------------------------------------------------------------------
+# -- far -------------------------------------------------------------------------------------------
 
 
 def far_rows(quick: bool) -> Iterator[Row]:
@@ -105,7 +106,7 @@ def far_rows(quick: bool) -> Iterator[Row]:
                     rt.scattering_length(alone(axes), FAR_M * sight, FAR_M * sight, 14e9) / formula
                 )
             )
-        # 0.01 dB is what was asked. The bent wavefront takes 4.3 (R1 + R2) / R dB, so these keep R1 + R2 under 2 m.
+        # 0.01 dB was asked for. The bent wavefront takes 4.3 (R1 + R2) / R dB, so R1 + R2 < 2 m.
         most = float(np.abs(np.concatenate(errors)).max())
         rate = partial(judged, key="sphere") if name == "spheres" else judged
         says = "`specular` at 1 km against the closed form, over shape and aspect"
@@ -113,7 +114,7 @@ def far_rows(quick: bool) -> Iterator[Row]:
         yield rate(
             f"1 km, {name}", "worst |dB| to rcs.ellipsoid", "dB", most, 0.01, says=says, cases=cases
         )
-    # A needle of 12 m radius: there the formula itself is not far enough away, and the near field says by how much.
+    # A needle of 12 m radius: the far field begins farther away, and the near field says how much.
     needle = np.array([0.03, 0.03, 0.6])
     sight = np.array([[1.0, 0.0, 0.0]])
     ours = float(
@@ -127,7 +128,7 @@ def far_rows(quick: bool) -> Iterator[Row]:
         ours,
         reference=formula,
     )
-    # Exact by symmetry, so only rounding is left.
+    # Exact by symmetry, so that only rounding is left.
     near = float(10 * np.log10(near_field_section(needle, np.array([1.0, 0.0, 0.0]), FAR_M)))
     claim, says = (
         "1 km, needle of R = 12 m",
@@ -137,14 +138,14 @@ def far_rows(quick: bool) -> Iterator[Row]:
 
 
 def near_field_section(axes: Array, axis: Array, distance: float) -> float:
-    """Cross-section seen along a symmetry axis from ``distance`` to the centre: both wavefronts are bent, the path is shorter."""
+    """Cross-section along a symmetry axis at ``distance`` from the centre, for bent wavefronts."""
     to_surface = distance - float(np.abs(axis) @ axes)
     smaller, larger = rt.rcs.ellipsoid_radii(*axes, *angles(axis))
     gap = (distance / to_surface) ** 4
     return float(np.pi * gap / ((1 / smaller + 1 / to_surface) * (1 / larger + 1 / to_surface)))
 
 
-# -- near -----------------------------------------------------------------------------------------------------------
+# -- near ------------------------------------------------------------------------------------------
 
 
 def corner_pairs(radar: rt.Radar) -> list[tuple[Array, Array]]:
@@ -172,13 +173,13 @@ def pair_cases(radar: rt.Radar, n: int) -> Iterator[Case]:
     actor = body()
     for seed, (part, axes) in enumerate(zip(actor.part_names, actor.semi_axes, strict=True)):
         for draw, frame in enumerate(Rotation.random(n, random_state=100 + seed).as_matrix()):
-            # Pairs ripple alike, aspects do not: a new aspect for every pair.
+            # Pairs ripple alike, aspects do not: every pair gets a new aspect.
             tx, rx = corner_pairs(radar)[draw % 8]
             yield Case(kind(part), alone(axes, frame), tx - shift, rx - shift)
 
 
 def pose_cases(radar: rt.Radar, n: int) -> Iterator[Case]:
-    """The walk at several instants, each of the 21 parts alone, from where the radar stands."""
+    """The walk at several instants, each of the 21 parts alone, from the radar's position."""
     actor = body()
     for time in np.linspace(0.2, actor.duration_s - 0.2, n):
         pose = actor.ellipsoids(float(time))
@@ -190,7 +191,7 @@ def pose_cases(radar: rt.Radar, n: int) -> Iterator[Case]:
 
 
 class Comparison(NamedTuple):
-    """One case at one frequency: our field, PO's, and what PO's specular point alone gives."""
+    """One case at one frequency: our field, PO's, and that of PO's specular point alone."""
 
     part: str
     k_rho: float
@@ -245,8 +246,9 @@ def near_rows(quick: bool) -> Iterator[Row]:
                 np.array([getattr(c, name) for c in found])
                 for name in ("ours", "optics", "stationary")
             )
-            # 0.1 dB is what was asked, as an rms over all 21 parts and random aspects; nearly all that is found is PO's
-            # terminator. Neck, feet and hands alone exceed it, and so does the walk, whose aspects are few and alike.
+            # 0.1 dB was asked for, as an rms over all 21 parts and random aspects; nearly all that
+            # is left is PO's terminator. Neck, feet and hands alone exceed it, and so does the
+            # walk, whose aspects are few and alike.
             quantity, error = f"rms dB to PO, {len(found)} cases", rms(decibel(ours / optics))
             if view == "walk":
                 yield reported(claim, quantity, "dB", error)
@@ -256,10 +258,10 @@ def near_rows(quick: bool) -> Iterator[Row]:
                 )
                 yield judged(claim, quantity, "dB", error, 0.1, says=says, cases=len(found))
             yield reported(claim, "rms complex error to PO", "", rms(ours / optics - 1))
-            # Geometric optics is the first term; the second, 1/(2jk rho), turns the phase and leaves the size alone.
+            # Geometric optics is the first term; the second, 1/(2jk rho), only shifts the phase.
             error, says = (
                 rms(decibel(ours / stationary)),
-                "`specular` at 4 m against the specular point's part of physical optics, all parts: rms",
+                "`specular` at 4 m against the specular point in physical optics, all parts: rms",
             )
             yield judged(
                 claim,
@@ -278,7 +280,7 @@ def near_rows(quick: bool) -> Iterator[Row]:
 
 
 def broadside_rows(quick: bool) -> Iterator[Row]:
-    """How far the far-field formula is off at 4 m: each shape across its long axis, where limbs send most."""
+    """Error of the far-field formula at 4 m across the long axis, where limbs reflect most."""
     antenna = np.array([NEAR_M, 0.0, 0.0])
     for band, frequencies in {
         "12 GHz": np.linspace(12e9, 16e9, 5 if quick else 33),
@@ -286,7 +288,8 @@ def broadside_rows(quick: bool) -> Iterator[Row]:
     }.items():
         lacks = []
         for part, axes in shapes().items():
-            # As the model `analytic` has it: the formula's return, spread over the way to the surface and not to the centre.
+            # As in the model `analytic`: the formula's return, with the spreading of the path to
+            # the surface and not to the centre.
             formula = (
                 np.sqrt(rt.rcs.ellipsoid(*axes, np.pi / 2, 0.0))
                 * (NEAR_M / (NEAR_M - axes[0])) ** 2
@@ -300,9 +303,12 @@ def broadside_rows(quick: bool) -> Iterator[Row]:
                 10 * np.log10(np.mean(np.abs(field) ** 2) / formula**2) for field in (optics, ours)
             )
             lacks.append(lack)
-            # The mean over the sweep takes most of the terminator's ripple away: what stays is as for the single ones.
+            # The mean over the sweep removes most of the terminator's ripple.
             claim, quantity = f"4 m, {band}, {part}", "broadside over rcs.ellipsoid, ref. PO"
-            says = "near field at 4 m under the far-field formula by `specular`, broadside, against physical optics"
+            says = (
+                "near field at 4 m under the far-field formula by `specular`, broadside, "
+                "against physical optics"
+            )
             yield judged(claim, quantity, "dB", our_lack, 0.1, reference=lack, says=says)
         yield reported(
             f"4 m, {band}, all parts",
@@ -324,8 +330,8 @@ def part_rows(band: str, found: list[Comparison]) -> Iterator[Row]:
         yield reported(
             claim, f"rms dB to PO, {len(own)} cases, k rho from {least:.0f}", "dB", rms(optics)
         )
-        # What was asked for every part, from the part of PO that is no artefact of its terminator.
-        says = "`specular` at 4 m against the specular point's part of physical optics, part by part: rms"
+        # The limit asked for of every part, against PO without the artefact of its terminator.
+        says = "`specular` at 4 m against the specular point in physical optics, part by part: rms"
         yield judged(
             claim,
             "rms dB to PO's specular point",
@@ -338,7 +344,7 @@ def part_rows(band: str, found: list[Comparison]) -> Iterator[Row]:
 
 
 def convergence(frequency: float) -> Iterator[Row]:
-    """The reference against itself with 2.9 times the points, and against the sphere's closed form."""
+    """The reference against itself with 2.9 times the points, and against a sphere's form."""
     tx, rx = np.array([2.4, 1.2, 3.0]), np.array([2.6, 1.1, 2.8])
     whole, stationary = [], []
     for axes in shapes().values():
@@ -356,13 +362,14 @@ def convergence(frequency: float) -> Iterator[Row]:
     own = lit_points(far, far, np.full(3, radius), frequency).scattering_length(frequency)
     whole.append(abs(own / complex(rt.rcs.sphere(radius, frequency, "po")) - 1))
     own = specular_contribution(far, far, np.full(3, radius), frequency)
-    # PO of a sphere: sqrt(pi) a ((1 + j/2ka) exp(2jka) - j/2ka), and its last term is the terminator's.
+    # PO of a sphere: sqrt(pi) a ((1 + j/2ka) exp(2jka) - j/2ka); the last term is the terminator's.
     stationary.append(abs(own / (np.sqrt(np.pi) * radius * np.exp(2j * ka) * (1 + 0.5j / ka)) - 1))
     for name, errors in (("PO", whole), ("PO's specular point", stationary)):
-        # A thousandth of what is judged with it would do.
+        # A thousandth of the limits that it serves would suffice.
         claim = f"the reference, {frequency / 1e9:g} GHz"
         says, cases = (
-            "the judge: physical optics by quadrature, 2.9 times the points, and a sphere's closed form: change",
+            "the reference: physical optics by quadrature, 2.9 times the points, "
+            "and a sphere's closed form: change",
             len(errors),
         )
         yield judged(
@@ -376,7 +383,7 @@ def convergence(frequency: float) -> Iterator[Row]:
         )
 
 
-# -- laws -----------------------------------------------------------------------------------------------------------
+# -- symmetries ------------------------------------------------------------------------------------
 
 
 def law_rows(quick: bool) -> Iterator[Row]:
@@ -402,15 +409,15 @@ def law_rows(quick: bool) -> Iterator[Row]:
         )
         double = rt.scattering_length(alone(2 * axes, frame.as_matrix()), 2 * tx, 2 * rx, 7e9)
         scaled.append(np.abs(double / there / 2 - 1))
-    # 4 m are 1200 rad at 14 GHz and float64 keeps 2e-13 of them; the specular point is good to 1e-7 of a semi-axis.
+    # 4 m are 1200 rad at 14 GHz, of which float64 keeps 2e-13; the point has 1e-7 of an axis.
     for name, errors in (
         ("Tx and Rx swapped", swapped),
-        ("all moved and turned", moved),
+        ("all moved and rotated", moved),
         ("all twice as large", scaled),
     ):
         change, says = (
             np.concatenate(errors),
-            "`specular`: Tx and Rx swapped, all moved and turned, all twice as large: change",
+            "`specular`: Tx and Rx swapped, all moved and rotated, all twice as large: change",
         )
         yield judged("4 m, laws", name, "", float(change.max()), 1e-7, says=says, cases=len(change))
 
@@ -418,7 +425,7 @@ def law_rows(quick: bool) -> Iterator[Row]:
 def referred_to(
     place: Array, value: NDArray[np.complex128], tx: Array, rx: Array, frequency: float
 ) -> NDArray[np.complex128]:
-    """Scattering length referred to ``place`` instead of the origin of coordinates."""
+    """Scattering length with its phase relative to ``place`` instead of the origin."""
     old = [np.linalg.norm(antenna, axis=1) for antenna in (tx, rx)]
     new = [np.linalg.norm(antenna - place, axis=1) for antenna in (tx, rx)]
     phase = np.exp(1j * wave_number(frequency) * (sum(new) - sum(old)))

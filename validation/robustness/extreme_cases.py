@@ -163,7 +163,7 @@ def spectrum(radar: rt.Radar, body: Ball, fidelity: str = "analytic") -> Any:
     """Range-Doppler of one window of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
     # The model asks a body for its poses, its parts and its duration: this one has them.
-    echoes = build_model(fidelity, radar, body).echoes(chirps)  # type: ignore[arg-type]
+    echoes = build_model(fidelity, radar, body).echoes(chirps)
     return rt.process.range_doppler(
         rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar
     )

@@ -121,7 +121,7 @@ def _() -> str:
     k = 2 * np.pi * 12e9 / C
     ka = np.geomspace(0.01, 1e4, 31)
     for method in ("go", "po", "mie"):
-        assert np.isfinite(rt.rcs.sphere(ka / k, 12e9, method)).all()  # type: ignore[arg-type]
+        assert np.isfinite(rt.rcs.sphere(ka / k, 12e9, method)).all()
     small, large = (
         abs(complex(rt.rcs.sphere(x / k, 12e9, "mie"))) ** 2 / (np.pi * (x / k) ** 2)
         for x in (0.01, 1e4)
@@ -138,7 +138,7 @@ def _() -> str:
         field, said = warned(
             lambda fidelity=fidelity: rt.scattering_length(
                 alone(1e-4, 1e-4, 1e-4), [4.0, 0, 0], [4.0, 0, 0], 1e9, fidelity
-            ),  # type: ignore[misc]
+            ),
             "radius of curvature",
         )
         assert np.isfinite(field).all()
@@ -307,7 +307,7 @@ def _() -> str:
         said = refused(
             lambda fidelity=fidelity: rt.scattering_length(
                 ball, [0.1, 0, 0], [4.0, 0, 0], 12e9, fidelity
-            ),  # type: ignore[misc]
+            ),
             "is inside ellipsoid 0",
         )
     return said
@@ -357,10 +357,10 @@ def _() -> str:
         variant = None
 
         def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-            seen = build_model("analytic", radar, Ball()).echoes(chirps)  # type: ignore[arg-type]
+            seen = build_model("analytic", radar, Ball()).echoes(chirps)
             return dataclasses.replace(seen, amplitude=seen.amplitude * 0)
 
-    found, said = warned(lambda: survey(Silence(), radar, Ball(), 400), "nobody is visible")  # type: ignore[arg-type]
+    found, said = warned(lambda: survey(Silence(), radar, Ball(), 400), "nobody is visible")
     distance = float(np.linalg.norm(radar.position_m))
     assert not found.visible
     assert abs(found.power * distance**4 - 1) < 1e-12, found.power

@@ -406,9 +406,9 @@ class Tree:
         found = self.traced(test_file)
         for prefixes in wanted:
             seconds = {
-                name: float(about["seconds"])  # type: ignore[arg-type]
+                name: float(about["seconds"])
                 for name, about in found.items()
-                if any(call.startswith(prefixes) for call in about["calls"])  # type: ignore[attr-defined]
+                if any(call.startswith(prefixes) for call in about["calls"])
             }
             if seconds:
                 break

@@ -45,7 +45,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
     sys.settrace(_called)
     yield
     sys.settrace(None)
-    threading.settrace(None)  # type: ignore[arg-type]
+    threading.settrace(None)
     names = {
         f"{code.co_filename[len(ROOT) :]}::{code.co_qualname}"
         for code in _seen
@@ -58,7 +58,7 @@ def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     about = _found.setdefault(report.nodeid, {})
-    about["seconds"] = float(about.get("seconds", 0.0)) + report.duration  # type: ignore[arg-type]
+    about["seconds"] = float(about.get("seconds", 0.0)) + report.duration
     if report.when == "call":
         about["outcome"] = report.outcome
 
