@@ -1,14 +1,16 @@
-"""The model `auto` against its tolerance, frame by frame of four whole activities, and its cost against the fixed models.
+"""The model `auto` against its tolerance, frame by frame of four activities, and its cost.
 
-Frames of 100 ms follow each other over 3 s of each activity. Of each, the received spectrum H(f, t) is held against that of
-`reference` at the four corner channels of the y-line, at the first, middle and last frequency of the sweep, in 4 TDM cycles
-spread evenly over the frame: the power of the frame in decibels, and rms |H - Href| over rms |Href| of the whole activity.
-The cost of a way is reported as the time of echoes and IF samples of every third frame over that of `analytic` in the same run.
+Frames of 100 ms cover 3 s of each activity. The received spectrum H(f, t) of each is compared with
+that of `reference` at the four corner channels of the y-line, at the first, middle and last
+frequency of the sweep, in 4 TDM cycles spread evenly over the frame: the power of the frame in
+decibels, and rms |H - Href| over rms |Href| of the whole activity. The cost of a model is reported
+as the time of echoes and IF samples of every third frame over that of `analytic` in the same run.
 
-Judged is the time that a user waits for the range-Doppler-time cloud when asking for 0.5 dB, over that by the cheapest fixed
-level that keeps 0.5 dB on all activities: the whole chain from motion to that cloud, after warm-up, without angles, pictures and
-files. Both run in turn, `REPEATS` times each after one run of each that is not counted, and their medians are added up over
-the activities.
+Judged is the time in which a user gets the range-Doppler-time cloud with a tolerance of 0.5 dB,
+over that by the cheapest fixed level that keeps 0.5 dB on all activities: the whole chain from
+motion to that cloud, after warm-up, without angles, pictures and files. Both run in turn, `REPEATS`
+times each after one run of each that is not counted, and their medians are added up over the
+activities.
 
     python validation/cost/auto.py [--quick] [--json FILE]
 """
@@ -39,7 +41,7 @@ from ladder import FRAMES, spectrum
 DURATION_S = 3.0
 REPEATS = 5
 MOST = {"analytic": 1.15, "specular": 1.15, "fresnel": 1.0}
-"""Times that of a fixed level: where a cheap one is enough, finding that out may cost 15 %."""
+"""Limits, as multiples of a fixed level: to find that a cheap one suffices may cost 15 %."""
 LOOSE = {"tolerance_db": 0.5}
 CYCLES = 4
 FIXED = ("analytic", "specular", "fresnel")  # cheapest first
@@ -50,7 +52,7 @@ TOLERANCES: dict[str, tuple[dict[str, float], ...]] = {
         {"tolerance_complex": 0.2},
         {"tolerance_complex": 0.05},
     ),
-    "paper-77ghz": ({"tolerance_db": 0.5},),  # its facets take minutes
+    "paper-77ghz": ({"tolerance_db": 0.5},),  # others have facets, which take minutes
 }
 
 
@@ -123,11 +125,11 @@ def measure(quick: bool) -> list[Row]:
                         )
                     )
         if quick:
-            continue  # one activity does not tell which fixed model meets the tolerance on all
+            continue  # one activity does not show which fixed model meets the tolerance on all
         cheapest = next(fixed for fixed in FIXED if all(meets[fixed]))
         says = (
-            f"{name}, time to the cloud by `auto` at 0.5 dB over that by `{cheapest}`, the cheapest fixed level that keeps it, "
-            f"medians of {REPEATS} runs in turn"
+            f"{name}, time to the cloud by `auto` at 0.5 dB over that by `{cheapest}`, "
+            f"the cheapest fixed level that keeps it, medians of {REPEATS} runs in turn"
         )
         figure = (
             f"{name}, auto 0.5 dB over {cheapest}",
@@ -142,7 +144,7 @@ def measure(quick: bool) -> list[Row]:
 def _cost(
     fidelity: str, options: dict[str, Any], radar: rt.Radar, body: Body, n_frames: int
 ) -> float:
-    """Seconds of every third frame [s], by a new model, for models keep what they traced."""
+    """Seconds of every third frame [s], by a new model, because models keep what they traced."""
     seconds(build_model(fidelity, radar, body, **options), radar, 0)
     model = build_model(fidelity, radar, body, **options)
     return sum(
@@ -157,7 +159,7 @@ def to_cloud(
     repeats: int = REPEATS,
     duration_s: float = DURATION_S,
 ) -> float:
-    """Time of all activities to the cloud by one level, with its own options, over that by another."""
+    """Time of all activities to the cloud by one level, with its options, over that by another."""
     whole = {fidelity: 0.0, other: 0.0}
     for activity in FRAMES:
         motion = rt.synthetic_motion(activity, seed=0, duration_s=duration_s)

@@ -1,7 +1,8 @@
-"""What `physical-optics` costs over `analytic` from motion to cloud, for one frame of 100 ms of each activity, all 96 channels.
+"""The cost of `physical-optics` over `analytic` from motion to cloud, for one frame of 100 ms.
 
-Both are whole runs in this process, the best of some after warm-up; pictures and page, which are the same for both and take
-longer than all else, are left out, so that they do not hide what is compared.
+Both are whole runs with all 96 channels in this process, for each activity; the best of several
+after warm-up counts. Pictures and pages are the same for both and take longer than all else, so
+they are left out.
 
     python validation/cost/end_to_end.py [--quick] [--json FILE]
 """
@@ -17,14 +18,14 @@ from rtradar.validate import rows
 from rtradar.validate.rows import Row, main, reported
 
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
-START_S = 1.0  # where kicks and punches are on their way
+START_S = 1.0  # where kicks and punches are in motion
 REPEATS = 3
-MOST = 5.0  # what is asked for at 12 GHz
+MOST = 5.0  # the limit asked for at 12 GHz
 LEFT_OUT = ("pictures", "report", "view", "write")
 
 
 def seconds(motion: rt.Motion, radar: rt.Radar, fidelity: str, folder: str) -> float:
-    """Of all stages but pictures and files [s]."""
+    """Seconds of all stages but pictures and files [s]."""
     best = float("inf")
     for _ in range(REPEATS):
         found = rt.run(
@@ -56,7 +57,10 @@ def measure(quick: bool) -> list[Row]:
             found.append(reported(claim, "analytic, motion to cloud", "s", analytic))
             found.append(reported(claim, "physical-optics, motion to cloud", "s", optics))
             if name == "paper-12ghz":
-                says = "a frame of 100 ms at 12 GHz, motion to cloud: `physical-optics` over `analytic`"
+                says = (
+                    "a frame of 100 ms at 12 GHz, motion to cloud: "
+                    "`physical-optics` over `analytic`"
+                )
                 found.append(
                     rows.judged(
                         claim,

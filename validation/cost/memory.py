@@ -1,8 +1,10 @@
-"""Peak memory and seconds a stage of whole runs, each in a process of its own: short, long, starved; and of reading an hour.
+"""Peak memory and seconds of the stages of whole runs, and of reading a recording of an hour.
 
-Memory is to be below 3 GB at 77 GHz and not to grow with the recording. Seconds are reported: they are of this machine.
+Each run has a process of its own: short ones, long ones, and one whose threads get no processor.
+Memory must stay below 3 GB at 77 GHz and must not grow with the recording. Seconds are reported,
+because they depend on the machine.
 
-python validation/cost/memory.py [--quick] [--json FILE]
+    python validation/cost/memory.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -19,22 +21,23 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 LIMIT_MB = 3000.0
 
-# A recording waits in a file from 1 MB on: it takes at most 2 MB of some 400, as made and placed. Were the IF samples held, it
-# would be gigabytes. How the arrays of two threads come to lie in one heap is chance, which adds and never takes away: so what a
-# run needs is the least of a few.
+# From 1 MB on, a recording waits in a file: it takes at most 2 MB of some 400, as made and as
+# placed. If the IF samples were held, it would be gigabytes. How the arrays of two threads share a
+# heap is chance, which only adds, so the need of a run is the least of several.
 GROWTH = 1.01
 RUNS = 3
 
-# Ten times as long: held twice, the recording alone would add 45 MB to some 330, its survey 9. What may grow is the heap.
+# Ten times as long: held twice, the recording alone would add 45 MB to some 330, and the link
+# budget 9. Only the heap may grow.
 LONG_GROWTH = 1.03
 SMALL_RADAR = (
     "tx_y = 2\ntx_z = 0\nrx_y = 4\nrx_z = 0\nsamples_per_chirp = 128\nchirp_duration_s = 500e-6\n"
 )
 
-# What waits for a thread is to hold nothing: the blocks of the whole capture would else be there in the end.
+# What waits for a thread must hold nothing, or the blocks of the whole capture would pile up.
 STARVED_GROWTH = 1.02
 
-# Of some 90 MB, most of which is Python and its packages; an hour of 30 joints takes 400 MB as an array.
+# Of some 90 MB, most of which is Python and its packages; an hour of 30 joints takes 400 MB.
 READING_GROWTH = 1.05
 JOINTS, RATE_HZ = 30, 120
 
@@ -60,7 +63,7 @@ def summary(folder: str, radar: str, fidelity: str, duration_s: float) -> dict[s
 
 
 def long_runs(short_s: float, long_s: float) -> list[Row]:
-    """A radar of few channels, so that the recording is what there is much of."""
+    """A radar of few channels, so that the recording is the largest part of the data."""
     with tempfile.TemporaryDirectory() as folder:
         radar = Path(folder, "small.toml")
         radar.write_text(SMALL_RADAR)
@@ -92,7 +95,7 @@ def long_runs(short_s: float, long_s: float) -> list[Row]:
 
 
 def starved(duration_s: float) -> list[Row]:
-    """A run whose threads but one never wake, the worst that other work on the machine can do to it."""
+    """A run whose threads but one never get a processor, the worst that a busy machine can do."""
     peak = {}
     for awake in (True, False):
         with tempfile.TemporaryDirectory() as folder:
@@ -136,7 +139,8 @@ if not awake:
     threading.Thread(target=in_threads, args=(hold, range(thread_count())), daemon=True).start()
     taken.wait()
 try:
-    result = rt.run(synthetic_motion("walk", duration_s=duration_s), rt.Radar.preset("paper-12ghz"), out=out, fidelity="analytic")
+    motion, radar = synthetic_motion("walk", duration_s=duration_s), rt.Radar.preset("paper-12ghz")
+    result = rt.run(motion, radar, out=out, fidelity="analytic")
 finally:
     asleep.set()
 print(result.summary["peak_memory_mb"])

@@ -1,14 +1,17 @@
-"""The trade of speed for accuracy: what every model and every setting of its options costs, and how far it is from `reference`.
+"""Speed against accuracy: the cost of every model and option, and its distance from `reference`.
 
-Error is that of ``ladder.py``: the received spectrum H(f, t) of the corner channels over one frame of 100 ms, rms over rms, and
-the power of that frame. Cost is the time of echoes and IF samples of that frame, all channels, over that of `analytic` in the
-same run; each is first run a little, so that nothing is compiled, and is the best of some. `rays` and `reference`, which take
-minutes a frame, are timed on a part of it: `rays` on one Tx over the time between two anchors, `reference` on two TDM cycles.
+The error is that of ``ladder.py``: the received spectrum H(f, t) of the corner channels over one
+frame of 100 ms, rms over rms, and the power of that frame. The cost is the time of echoes and IF
+samples of that frame, all channels, over that of `analytic` in the same run; each first runs a
+little, so that nothing is compiled, and the best of several counts. `rays` and `reference`, which
+take minutes for a frame, are timed on a part of it: `rays` on one Tx over the time between two
+keyframes, `reference` on two TDM cycles.
 
-What is measured goes to ``--json FILE`` at once, and what is there is not measured again: to go on after a stop, or to add a
-line to `MODELS` or `OPTIONS`, run it again with the same file. ``--costs`` measures all costs anew, and keeps errors.
+Results go to ``--json FILE`` at once, and those in the file are not measured again: to continue
+after an interruption, or to add a line to `MODELS` or `OPTIONS`, run the script again with the same
+file. ``--costs`` measures all costs anew, and keeps the errors.
 
-    python validation/cost/trade.py --json FILE [--figure validation/cost/trade.png] [--costs] [--quick]
+    python validation/cost/trade.py --json FILE [--figure FILE] [--costs] [--quick]
 """
 
 from __future__ import annotations
@@ -36,7 +39,7 @@ sys.path.append(str(Path(__file__).resolve().parents[1] / "other_methods"))
 
 from ladder import FRAMES, PRESETS, Scene
 
-CHEAPEST = "analytic"  # all costs are over its
+CHEAPEST = "analytic"  # all costs are relative to it
 # In the order of the table; `reference` has a cost and no error.
 MODELS = (
     "analytic-paper",
@@ -48,12 +51,12 @@ MODELS = (
     "rays",
     "reference",
 )
-SLOW = ("rays", "reference")  # minutes a frame: after all others
+SLOW = ("rays", "reference")  # minutes for a frame: after all others
 
 
 @dataclass(frozen=True)
 class ModelOption:
-    """Settings of one option, from cheap to dear, for each radar; that which the model takes by itself is among them."""
+    """Values of one option, from cheap to expensive, for each radar; the default is among them."""
 
     fidelity: str
     name: str
@@ -103,7 +106,7 @@ MARKERS = {"walk": "o", "kick": "^", "punch": "s", "jumping_jack": "D"}
 
 @dataclass(frozen=True)
 class Setting:
-    """A model with its own options, or one of them turned."""
+    """A model with its default options, or with one of them changed."""
 
     fidelity: str
     option: str = ""
@@ -120,19 +123,19 @@ class Setting:
 
 @dataclass
 class Point:
-    """What one setting gave on one activity."""
+    """Result of one setting on one activity."""
 
     preset: str
     activity: str
     setting: str
-    error: float  # rms over rms; 0 of the reference
+    error: float  # rms over rms; 0 for the reference
     power_db: float
     seconds: float = 0.0  # of one frame
     cost: float = 0.0  # over that of `analytic`
 
 
 def settings_of(option: ModelOption, preset: str) -> list[tuple[float, Setting]]:
-    """Along an option, each with its value; where it stands by itself is the model as it is."""
+    """Settings along an option, each with its value; the default value is the model as it is."""
 
     def at(value: float) -> Setting:
         return (
@@ -155,11 +158,11 @@ def settings(preset: str, quick: bool) -> list[Setting]:
     return list(dict.fromkeys(found))
 
 
-# -- cost -----------------------------------------------------------------------------------------------------------
+# -- cost ------------------------------------------------------------------------------------------
 
 
 def seconds(model: EchoModel, radar: rt.Radar, first: int) -> float:
-    """Of echoes and IF samples of the frame that begins at this chirp."""
+    """Time of echoes and IF samples of the frame that begins at this chirp [s]."""
     step, end = 33 * radar.n_tx, first + radar.chirps_per_frame
     return sum(
         timed(model, radar, np.arange(begin, min(begin + step, end)))
@@ -175,7 +178,7 @@ def timed(model: EchoModel, radar: rt.Radar, chirps: NDArray[np.int64]) -> float
 
 
 def seconds_of(scene: Scene, setting: Setting) -> float:
-    """The same for a setting, by a model that has traced nothing of it yet; of those that take minutes, from a part of it."""
+    """Time of a frame by a new model that has traced nothing yet; of slow ones, from a part [s]."""
     radar, first = scene.radar, scene.first_chirp
     model = build_model(setting.fidelity, radar, scene.body, **setting.options)
     if setting.fidelity == "reference":
@@ -183,7 +186,7 @@ def seconds_of(scene: Scene, setting: Setting) -> float:
         timed(model, radar, chirps)
         return timed(model, radar, chirps + len(chirps)) * radar.cycles_per_frame / 2
     if setting.fidelity == "rays":
-        # From one anchor to the next, one of all Tx.
+        # One Tx, from one keyframe to the next.
         step = round(ANCHOR_S / radar.chirp_duration_s)
         begin = -(-first // step) * step
         before, chirps = (np.arange(at, at + step) for at in (begin, begin + step))
@@ -198,7 +201,7 @@ def seconds_of(scene: Scene, setting: Setting) -> float:
 
 
 def best_seconds(scene: Scene, setting: Setting) -> float:
-    """The best of some: of many where it takes a moment, of one where it takes long."""
+    """The best of several runs: of many where a run is short, of one where it is long."""
     found = [seconds_of(scene, setting)]
     began = time.perf_counter()
     while len(found) < 5 and time.perf_counter() - began < 4:
@@ -209,7 +212,7 @@ def best_seconds(scene: Scene, setting: Setting) -> float:
 def warm_up(scene: Scene, fidelity: str) -> None:
     """Compile what the model compiles."""
     if fidelity in SLOW:
-        return  # begun anyway
+        return  # it is compiled by its first run
     chirps = np.arange(scene.first_chirp, scene.first_chirp + scene.radar.n_tx)
     model = build_model(fidelity, scene.radar, scene.body)
     rt.signal.synthesize(
@@ -217,7 +220,7 @@ def warm_up(scene: Scene, fidelity: str) -> None:
     )
 
 
-# -- all of it ------------------------------------------------------------------------------------------------------
+# -- all of it -------------------------------------------------------------------------------------
 
 
 def read(path: Path | None) -> dict[tuple[str, str, str], Point]:
@@ -237,7 +240,7 @@ def write(path: Path | None, points: dict[tuple[str, str, str], Point]) -> None:
 def measure_points(
     scene: Scene, wanted: Sequence[Setting], points: dict[tuple[str, str, str], Point]
 ) -> Iterator[Point]:
-    """What is not there yet, one after the other."""
+    """Measure what is missing, one setting after the other."""
     base = None
     for setting in wanted:
         key = scene.preset, scene.activity, setting.label
@@ -253,7 +256,7 @@ def measure_points(
             )
             point = points[key] = Point(*key, error, power_db)
         if base is None:
-            # In this run, however little of it is left to do.
+            # In this run, however little is left to measure.
             warm_up(scene, CHEAPEST)
             base = best_seconds(scene, Setting(CHEAPEST))
         warm_up(scene, setting.fidelity)
@@ -262,11 +265,11 @@ def measure_points(
         yield point
 
 
-# -- table and figure -----------------------------------------------------------------------------------------------
+# -- table and figure ------------------------------------------------------------------------------
 
 
 def span(values: Sequence[float], form: str) -> str:
-    """Least to most, once where they read alike."""
+    """Least and largest value, or one where they look alike."""
     least, most = format(min(values), form), format(max(values), form)
     return least if least == most else f"{least} to {most}"
 
@@ -284,7 +287,7 @@ def figures(points: list[Point]) -> str:
 
 
 def table(points: dict[tuple[str, str, str], Point]) -> str:
-    """For docs/choosing-a-level.md: a line a model, then a line a setting of an option; from and to over the activities."""
+    """Table for docs/choosing-a-level.md: a line for each model, then one for each setting."""
     lines = [
         "| model | "
         + " | ".join(f"{name[6:8]} GHz: complex error | frame power | cost" for name in PRESETS)
@@ -319,7 +322,7 @@ def table(points: dict[tuple[str, str, str], Point]) -> str:
 
 
 def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
-    """Complex error over cost: a colour a model, a marker an activity, a line an option."""
+    """Complex error over cost: a colour for each model, a marker for each activity."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -363,7 +366,7 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
                     alpha=0.6,
                     zorder=2,
                 )
-                # The ends of the option, once.
+                # The ends of the option, each once.
                 if activity == "walk" and len(found) > 1:
                     for value, point in (found[0], found[-1]):
                         text = f"{1e3 * value:g} ms" if option.name == "anchor_s" else f"{value:g}"
@@ -426,12 +429,10 @@ def draw(points: dict[tuple[str, str, str], Point], path: Path) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--json",
-        type=Path,
-        help="points are kept there; those that it holds are not measured again",
+        "--json", type=Path, help="file of the results; those in it are not measured again"
     )
     parser.add_argument(
-        "--figure", type=Path, metavar="FILE", help="draw error over cost there, as PNG"
+        "--figure", type=Path, metavar="FILE", help="draw error over cost to this PNG file"
     )
     parser.add_argument("--costs", action="store_true", help="measure the cost of all points anew")
     parser.add_argument(
@@ -457,8 +458,9 @@ def main() -> int:
             for point in measure_points(scene, wanted, points):
                 write(options.json, points)
                 print(
-                    f"{time.perf_counter() - began:6.0f} s  {scene.preset}  {scene.activity:<13} {point.setting:<36} "
-                    f"{100 * point.error:7.2f} %  {point.power_db:+6.2f} dB  {point.seconds:9.3g} s  {point.cost:7.3g}",
+                    f"{time.perf_counter() - began:6.0f} s  {scene.preset}  {scene.activity:<13} "
+                    f"{point.setting:<36} {100 * point.error:7.2f} %  {point.power_db:+6.2f} dB  "
+                    f"{point.seconds:9.3g} s  {point.cost:7.3g}",
                     flush=True,
                 )
     print(table(points))

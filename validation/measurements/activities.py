@@ -1,14 +1,15 @@
-"""How well activities are told apart: the data sets and trainings of docs/classification.md, and what they gave.
+"""How well activities are classified: the data sets and trainings of docs/classification.md.
 
     python validation/measurements/activities.py OUT [--only NAME,NAME,...] [--list]
 
-Every step is one command of `rtradar` and goes on where it was stopped, so this may be killed and started again. All of it takes
-many hours on two cores; docs/classification.md has what came of it. Real recordings are those that the environment variable
-RTRADAR_MOCAP names.
+Every step is one command of `rtradar` and continues where it was interrupted, so this script may be
+killed and started again. All of it takes many hours on two cores; docs/classification.md has the
+results. Real recordings are those in the folder that RTRADAR_MOCAP names.
 
-Judged are the accuracies asked for (97 % by the paper's folds, 90 % by subject), and that what must be at chance is: clouds of
-noise alone, and how a cloud was made, may be above a quarter by what one time in a hundred is luck, no more. How clouds would be
-made is known before they are, so that is judged over eight data sets that differ in their seed.
+Two things are judged: the accuracies asked for (97 % by the paper's folds, 90 % by subject), and
+that noise alone and the way in which a cloud was made stay at chance. These may exceed a quarter
+only by what happens by luck one time in a hundred. How clouds will be made is known before they
+exist, so that is judged over eight data sets with different seeds.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ DATA = {
 TRAININGS = {
     **{f"lean-{size}": f"paper-400 --points {size}" for size in SIZES},
     "paper-1000": "paper-400 --recipe paper",
-    # One fold of each other size: ten take a day.
+    # One fold of each other size: ten folds take a day.
     **{
         f"paper-{size}": f"paper-400 --recipe paper --points {size} --fold 1"
         for size in SIZES
@@ -54,7 +55,9 @@ TRAININGS = {
     "paper-1000-unit-sphere": "paper-400 --recipe paper --scaling unit-sphere --fold 1",
     "paper-1000-turned": "paper-400 --recipe paper --augmentation turned --fold 1",
     "paper-1000-all-epochs": "paper-400 --recipe paper --all-epochs --fold 1",
-    "paper-1000-first-trial": "paper-400 --recipe paper --rate 1e-6 --epochs 40 --all-epochs --fold 1",
+    "paper-1000-first-trial": (
+        "paper-400 --recipe paper --rate 1e-6 --epochs 40 --all-epochs --fold 1"
+    ),
     "subject": "paper-400 --split subject",
     "recorded": "paper-400 real --split recorded",
     "real": "real --split recording --folds 2",
@@ -94,7 +97,7 @@ AT_CHANCE = {
 
 
 def commands(out: Path) -> dict[str, list[str]]:
-    """Words of every step's command, by the name of the step."""
+    """Words of the command of every step, by the name of the step."""
     steps = {
         f"data/{name}": [
             "dataset",
@@ -112,7 +115,7 @@ def commands(out: Path) -> dict[str, list[str]]:
 
 
 class Planned:
-    """Clouds that are not made yet, of which only their provenance is known."""
+    """Clouds that do not exist yet, of which only the provenance is known."""
 
     def __init__(self, spec: Spec) -> None:
         self._recipes = plan_samples(spec)
@@ -129,7 +132,7 @@ class Planned:
 
 
 def by_metadata() -> list[str]:
-    """How well a forest does that is only told how clouds would be made: what is wrong with it, in words."""
+    """Faults of the accuracy of a forest that sees only how the clouds would be made."""
     spec = read_spec(DATA_SETS / "paper_400.toml")
     shares, answers = [], 0
     for seed in range(8):
@@ -145,13 +148,14 @@ def by_metadata() -> list[str]:
         )
         answers += len(planned)
     print(
-        f"\nmetadata alone, eight seeds of the 400: {np.mean(shares):.1%}, from {min(shares):.1%} to {max(shares):.1%}"
+        f"\nmetadata alone, eight seeds of the 400: {np.mean(shares):.1%}, "
+        f"from {min(shares):.1%} to {max(shares):.1%}"
     )
     return judged("metadata", "random forest", float(np.mean(shares)), answers)
 
 
 def evaluate(out: Path) -> list[str]:
-    """Tables and pictures of all that is trained; what was asked for and missed is returned."""
+    """Print tables and draw pictures of all trainings; return the accuracies that were missed."""
     missed = by_metadata()
     for name, trainings in SHOWN.items():
         there = [out / "trained" / one for one in trainings]
@@ -174,18 +178,20 @@ def evaluate(out: Path) -> list[str]:
 
 
 def wandering(out: Path) -> None:
-    """Print what the last epochs of the paper's 200 change, of which those after the 70th hardly move a weight."""
+    """Print the last epochs of the paper's 200, of which those after the 70th change little."""
     path = out / "trained" / "paper-1000-all-epochs" / "training-01" / "outcome.json"
     if path.exists():
         history = json.loads(path.read_text())["history"]
         print(
-            "\n200 epochs of one fold: epochs, loss and accuracy of the clouds it learns from, accuracy of test clouds"
+            "\n200 epochs of one fold: epochs, loss and accuracy of the training clouds, "
+            "accuracy of the test clouds"
         )
         for first, last in ((51, 60), (61, 70), (71, 100), (101, 150), (151, 200)):
             rows = history[first - 1 : last]
             loss, learning, test = (np.array([row[name] for row in rows]) for name in _WATCHED)
             print(
-                f"{first} to {last}: {loss.mean():.2f}, {learning.mean():.1%}, {test.mean():.1%} +- {test.std():.1%}"
+                f"{first} to {last}: {loss.mean():.2f}, {learning.mean():.1%}, "
+                f"{test.mean():.1%} +- {test.std():.1%}"
             )
 
 
@@ -193,7 +199,7 @@ _WATCHED = ("train_loss", "train_accuracy", "test_accuracy")
 
 
 def judged(name: str, title: str, accuracy: float, answers: int) -> list[str]:
-    """What is wrong with an accuracy, in words."""
+    """Faults of an accuracy, in words."""
     least = next(
         (
             share
@@ -210,7 +216,8 @@ def judged(name: str, title: str, accuracy: float, answers: int) -> list[str]:
         )  # 2.33: the 99th percentile of a normal distribution
         if accuracy > most:
             return [
-                f"{name}, {title}: {accuracy:.1%} of {answers} answers is more than chance ({most:.1%})"
+                f"{name}, {title}: {accuracy:.1%} of {answers} answers "
+                f"is more than chance ({most:.1%})"
             ]
     return []
 
@@ -218,21 +225,19 @@ def judged(name: str, title: str, accuracy: float, answers: int) -> list[str]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "out", type=Path, metavar="OUT", help="folder for clouds, trainings and tables"
+        "out", type=Path, metavar="OUT", help="folder for the clouds, trainings and tables"
     )
     parser.add_argument(
         "--only",
         metavar="A,B,...",
-        help="these steps only (see --list); tables are made of all that is there",
+        help="run only these steps (see --list); tables are made of all that exists",
     )
-    parser.add_argument(
-        "--list", action="store_true", help="say what would be run, and run nothing"
-    )
+    parser.add_argument("--list", action="store_true", help="print the steps without running them")
     options = parser.parse_args()
     steps = commands(options.out)
     names = list(steps) if options.only is None else options.only.split(",")
     if unknown := [name for name in names if name and name not in steps]:
-        parser.error(f"no step '{unknown[0]}'; there are {', '.join(steps)}")
+        parser.error(f"there is no step '{unknown[0]}'; the steps are {', '.join(steps)}")
     for name in filter(None, names):
         words = [*RTRADAR, *steps[name]]
         print(f"{name}: {shlex.join(words)}", flush=True)
@@ -241,7 +246,7 @@ def main() -> int:
     if options.list:
         return 0
     missed = evaluate(options.out)
-    print("\n".join(["", *missed]) if missed else "\nall that is judged is kept")
+    print("\n".join(["", *missed]) if missed else "\nall limits are kept")
     return int(bool(missed))
 
 

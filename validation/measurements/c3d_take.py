@@ -1,16 +1,18 @@
-"""The take that exists as C3D and as AMC, CMU 135_02: how far apart the joints are that both give, joint by joint.
+"""The take that exists as C3D and as AMC, CMU 135_02: the distance between the joints of both.
 
-The offsets of `rtradar.motion.formats.markers` were set by the first half of the take; only the second half is judged, frame k
-beside frame k. It is the same person: how well the offsets fit others is not measured here. The median of each joint must stay
-within 6 cm; beside it stand the distance that 99 % of the frames keep, the largest, the frame of that, and the share beyond 6
-cm.
+The offsets of `rtradar.motion.formats.markers` were fitted to the first half of the take; only the
+second half is judged, frame by frame. It is the same person, so how well the offsets fit others is
+not measured here. The median of each joint must stay within 6 cm. The distance that 99 % of the
+frames keep, the largest distance with its frame, and the fraction beyond 6 cm are reported.
 
-Two reasons are measured. How far the AMC's joint is, in the median, from the one point that fits it best in the axes of three
-markers of its segment ("rigid"): no point fixed to the markers can be nearer. And how far the knee is bent, in all frames and
-where it is beyond; and the largest acceleration of a hand in the AMC and of its marker: a jump of one frame.
+Two causes are measured. One is the median distance of the AMC's joint from the one point that fits
+it best in the axes of three markers of its segment ("rigid"): no point that is fixed to the markers
+can be nearer. The other is how far the knee is bent, in all frames and in those beyond the limit;
+and the largest acceleration of a hand in the AMC and of its marker, which shows jumps of one frame.
 
-Then markers are taken away for 0.1 s, one at a time, and bridged: how far off the bridge is. Last, without --quick, both go
-through radar and detector: the distance of their RDT clouds of a kick, in bins, beside that of two samplings of one of them.
+Then markers are removed for 0.1 s, one at a time, and the error of the interpolation is measured.
+Last, without --quick, both go through radar and detector: the distance of their RDT clouds of a
+kick, in bins, beside that of two samplings of one of them.
 
     RTRADAR_MOCAP=/path/to/mocap python validation/measurements/c3d_take.py [--quick] [--json FILE]
 """
@@ -34,7 +36,7 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 LIMIT_CM = 6.0
 
-# Three markers of the segment that a joint moves with; of the left side where there are two.
+# Three markers of the segment to which a joint belongs; on the left side where there are two.
 SEGMENTS = {
     "root": "LFWT RFWT LBWT",
     "hip": "LFWT RFWT LBWT",
@@ -56,7 +58,7 @@ SEGMENTS = {
 def folder() -> Path:
     named = os.environ.get("RTRADAR_MOCAP")
     if not named:
-        raise SystemExit("set RTRADAR_MOCAP to the folder of real recordings")
+        raise SystemExit("RTRADAR_MOCAP is not set: it names the folder of real recordings")
     return Path(named) / "cmu"
 
 
@@ -66,7 +68,7 @@ def rigid(
     b: NDArray[np.float64],
     c: NDArray[np.float64],
 ) -> float:
-    """Median distance [cm] of points (frame, 3) from their median place in the axes of three markers."""
+    """Median distance [cm] of points (frame, 3) from their median position in markers' axes."""
     x = (b - a) / np.linalg.norm(b - a, axis=1, keepdims=True)
     z = np.cross(x, c - a)
     z /= np.linalg.norm(z, axis=1, keepdims=True)
@@ -75,7 +77,7 @@ def rigid(
 
 
 def segment_of(node: str) -> list[str]:
-    """Three markers of the segment that a node moves with."""
+    """Three markers of the segment to which a node belongs."""
     names = SEGMENTS[node[2:] if node[1] == "_" else node].split()
     on_the_left = node.startswith("r_") and all(name[0] == "L" for name in names)
     return [f"R{name[1:]}" if on_the_left else name for name in names]
@@ -102,7 +104,7 @@ def joints(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
             ),
             reported(
                 node,
-                f"share beyond {LIMIT_CM:g} cm",
+                f"fraction beyond {LIMIT_CM:g} cm",
                 "%",
                 float((distance > LIMIT_CM).mean()) * 100,
             ),
@@ -134,7 +136,7 @@ def reasons(take: Path, amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
             rows.append(
                 reported(
                     f"{key}_knee",
-                    "bend where beyond, median",
+                    "bend in frames beyond it, median",
                     "deg",
                     float(np.median(bend[beyond])),
                 )
@@ -186,7 +188,7 @@ def clouds(amc: rt.Motion, c3d: rt.Motion) -> list[Row]:
     found = {}
     for name, motion, seed in (("AMC", amc, 0), ("C3D", c3d, 0), ("AMC again", amc, 1)):
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", rt.ValidityWarning)  # feet that pass 7 m/s
+            warnings.simplefilter("ignore", rt.ValidityWarning)  # feet faster than 7 m/s
             found[name] = clouds_of(motion, radar, start_s=11.0, duration_s=1.5, seed=seed)[
                 0
             ].rdt.points

@@ -1,16 +1,18 @@
-"""How well does each way of interpolating rotations meet frames that it was not shown?
+"""How well each method of interpolating rotations predicts frames that were left out.
 
-Every second frame of each real recording is left out (120 Hz to 60 Hz, BVH 30 Hz to 15 Hz), the rest interpolated, the
-left-out frames compared: rotation error of every bone [deg], position error of every joint with the true root [mm],
-both rms and maximum, over recordings. Then two dangers: the largest step of angular velocity at a frame relative to
-the typical angular acceleration over one frame (smoothness; slerp steps there), and what one spike of a single frame
-does to its neighbours. Last, what smooth motion becomes on a radar: a limb of 0.8 m that swings 1.5 rad at 2 Hz and a
-root that bobs 2 cm at 2 Hz, both sampled at 120 Hz: their position error, as phase of a 77 GHz echo relative to a
-carrier of 0 dB. All of that phase repeats with the frames, so it is the power of false Doppler lines.
+Every second frame of each real recording is left out (120 Hz to 60 Hz, BVH 30 Hz to 15 Hz), the
+rest is interpolated, and the frames left out are compared: rotation error of every bone [deg] and
+position error of every joint with the true root [mm], both as rms and maximum, over recordings.
+Two dangers follow: the largest step of angular velocity at a frame relative to the typical change
+over one frame (smoothness; slerp has steps there), and the effect of a spike of a single frame on
+its neighbours. Last, the effect on smooth motion as a radar sees it: a limb of 0.8 m that swings
+1.5 rad at 2 Hz and a root that moves up and down by 2 cm at 2 Hz, both sampled at 120 Hz. Their
+position error is the phase of a 77 GHz echo relative to a carrier of 0 dB. All of that phase
+repeats with the frames, so it is the power of false Doppler lines.
 
-Without RTRADAR_MOCAP, the folder of recordings, only the last two are told.
+Without RTRADAR_MOCAP, the folder of recordings, only the last two are measured.
 
-    RTRADAR_MOCAP=/path/to/mocap python validation/measurements/interpolation.py [--quick] [--json FILE]
+    RTRADAR_MOCAP=folder python validation/measurements/interpolation.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
@@ -82,7 +84,7 @@ METHODS: dict[str, Method] = {
 
 
 def angle_deg(first: Array, second: Array) -> Array:
-    """Angle between rotations (..., 4) [deg]; through the chord, exact for small angles."""
+    """Angle between rotations (..., 4) [deg], from the chord, which is exact for small angles."""
     chord = np.minimum(
         np.linalg.norm(first - second, axis=-1), np.linalg.norm(first + second, axis=-1)
     )
@@ -90,7 +92,7 @@ def angle_deg(first: Array, second: Array) -> Array:
 
 
 def place(motion: Motion, quaternions: Array) -> Array:
-    """Joints relative to the root (frame, joint, 3) [m]."""
+    """Positions of the joints relative to the root (frame, joint, 3) [m]."""
     places = quaternion_rotate(quaternions, motion.offsets)
     places[:, 0] = 0.0
     for joint, parent in enumerate(motion.parents[1:], start=1):
@@ -99,7 +101,7 @@ def place(motion: Motion, quaternions: Array) -> Array:
 
 
 def held_out(motion: Motion, method: Method) -> tuple[Array, Array]:
-    """Rotation errors [deg] and position errors [mm] at the left-out frames."""
+    """Rotation errors [deg] and position errors [mm] at the frames left out."""
     keep = motion.rotations[::2]
     times = np.arange(len(keep)) * 2.0
     at = np.arange(1.0, times[-1], 2.0)
@@ -111,7 +113,7 @@ def held_out(motion: Motion, method: Method) -> tuple[Array, Array]:
 
 
 def velocity_step(motion: Motion, method: Method) -> float:
-    """RMS step of the angular velocity across a frame, in units of its rms change over one frame interval."""
+    """Rms step of the angular velocity at a frame, over its rms change in one frame interval."""
     times = np.arange(len(motion.rotations), dtype=np.float64)
     inner = times[2:-2]
     d = 1e-4
@@ -129,7 +131,7 @@ def velocity_step(motion: Motion, method: Method) -> float:
 
 
 def spike_reach(method: Method) -> Array:
-    """A still bone with one frame turned by 60 deg: largest angle [deg] in the 1st to 4th interval beside the spike."""
+    """Largest angle [deg] in intervals 1 to 4 beside a spike of 60 deg in one frame of a bone."""
     rotations = np.tile([0.0, 0.0, 0.0, 1.0], (41, 1, 1))
     rotations[20, 0] = Rotation.from_euler("x", 60, degrees=True).as_quat()
     times = np.arange(41.0)
@@ -141,7 +143,7 @@ def spike_reach(method: Method) -> Array:
 
 
 def error_db(error_m: Array) -> float:
-    """RMS phase that a range error makes on a 77 GHz echo, in dB of its carrier."""
+    """Rms phase that a range error causes on a 77 GHz echo, in dB of its carrier."""
     wavenumber = 2 * np.pi * 77e9 / SPEED_OF_LIGHT_MPS
     return float(20 * np.log10(np.sqrt(np.mean((2 * wavenumber * error_m) ** 2))))
 
@@ -163,7 +165,7 @@ def smooth_limb(method: Method) -> float:
 
 
 def smooth_root(spline: Callable[[Array, Array], Callable[[Array], Array]]) -> float:
-    """False Doppler power [dB] of a bobbing root seen from above."""
+    """False Doppler power [dB] of a root that moves up and down, seen from above."""
     times, at = np.arange(241) / 120, np.linspace(0.1, 1.9, 20001)
     return error_db(
         spline(times, 0.01 * np.sin(4 * np.pi * times))(at) - 0.01 * np.sin(4 * np.pi * at)
@@ -225,6 +227,4 @@ def measure(quick: bool) -> list[Row]:
 
 
 if __name__ == "__main__":
-    sys.exit(
-        main("How well interpolation of rotations meets frames that it was not shown.", measure)
-    )
+    sys.exit(main("How well interpolation of rotations predicts frames left out.", measure))

@@ -1,6 +1,6 @@
-"""Real recordings through the whole chain: both models, both radars; a table of what came out.
+"""Real recordings through the whole chain, with two models and both radars; prints a table.
 
-RTRADAR_MOCAP=folder python validation/measurements/recordings.py --out out/recordings [--radar paper-12ghz] [--only cmu]
+RTRADAR_MOCAP=folder python validation/measurements/recordings.py [--out out/recordings]
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ def main() -> None:
     options = parser.parse_args()
     folder = os.environ.get("RTRADAR_MOCAP")
     if not folder:
-        raise SystemExit("set RTRADAR_MOCAP to the folder of real recordings")
+        raise SystemExit("RTRADAR_MOCAP is not set: it names the folder of real recordings")
     print(
         f"{'recording':34} {'activity':14} {'radar':12} {'model':9} {'points':>6} "
         f"{'detections':>10} {'wall s':>7} {'capture s':>9} {'MB':>6}"
@@ -58,7 +58,8 @@ def main() -> None:
                     )
                 said = result.summary
                 print(
-                    f"{path.stem[:34]:34} {activity:14} {radar:12} {fidelity:9} {said['rdt_points']:6} {said['detections']:10} "
+                    f"{path.stem[:34]:34} {activity:14} {radar:12} {fidelity:9} "
+                    f"{said['rdt_points']:6} {said['detections']:10} "
                     f"{said['wall_s']:7.1f} {said['capture_s']:9.2f} {said['peak_memory_mb']:6.0f} "
                     + "; ".join(str(warning.message) for warning in caught),
                     flush=True,

@@ -399,16 +399,16 @@ class Both:
     """The tracer's answers, with a count of those that the closed form contradicts."""
 
     def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
-        self._tracer, self._judge, self.lines, self.different = tracer, judge, 0, 0
+        self._tracer, self._reference, self.lines, self.different = tracer, reference, 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
         self._tracer.pose(centres, frames)
-        self._judge.pose(centres, frames)
+        self._reference.pose(centres, frames)
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         seen = self._tracer.sees(origins, targets, own)
         self.lines += len(seen)
-        self.different += int((seen != self._judge.sees(origins, targets, own)).sum())
+        self.different += int((seen != self._reference.sees(origins, targets, own)).sum())
         return seen
 
 
