@@ -1,4 +1,4 @@
-"""README's picture: a synthetic walk, its ellipsoids before the radar, and what both models make of it.
+"""Picture of the README: a synthetic walk, its ellipsoids before the radar, and its maps.
 
 python validation/picture.py [--out validation/picture.png]
 """

@@ -178,19 +178,22 @@ def room_rows(name: str) -> Iterator[Row]:
         claim = f"{name}, {label}"
         alone = by_package(method, still, radar, options)
         says = "clutter removal: residual of a static room alone, over its strongest cell"
-        quantity = "left of a still room alone, of its strongest cell"
+        quantity = "residual of the room alone, over its strongest cell"
         yield judged(claim, quantity, "", abs(alone).max() / strongest, 0.0, says=says)
         ours = spectra_of(by_package(method, still + moving, radar, options))
         expected = spectra_of(by_hand(method, truth, radar, **options))
         left_db = 20 * math.log10(abs(ours - expected).max() / strongest)
-        quantity = f"left of a room {ROOM_DB:g} dB above the movers, of its strongest cell"
+        room = f"a room {ROOM_DB:g} dB above the moving points"
+        quantity = f"residual of {room}, over its strongest cell"
         yield judged(
             claim, quantity, "dB", left_db, MOST_LEFT_DB, says=f"clutter removal: {quantity}"
         )
         kept_db = 20 * math.log10(
             abs(expected).max() / abs(spectra_of(truth[-radar.cycles_per_frame :])).max()
         )
-        yield reported(claim, "strongest cell of the movers, after over before", "dB", kept_db)
+        yield reported(
+            claim, "strongest cell of the moving points, after over before", "dB", kept_db
+        )
 
 
 def response_rows(name: str) -> Iterator[Row]:

@@ -1,8 +1,10 @@
-"""Data sets that are killed while they are built: nothing lost, nothing twice, the same bytes as of an undisturbed build.
+"""Data sets that are killed while they are built: no sample is lost, made twice, or different.
 
-A worker is killed by signal 9; the whole build is; the scheduler of a cluster is; the disk is full (a tmpfs of a few samples
-where one can be mounted, else a limit on the size of files); a sample is cut short. After each the same command runs again, and
-what is there then is held against an undisturbed build, byte by byte. Last, the throughput of two workers against one.
+Five things happen to a build: a worker is killed by signal 9; the whole build is; the scheduler of
+a cluster is; the disk is full (a tmpfs of a few samples where one can be mounted, else a limit on
+the size of files); and a sample is cut short. After each the same command runs again, and the
+result is compared with an undisturbed build, byte by byte. Last, the throughput of two workers is
+measured against that of one.
 
     python validation/robustness/campaign_kills.py [--quick] [--json FILE]
 """
@@ -56,11 +58,11 @@ heading_deg = [-30, 30]
 """
 RTRADAR = [sys.executable, "-m", "rtradar", "dataset", "build"]
 PATIENCE_S = 600.0
-SAMPLE_BYTES = 60_000  # less than any sample has
+SAMPLE_BYTES = 60_000  # fewer than any sample has
 
 
 class Trial:
-    """A data set that is built again and again, each time into a folder of its own, and disturbed."""
+    """A data set that is built again and again, each time in a folder of its own, and disturbed."""
 
     def __init__(self, work: Path, samples: int, seconds: float, fidelity: str) -> None:
         self.work, self.samples = work, samples
@@ -82,7 +84,7 @@ class Trial:
         )
 
     def finish(self, out: Path, *options: str) -> tuple[int, str, dict[str, float]]:
-        """A whole build: exit status, what it said on stderr, its report."""
+        """Run a whole build; return its exit status, its text on stderr, and its report."""
         report = self.work / "report.json"
         report.unlink(missing_ok=True)
         process = self.start(out, *(options or ("--workers", "2")), "--json", str(report))
@@ -90,7 +92,7 @@ class Trial:
         return process.returncode, said, json.loads(report.read_text()) if report.exists() else {}
 
     def wait_for(self, out: Path, count: int, process: subprocess.Popen[str]) -> set[str]:
-        """Until some samples are there; their names."""
+        """Wait until some samples exist, and return their names."""
         while process.poll() is None:
             there = {path.name for path in out.glob("[!.]*.npz")}
             if len(there) >= count:
@@ -101,13 +103,13 @@ class Trial:
         )
 
     def rows(self, claim: str, out: Path, stamps: dict[str, int], made: float) -> list[Row]:
-        """What a build that was disturbed and built on is worth; ``stamps`` of the samples that were there before."""
+        """Rows of a disturbed build that was continued; ``stamps`` are of the earlier samples."""
         found = contents(out)
         lost = [name for name in self.undisturbed if name not in found]
         differs = [name for name in found if found[name] != self.undisturbed.get(name)]
         again = [name for name, stamp in stamps.items() if (out / name).stat().st_mtime_ns != stamp]
         wrong = abs(made - (self.samples - len(stamps)))
-        says = "a data set killed while it is built, and built on: "
+        says = "a data set killed while it is built, and continued: "
         return [
             judged(
                 claim,
@@ -134,7 +136,7 @@ class Trial:
                 0,
                 says=says + "whole samples made twice",
             ),
-            reported(claim, "samples there when it went on", "1", len(stamps)),
+            reported(claim, "samples that existed when it continued", "1", len(stamps)),
         ]
 
 
@@ -143,7 +145,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 def whole(out: Path) -> dict[str, int]:
-    """Samples that are there and whole, and when they were written."""
+    """Samples that exist and are whole, with the time at which they were written."""
     return {path.name: path.stat().st_mtime_ns for path in out.glob("[!.]*.npz") if is_whole(path)}
 
 
@@ -156,7 +158,7 @@ def one_line(claim: str, said: str, status: int, expected: int) -> list[Row]:
             "1",
             abs(len(lines) - 1),
             0,
-            says="a build that fails says one line",
+            says="a build that fails prints one line",
         ),
         judged(
             claim,
@@ -263,7 +265,7 @@ def scheduler_killed(trial: Trial, out: Path) -> list[Row]:
 
 @contextmanager
 def little_room(out: Path, size: int) -> Iterator[tuple[str, Callable[[], None]]]:
-    """A folder with room for ``size`` bytes, where it can be had: its kind, and what gives it more."""
+    """Make room for ``size`` bytes: yield a folder, the kind of limit, and a call that lifts it."""
     out.mkdir()
     mounted = subprocess.run(
         ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", str(out)],
@@ -337,7 +339,7 @@ def sample_cut(trial: Trial, out: Path) -> list[Row]:
 
 
 def throughput(work: Path, samples: int, seconds: float) -> list[Row]:
-    """Samples a second once every worker has made its first, at 12 GHz with all channels."""
+    """Samples per second at 12 GHz with all channels, once every worker has made its first."""
     spec = work / "speed.toml"
     spec.write_text(
         SPEC.format(seconds=seconds, radar="paper-12ghz", fidelity="specular", half=samples // 2)

@@ -1,4 +1,4 @@
-"""How far apart the RDT clouds of two seeds of one run are: what is left when nothing but noise and sampling differ.
+"""Distance between the RDT clouds of two seeds of one run, which differ by noise and sampling.
 
 python validation/robustness/cloud_sampling.py [--quick] [--json FILE]
 """

@@ -1,4 +1,4 @@
-"""What an extreme case is, and what cases share: small radars and bodies, closed forms, and ways to be refused or warned."""
+"""Extreme cases and what they share: small radars and bodies, closed forms, refusals, warnings."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ BESIDE = np.array([0.0, 0.1, 0.0])
 
 
 class Case(NamedTuple):
-    """One extreme; ``run`` gives back what it got, and raises AssertionError where that is wrong."""
+    """One extreme; ``run`` returns what it found, and raises AssertionError where that is wrong."""
 
     name: str
     expected: str
@@ -36,7 +36,7 @@ class Case(NamedTuple):
 
 
 def collector() -> tuple[list[Case], Callable[..., Any]]:
-    """A list of cases, and the decorator that adds a function to it by its name and what is expected of it."""
+    """A list of cases, and the decorator that adds a function with its name and expectation."""
     cases: list[Case] = []
 
     def case(
@@ -52,7 +52,7 @@ def collector() -> tuple[list[Case], Callable[..., Any]]:
 
 
 def refused(work: Callable[[], object], words: str) -> str:
-    """The message of the refusal, which must be one line that holds ``words``, a regular expression."""
+    """Message of the refusal, which must be one line that matches ``words``."""
     try:
         found = work()
     except rt.InputError as error:
@@ -64,7 +64,7 @@ def refused(work: Callable[[], object], words: str) -> str:
 
 
 def warned(work: Callable[[], Any], words: str) -> tuple[Any, str]:
-    """What it gave, and the warning that holds ``words``."""
+    """Result of a call, and its warning that matches ``words``."""
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         found = work()
@@ -89,7 +89,7 @@ def together(*targets: rt.Ellipsoids) -> rt.Ellipsoids:
 def along_axis(
     half_length: float, radii: tuple[float, float], gap: float, frequency: float
 ) -> complex:
-    """F [m] seen along a symmetry axis from ``gap`` before the surface, whose principal radii there are ``radii``."""
+    """F [m] along a symmetry axis from ``gap`` before a surface of principal radii ``radii``."""
     distance = half_length + gap
     size = (distance / gap) ** 2 * np.sqrt(
         np.pi / ((1 / radii[0] + 1 / gap) * (1 / radii[1] + 1 / gap))
@@ -106,7 +106,7 @@ def worst_error(pairs: list[tuple[complex, complex]], limit: float) -> str:
 
 @dataclasses.dataclass(frozen=True)
 class Ball:
-    """A sphere that flies along x; all that a model asks of a body."""
+    """A sphere that flies along x, with all that a model needs of a body."""
 
     speed: float = 0.0
     radius: float = 0.2
@@ -147,7 +147,7 @@ def motion() -> rt.Motion:
 def chain(
     radar: rt.Radar | None = None, what: rt.Motion | None = None, **options: Any
 ) -> tuple[rt.Result, list[str]]:
-    """The whole chain, and its warnings; every number of its summary is finite, or it could not have been written."""
+    """A whole run and its warnings; all numbers of its summary are finite, or writing it fails."""
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         values: dict[str, Any] = {"fidelity": "analytic", "duration_s": 0.12}
@@ -160,9 +160,9 @@ def chain(
 
 
 def spectrum(radar: rt.Radar, body: Ball, fidelity: str = "analytic") -> Any:
-    """Range-Doppler of one window of a sphere."""
+    """Range-Doppler spectrum of one frame of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
-    # The model asks a body for its poses, its parts and its duration: this one has them.
+    # A model needs the poses, the parts and the duration of a body, which this one has.
     echoes = build_model(fidelity, radar, body).echoes(chirps)
     return rt.process.range_doppler(
         rt.signal.synthesize(echoes, radar, radar.chirp_times(len(chirps))), radar

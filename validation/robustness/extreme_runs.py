@@ -26,7 +26,7 @@ import rtradar.body
 CASES, case = collector()
 
 
-# -- motion ---------------------------------------------------------------------------------------------------------
+# -- motion ----------------------------------------------------------------------------------------
 
 
 @case("0 m/s", "all power at Doppler 0 and its window's two neighbours")
@@ -136,7 +136,7 @@ def _() -> str:
     return refused(lambda: bvh("0.01", "nan"), r"(?i)line 1\d.*nan|nan.*line 1\d")
 
 
-# -- radar and processing -------------------------------------------------------------------------------------------
+# -- radar and processing --------------------------------------------------------------------------
 
 
 @case("one Tx, one Rx", "finite, without angles")

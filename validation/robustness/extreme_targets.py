@@ -36,7 +36,7 @@ from rtradar.scatter import build_model
 CASES, case = collector()
 
 
-# -- frequency, distance, size, shape -------------------------------------------------------------------------------
+# -- frequency, distance, size, shape --------------------------------------------------------------
 
 
 @case("1, 12, 77, 300 GHz: a sphere of 0.5 m, both models", "near-field closed form, phase and all")
@@ -68,7 +68,8 @@ def _() -> str:
     )
     assert any("radius of curvature" in message for message in said), said
     high, _ = chain(small_radar(start_frequency_hz=300e9, chirp_duration_s=20e-6))
-    return f"{low.summary['detections']} and {high.summary['detections']} detections; 1 GHz: {said[0][:60]}..."
+    few, many = (found.summary["detections"] for found in (low, high))
+    return f"{few} and {many} detections; 1 GHz: {said[0][:60]}..."
 
 
 @case("a sphere at 0.1 m, 4 m, 1 km and 10 km", "near-field closed form at each")
@@ -189,7 +190,7 @@ def _() -> str:
     return f"within {worst:.2f} dB"
 
 
-@case("physical optics above ka = 400, without a say on facets", "refused")
+@case("physical optics above ka = 400, without a number of facets", "refused")
 def _() -> str:
     return refused(
         lambda: rt.scattering_length(
@@ -217,7 +218,7 @@ def _() -> str:
             )
         assert np.isfinite(fields).all(), (fidelity, fields)
         expected = rt.rcs.sphere(0.05, 24e9, "go" if fidelity == "fresnel" else "po")
-        # 0.02: facets; their phase at 10 km, where float32 would know it to 0.5 rad.
+        # 0.02 is the error of facets; float32 would know their phase at 10 km to 0.5 rad only.
         assert abs(fields[1] / complex(expected) - 1) < 0.02, (fidelity, fields[1], expected)
     return "finite; phase and all to 2 % at 10 km"
 
@@ -260,7 +261,7 @@ def _() -> str:
     return f"{len(faces)} triangles, {20 * np.log10(abs(ratio)):+.4f} dB"
 
 
-# -- bodies ---------------------------------------------------------------------------------------------------------
+# -- bodies ----------------------------------------------------------------------------------------
 
 
 @case("a bone of no length", "refused, by the name of its part")
@@ -390,7 +391,7 @@ def _() -> str:
         worst_amplitude = max(
             worst_amplitude, float(np.abs(here.amplitude - away.amplitude).max()) / largest
         )
-    # 10 km has rounding of 2e-12 m; a part that is just hidden in one place must be hidden in the other.
+    # Rounding at 10 km is 2e-12 m; a part that is just occluded in one place is so in the other.
     assert worst_length < 1e-10, worst_length
     assert worst_amplitude < 1e-6, worst_amplitude
     return f"lengths within {worst_length:.0e} m, amplitudes within {worst_amplitude:.0e}"

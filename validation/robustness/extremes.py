@@ -1,8 +1,9 @@
-"""Extremes: each gives the right finite answer, or a clear refusal or warning; never NaN, a hang or an abort.
+"""Extremes: each gives the right finite answer, or a clear refusal or warning; never NaN or a hang.
 
-A case says what is expected, and gives back what it got or fails. Right is told by closed forms written down in the cases: a
-sphere seen from one place at the distance R from its surface has |F| D^2 / R^2 sqrt(pi) / (1/a + 1/R), D the distance of its
-centre, and along a symmetry axis an ellipsoid has the same with both of its radii of curvature. The tests run the same cases.
+A case states what is expected, and returns what it found or fails. What is right follows from
+closed forms in the cases: a sphere seen from the distance R from its surface has |F| D^2 / R^2
+sqrt(pi) / (1/a + 1/R), with D the distance of its centre, and along a symmetry axis an ellipsoid
+has the same with both of its radii of curvature. The tests run the same cases.
 
     python validation/robustness/extremes.py [--quick] [--json FILE]
 """
@@ -38,7 +39,7 @@ def measure(quick: bool) -> list[Row]:
         good, got = outcome(one)
         print(f"{one.name:62}  {one.expected:62}  {got}", flush=True)
         quantity = one.expected if good else f"{one.expected}; got: {got}"
-        says = "extremes: not the right finite answer, nor a refusal, nor a warning (1: so)"
+        says = "extremes: neither the right finite answer nor a refusal or warning (1: so)"
         rows.append(judged(one.name, quantity, "", 0.0 if good else 1.0, 0.0, says=says))
     return rows
 

@@ -25,7 +25,7 @@ NETCDF = {"if_real": IF.real, "if_imag": IF.imag, "radar": np.array(TOLD)}
 
 
 def _zarr(folder: Path, data: bytes) -> None:
-    """Summary, what the array says of itself, and its one chunk, apart at the word CUT."""
+    """Summary, metadata of the array, and its one chunk, separated by the word CUT."""
     summary, about, chunk = (*data.split(b"CUT"), b"", b"")[:3]
     run = folder / "run"
     shutil.rmtree(run, ignore_errors=True)

@@ -18,12 +18,12 @@ import numpy as np
 Arrays = Mapping[str, np.ndarray]
 
 MOST_VALUES = 10_000
-"""Arrays that claim more are claims alone: nothing lies behind them."""
+"""Arrays that claim more elements than this have no data behind them."""
 
 
 @dataclass(frozen=True)
 class Target:
-    """A reader: ``read`` takes a folder that it has to itself and the bytes of a file; ``seeds`` are files that it takes."""
+    """A reader: ``read`` takes a folder of its own and the bytes of a file; ``seeds`` are good."""
 
     read: Callable[[Path, bytes], object]
     seeds: Callable[[], list[bytes]]
@@ -43,8 +43,8 @@ def npy(array: np.ndarray) -> bytes:
 
 
 @dataclass(frozen=True)
-class Piece:
-    """An array as a hostile file has it: what it claims to be, and what there is of it."""
+class HostileArray:
+    """An array as a hostile file has it: what it claims to be, and the values that it has."""
 
     kind: np.dtype
     shape: tuple[int, ...]
@@ -59,7 +59,7 @@ class Piece:
         return np.resize(self.values, self.shape)
 
     def npy(self) -> bytes:
-        """A NumPy file of it."""
+        """Bytes of a NumPy file with this array."""
         if not self.is_claim:
             return npy(self.array)
         buffer = io.BytesIO()
@@ -72,29 +72,32 @@ class Piece:
         return buffer.getvalue() + self.values.tobytes()
 
 
-def pieces(text: bytes, good: Arrays) -> dict[str, Piece]:
-    """Good arrays by their names, but for those of which a line of the text says otherwise.
+def hostile_arrays(text: bytes, good: Arrays) -> dict[str, HostileArray]:
+    """Good arrays by their names, except those of which a line of the text says otherwise.
 
-    A line is JSON: [name, kind, shape, values], or [name] of what is left out; one that is no JSON changes nothing. Behind the
-    checksums and addresses of a whole archive a fuzzer reaches little; this it can change at will.
+    A line is JSON: [name, kind, shape, values], or [name] for one that is left out; a line that is
+    no JSON changes nothing. A fuzzer hardly gets past the checksums and addresses of a whole
+    archive, but it can change this text at will.
     """
-    found = {name: Piece(array.dtype, array.shape, array.ravel()) for name, array in good.items()}
+    found = {
+        name: HostileArray(array.dtype, array.shape, array.ravel()) for name, array in good.items()
+    }
     for line in text.split(b"\n"):
         with suppress(
             ValueError, TypeError, AttributeError, OverflowError, RecursionError, RuntimeWarning
         ):
-            name, *told = json.loads(line)
-            if told:
-                found |= {name: _piece(*told)} if name.isprintable() else {}
+            name, *claimed = json.loads(line)
+            if claimed:
+                found |= {name: _hostile_array(*claimed)} if name.isprintable() else {}
             else:
                 found.pop(name, None)
     return found
 
 
-def _piece(kind: str, shape: list[int], values: list[Any]) -> Piece:
+def _hostile_array(kind: str, shape: list[int], values: list[Any]) -> HostileArray:
     try:
         made = np.dtype(kind)
-    except SyntaxError:  # NumPy reads words with commas as Python
+    except SyntaxError:  # NumPy parses words with commas as Python
         raise ValueError from None
     if (
         made.hasobject
@@ -103,16 +106,17 @@ def _piece(kind: str, shape: list[int], values: list[Any]) -> Piece:
         or not all(0 <= length < 2**40 for length in shape)
     ):
         raise ValueError
-    return Piece(made, tuple(map(int, shape)), np.array(values).astype(made).ravel()[:MOST_VALUES])
+    there = np.array(values).astype(made).ravel()[:MOST_VALUES]
+    return HostileArray(made, tuple(map(int, shape)), there)
 
 
 def as_text(arrays: Arrays) -> bytes:
-    """What `pieces` reads."""
-    told = (
+    """Text of arrays for `hostile_arrays`."""
+    lines = (
         (name, _name(array.dtype), array.shape, array.ravel().tolist())
         for name, array in arrays.items()
     )
-    return b"\n".join(json.dumps(one).encode() for one in told)
+    return b"\n".join(json.dumps(one).encode() for one in lines)
 
 
 def _name(kind: np.dtype) -> str:
@@ -121,21 +125,21 @@ def _name(kind: np.dtype) -> str:
 
 def npz(path: Path, good: Arrays, text: bytes = b"") -> Path:
     with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, piece in pieces(text, good).items():
-            archive.writestr(f"{name}.npy", piece.npy())
+        for name, hostile in hostile_arrays(text, good).items():
+            archive.writestr(f"{name}.npy", hostile.npy())
     return path
 
 
 def hdf5(path: Path, good: Arrays, text: bytes = b"") -> Path:
     with h5py.File(path, "w") as file:
-        for name, piece in pieces(text, good).items():
+        for name, hostile in hostile_arrays(text, good).items():
             with suppress(
                 TypeError, ValueError, KeyError, OSError, RuntimeError
-            ):  # not of a kind or name that HDF5 knows
-                if piece.kind.kind == "U" and not piece.shape:
-                    file.attrs[name] = str(piece.array)
-                elif piece.is_claim:
-                    file.create_dataset(name, piece.shape, piece.kind, chunks=True)
+            ):  # its kind or name is unknown to HDF5
+                if hostile.kind.kind == "U" and not hostile.shape:
+                    file.attrs[name] = str(hostile.array)
+                elif hostile.is_claim:
+                    file.create_dataset(name, hostile.shape, hostile.kind, chunks=True)
                 else:
-                    file[name] = piece.array
+                    file[name] = hostile.array
     return path

@@ -1,4 +1,4 @@
-"""The target of `fuzz_readers.py` in C3D files: markers of a person who stands, written by hand as the format's manual says."""
+"""Target of `fuzz_readers.py` for C3D files: markers of a standing person, by the manual."""
 
 from __future__ import annotations
 
@@ -19,15 +19,17 @@ FRAMES, RATE_HZ = 3, 100.0
 
 # Forward, left (of the left side), up [m].
 PLACES = {
-    "FHD": (0.10, 0.07, 1.62), "BHD": (-0.08, 0.05, 1.62), "C7": (-0.05, 0.0, 1.45), "CLAV": (0.05, 0.0, 1.45),
-    "T10": (-0.10, 0.0, 1.15), "STRN": (0.10, 0.0, 1.15), "SHO": (0.0, 0.2, 1.42), "ELB": (0.0, 0.2, 1.12),
-    "WRA": (0.28, 0.2, 1.16), "WRB": (0.28, 0.2, 1.08), "FIN": (0.37, 0.2, 1.12), "FWT": (0.12, 0.12, 0.95),
-    "BWT": (-0.12, 0.08, 0.95), "KNE": (0.0, 0.12, 0.52), "ANK": (0.0, 0.12, 0.08), "TOE": (0.16, 0.12, 0.08),
+    "FHD": (0.10, 0.07, 1.62), "BHD": (-0.08, 0.05, 1.62), "C7": (-0.05, 0.0, 1.45),
+    "CLAV": (0.05, 0.0, 1.45), "T10": (-0.10, 0.0, 1.15), "STRN": (0.10, 0.0, 1.15),
+    "SHO": (0.0, 0.2, 1.42), "ELB": (0.0, 0.2, 1.12), "WRA": (0.28, 0.2, 1.16),
+    "WRB": (0.28, 0.2, 1.08), "FIN": (0.37, 0.2, 1.12), "FWT": (0.12, 0.12, 0.95),
+    "BWT": (-0.12, 0.08, 0.95), "KNE": (0.0, 0.12, 0.52), "ANK": (0.0, 0.12, 0.08),
+    "TOE": (0.16, 0.12, 0.08),
 }  # fmt: skip
 
 
 def _standing() -> np.ndarray:
-    """(frame, marker, 3) [mm], walking a little."""
+    """Markers (frame, marker, 3) [mm] of a person who walks a little."""
     side = np.array([[1, -1 if name[0] == "R" else 1, 1] for name in NEEDED])
     places = np.array([PLACES.get(name) or PLACES[name[1:]] for name in NEEDED]) * side
     return 1e3 * (places + np.arange(FRAMES)[:, None, None] * [0.01, 0.0, 0.0])
@@ -81,6 +83,7 @@ TARGETS = {
     "c3d": Target(
         _read,
         lambda: [c3d(True), c3d(False), c3d(True, "+Y")],
-        "POINT ANALOG TRIAL USED FRAMES SCALE RATE DATA_START UNITS Y_SCREEN LABELS ACTUAL_START_FIELD ACTUAL_END_FIELD FORMAT m",
+        "POINT ANALOG TRIAL USED FRAMES SCALE RATE DATA_START UNITS Y_SCREEN LABELS "
+        "ACTUAL_START_FIELD ACTUAL_END_FIELD FORMAT m",
     )
 }

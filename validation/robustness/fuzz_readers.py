@@ -1,11 +1,12 @@
-"""Readers of files that may be anybody's, fuzzed by coverage (Atheris, libFuzzer): only errors of our own may come out.
+"""Readers of files, fuzzed by coverage (Atheris, libFuzzer): only our own errors may occur.
 
-What counts as found: any exception but `InputError`, any warning but a `ValidityWarning`, more than 4 s of processor time for one
-file of some kilobytes, more than 2 GB, and the end of the process. Each is kept once for each line that it comes from,
-with the file that does it. Every reader has a process of its own; what it learned is kept in ``--corpus`` for another time.
+Findings are any exception but `InputError`, any warning but a `ValidityWarning`, more than 4 s of
+processor time for a file of some kilobytes, more than 2 GB of memory, and the end of the process.
+Each is kept once for each line that it comes from, with the file that causes it. Every reader has a
+process of its own; what it has learned is kept in ``--corpus`` for another time.
 
     pip install -c constraints.txt --editable '.[fuzz,campaign,learn]'
-    python validation/robustness/fuzz_readers.py --minutes 30 [--only bvh,scene] [--corpus DIR] [--json FILE]
+    python validation/robustness/fuzz_readers.py --minutes 30 [--only bvh,scene] [--corpus DIR]
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ PARTS = (
     "fuzz_markers",
     "fuzz_runs",
     "fuzz_targets",
-)  # where targets are; each is imported only for its own
-EVERY = 200  # inputs between two reports of a process, which ends without a word
+)  # modules of the targets; each is imported only for its own
+EVERY = 200  # inputs between two reports of a process, which may end without a word
 
 
 class TooSlowError(BaseException):
@@ -45,20 +46,20 @@ def _stop(*_: object) -> NoReturn:
 
 
 def homes(names: list[str]) -> dict[str, str]:
-    """Which part each reader's target is in, by its name; all of them where none is named."""
+    """Module of each reader's target by the reader's name; all of them if none is named."""
     found: dict[str, str] = {}
     for part in PARTS:
         if not names or not set(names) <= set(found):
             found |= dict.fromkeys(importlib.import_module(part).TARGETS, part)
     unknown = [name for name in names if name not in found]
     if unknown:
-        sys.exit(f"no reader is called {', '.join(unknown)}; there are {', '.join(found)}")
+        sys.exit(f"there is no reader '{', '.join(unknown)}'; the readers are {', '.join(found)}")
     return {name: found[name] for name in names or found}
 
 
 def fuzz(name: str, part: str, seconds: int, corpus: Path, report: Path) -> NoReturn:
     """Fuzz one reader, in this process, to its end."""
-    os.environ["NUMBA_DISABLE_JIT"] = "1"  # what watches the branches cannot be compiled
+    os.environ["NUMBA_DISABLE_JIT"] = "1"  # compiled code has no branches that could be watched
     import atheris
 
     with atheris.instrument_imports(include=["rtradar", "tomllib"]):
@@ -133,7 +134,7 @@ def _escaped(word: str) -> str:
 def _keep(
     found: dict[str, dict[str, str]], folder: Path, error: BaseException, data: bytes
 ) -> None:
-    """One of each kind: by its type and the last line of rtradar that it went through."""
+    """Keep one of each kind, by its type and the last line of rtradar that it went through."""
     frames = [
         frame
         for frame in traceback.extract_tb(error.__traceback__)
@@ -154,16 +155,16 @@ def _keep(
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument(
-        "--minutes", type=float, default=18.0, help="of all readers together (default: 18)"
+        "--minutes", type=float, default=18.0, help="time for all readers together (default: 18)"
     )
     parser.add_argument("--only", metavar="A,B,...", help="these readers")
     parser.add_argument(
         "--corpus",
         type=Path,
         metavar="DIR",
-        help="what was learned, and what was found (default: a new folder)",
+        help="folder for what is learned and found (default: a new one)",
     )
-    parser.add_argument("--json", type=Path, metavar="FILE", help="write the findings there")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the findings to this file")
     parser.add_argument("--reader", help=argparse.SUPPRESS)
     parser.add_argument("--part", help=argparse.SUPPRESS)
     parser.add_argument("--seconds", type=int, help=argparse.SUPPRESS)
@@ -192,10 +193,11 @@ def main() -> int:
             }
         minutes, slowest = result["seconds"] / 60, result["slowest_s"]
         print(
-            f"{name:18} {result['inputs']:9d} {result['taken']:8d} {minutes:8.2f} {slowest:6.2f} s  {len(result['found'])}"
+            f"{name:18} {result['inputs']:9d} {result['taken']:8d} {minutes:8.2f} {slowest:6.2f} s"
+            f"  {len(result['found'])}"
         )
-        for what, told in result["found"].items():
-            print(f"    {what}: {told['message']}  {told['file']}")
+        for what, finding in result["found"].items():
+            print(f"    {what}: {finding['message']}  {finding['file']}")
         sys.stdout.flush()
     inputs, hours = (
         sum(one["inputs"] for one in results.values()),

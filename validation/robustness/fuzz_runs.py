@@ -47,7 +47,7 @@ MOMENTS = {
 
 
 def _look(change: Callable[[Path, bytes], object]) -> Callable[[Path, bytes], None]:
-    """A run's folder, all good but for what ``change`` writes into it."""
+    """A run's folder that is all good except for what ``change`` writes into it."""
 
     def read(folder: Path, data: bytes) -> None:
         if not (folder / "good").is_dir():

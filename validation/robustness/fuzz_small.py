@@ -1,4 +1,4 @@
-"""A run as small as can be, and words of its files, for the targets of `fuzz_readers.py`."""
+"""A run that is as small as possible, and words of its files, for `fuzz_readers.py`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,10 @@ SUMMARY = {
     "parameters": {"radar": dataclasses.asdict(RADAR), "scene": "free-space", "motion": "walk"},
     "fidelity": "analytic",
 }
-JSON = 'null true false NaN -Infinity 1e999 -1 -1e300 {} [] "" 99999999999999999999 1099511627775 [[[[ : , '
+JSON = (
+    "null true false NaN -Infinity 1e999 -1 -1e300 {} [] "
+    '"" 99999999999999999999 1099511627775 [[[[ : , '
+)
 ARRAYS = JSON + "<f8 <f4 <i8 <u8 <c8 <c16 <U12 |S9 |b1 |O <M8[s] |V3 >f4 <f2 |u1 <f4,<f4"
 RADAR_WORDS = (
     " ".join(field.name for field in dataclasses.fields(Radar))

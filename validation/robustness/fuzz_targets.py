@@ -1,4 +1,4 @@
-"""What `fuzz_readers.py` throws bytes at: every reader of files that may be anybody's, and files to begin with."""
+"""Targets of `fuzz_readers.py`: every reader of files, and good files to begin with."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ ASF = """:units
     root first
   end
 """
-AMC = ":FULLY-SPECIFIED\n:DEGREES\n1\nroot 1 2 3 0 0 0\nfirst 0 0 0\n2\nroot 1 2 3 0 90 0\nfirst 0 0 450\n"
+AMC = (
+    ":FULLY-SPECIFIED\n:DEGREES\n"
+    "1\nroot 1 2 3 0 0 0\nfirst 0 0 0\n2\nroot 1 2 3 0 90 0\nfirst 0 0 450\n"
+)
 BVH = """HIERARCHY
 ROOT hip
 {
@@ -182,31 +185,37 @@ licence = "CC0"
 start_s = 0.01
 """
 WORDS = {
-    "asf": ":units :root :bonedata :hierarchy :documentation begin end name direction length axis dof order orientation position "
+    "asf": ":units :root :bonedata :hierarchy :documentation begin end name direction length axis "
+    "dof order orientation position "
     "rx ry rz TX TY TZ XYZ zyx deg rad limits 1e-320 1e308 -1e308 nan \xb2 #",
-    "amc": ":DEGREES :RADIANS :FULLY-SPECIFIED root first 1e308 1e-320 \xb2 # 99999999999999999999 -",
-    "bvh": "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION Frames: Frame Time: Xposition Yposition Zposition Zrotation "
+    "amc": ":DEGREES :RADIANS :FULLY-SPECIFIED root first 1e308 1e-320 \xb2 # "
+    "99999999999999999999 -",
+    "bvh": "HIERARCHY ROOT JOINT End Site OFFSET CHANNELS MOTION Frames: Frame Time: "
+    "Xposition Yposition Zposition Zrotation "
     "Xrotation Yrotation { } 1e308 1e-320 1e-300 1e20 1e-9 \xb2",
-    "toml": 'true false inf nan -inf = [ ] [[ ]] { } """ 1e308 0xffffffffffffffffffff 1979-05-27T07:32:00Z '
+    "toml": "true false inf nan -inf = [ ] [[ ]] { } "
+    '""" 1e308 0xffffffffffffffffffff 1979-05-27T07:32:00Z '
     + " ".join(
         line.split(" = ")[0].strip("[]{ ")
         for line in (RADAR + ANTENNAS + DIVISION + SCENE + SPEC).splitlines()
     )
     + " tdm cosine dipole isotropic pairs v",
     "json": 'null true false NaN Infinity 1e999 -1 {} [] "" 99999999999999999999 "../x" [[[[ : ,',
-    "ply": "ply format ascii 1.0 binary_little_endian binary_big_endian element vertex face edge property list uchar int float "
+    "ply": "ply format ascii 1.0 binary_little_endian binary_big_endian element vertex face edge "
+    "property list uchar int float "
     "double x y z vertex_indices end_header comment",
     "obj": "v vt vn f o g usemtl mtllib # // / -1 s",
     "stl": "solid facet normal outer loop vertex endloop endfacet endsolid",
-    "glb": "glTF JSON BIN accessors bufferViews buffers meshes nodes scenes primitives attributes POSITION indices mode count "
+    "glb": "glTF JSON BIN accessors bufferViews buffers meshes nodes scenes primitives attributes "
+    "POSITION indices mode count "
     "componentType 5126 5125 type VEC3 SCALAR byteLength byteOffset matrix children uri sparse",
 }
-"""What each format is made of: a fuzzer that knows words gets farther."""
+"""Words of each format: a fuzzer that knows them gets farther."""
 
 
 def _pose(motion: Motion) -> None:
     motion.at([0.0, motion.duration_s / 2, motion.duration_s])
-    with suppress(InputError):  # which joints a person needs is no matter of the reader's
+    with suppress(InputError):  # the reader does not know which joints a person needs
         Body.from_motion(motion).at([0.0, motion.duration_s])
 
 
@@ -221,7 +230,7 @@ def _amc(folder: Path, data: bytes) -> None:
 
 
 def _person(folder: Path, data: bytes) -> None:
-    """Skeleton and motion in one, apart at the first null byte: what neither alone reaches."""
+    """Skeleton and motion in one, separated at the first null byte, which reaches more code."""
     asf, _, amc = data.partition(b"\0")
     (folder / "x.asf").write_bytes(asf)
     _pose(load_motion(written(folder / "x.amc", amc), folder / "x.asf"))
@@ -282,7 +291,7 @@ def _cloud(folder: Path, data: bytes) -> None:
 
 
 def _array(folder: Path, data: bytes) -> None:
-    """Arrays and labels behind right checksums, apart at the word CUT, which no chance change of the archive would reach."""
+    """Arrays and labels with right checksums, separated by CUT, which no random change reaches."""
     parts = data.split(b"CUT")
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
@@ -419,14 +428,14 @@ def _meshes(ending: str) -> list[bytes]:
 
 
 def recorded(ending: str, lines: int) -> list[bytes]:
-    """Real recordings, where the environment names a folder of them, to so many lines."""
+    """Real recordings, cut to some lines, if the environment names a folder of them."""
     root = os.environ.get("RTRADAR_MOCAP")
     files = sorted(Path(root).rglob(f"*{ending}"))[:6] if root else []
     return [b"\n".join(file.read_bytes().split(b"\n")[:lines]) + b"\n" for file in files]
 
 
 def _people() -> list[bytes]:
-    """Whole people of a few frames, where there are recordings."""
+    """Whole people of a few frames, if there are recordings."""
     root = os.environ.get("RTRADAR_MOCAP")
     found = [(ASF + "\0" + AMC).encode()]
     for asf in sorted(Path(root).rglob("*.asf"))[:4] if root else []:
@@ -439,7 +448,7 @@ def _people() -> list[bytes]:
 
 
 def _short_bvh() -> list[bytes]:
-    """BVH recordings cut to three frames, and saying so."""
+    """BVH recordings that are cut to three frames, with the right count."""
     found = []
     for data in recorded(".bvh", 10**6):
         head, _, rest = data.partition(b"Frame Time:")

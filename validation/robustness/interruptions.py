@@ -1,11 +1,14 @@
-"""Commands that are told to end, or killed, at several moments: what is left on the disk, how soon, and what is said.
+"""Commands that are interrupted or killed at several moments: the files, the time, the message.
 
-Ctrl-C (SIGINT to the whole group, as a terminal does), SIGTERM and SIGKILL at each stage of ``run``, ``compare``, ``dataset
-build``, ``train``, ``export`` and ``view``, some into a folder where an older result of the same command lies. Claimed is: every
-file is as it was before or as an undisturbed command leaves it; after Ctrl-C and SIGTERM there are no others, the end comes
-within 2 s, with status 1, one line and no traceback, and no process is left. After SIGKILL, which no command hears of, the folder
-of a run holds old files or new ones; where the kill fell between the moves of its files it holds both, its list says so, and a
-command that reads it refuses it in one line. A command that reads changes nothing, and the next run takes away what is neither.
+Ctrl-C (SIGINT to the whole group, as from a terminal), SIGTERM and SIGKILL come at each stage of
+``run``, ``compare``, ``dataset build``, ``train``, ``export`` and ``view``, some with an output
+folder that holds an older result of the same command. Claimed is that every file is as it was
+before or as an undisturbed command leaves it. After Ctrl-C and SIGTERM there are no other files,
+the command ends within 2 s, with status 1, one line and no traceback, and no process is left. No
+command notices SIGKILL: after it the folder of a run holds old files or new ones. If the kill came
+between the renames of its files it holds both, its list says so, and a command that reads it
+refuses it in one line. A command that only reads changes nothing, and the next run removes what is
+neither.
 
     python validation/robustness/interruptions.py [--quick] [--json FILE] [--figure DIR]
 """
@@ -28,7 +31,7 @@ from campaign_kills import HALVES, RADAR
 
 from rtradar.validate.rows import Row, judged, main
 
-SAYS = "a command that is told to end: "
+SAYS = "an interrupted command: "
 PATIENCE_S = 300.0
 SPEC = f"""
 [windows]
@@ -42,10 +45,11 @@ fidelity = ["analytic"]
 
 @dataclass(frozen=True)
 class Stage:
-    """How far a command has come as it is disturbed.
+    """Progress of a command at which it is disturbed.
 
-    ``sign`` tells from outside: ``hears`` the signals, ``loads`` a library of that name, ``compiles`` or ``writes`` a file of
-    that name, in the folder of what is compiled or in its own; ``delay_s`` after it comes the signal.
+    ``sign`` shows it from outside: the command ``hears`` signals, ``loads`` a library of that name,
+    or ``compiles`` or ``writes`` a file of that name, in the folder of compiled code or in its own.
+    The signal comes ``delay_s`` later.
     """
 
     name: str
@@ -55,13 +59,13 @@ class Stage:
 
 @dataclass(frozen=True)
 class Case:
-    """A command, in which {out} is where its files go, and the stages at which it is disturbed."""
+    """A command, whose output folder is written {out}, and the stages at which it is disturbed."""
 
     name: str
     words: tuple[str, ...]
     stages: tuple[Stage, ...]
-    cold: bool = False  # without what was compiled before
-    single: bool = False  # its files are each whole, and belong together no further
+    cold: bool = False  # with an empty cache of compiled code
+    single: bool = False  # each file is whole on its own, and they need not belong together
     anew: bool = True  # into an empty folder, not over older files
 
 
@@ -187,7 +191,7 @@ def start(case: Case, out: Path, work: Path) -> subprocess.Popen[str]:
 
 
 def contents(folder: Path) -> dict[str, int]:
-    """Every file, and when it was written."""
+    """All files, with the time at which each was written."""
     return {
         str(path.relative_to(folder)): path.stat().st_mtime_ns
         for path in sorted(folder.rglob("*"))
@@ -198,12 +202,12 @@ def contents(folder: Path) -> dict[str, int]:
 def wait_for(
     sign: str, out: Path, work: Path, since: float, process: subprocess.Popen[str]
 ) -> bool:
-    """Until the sign is seen; whether the process still runs."""
+    """Wait for the sign; return whether the process still runs."""
     kind, _, name = sign.partition(" ")
     running = psutil.Process(process.pid)
     while process.poll() is None:
         with contextlib.suppress(psutil.Error, OSError):  # it ended, or a file vanished, meanwhile
-            # A second thread waits for signals as soon as rtradar, not Python, has the word.
+            # A second thread waits for signals as soon as rtradar, and not Python, handles them.
             if kind == "hears" and running.num_threads() > 1:
                 return True
             if kind == "loads" and any(name in part.path for part in running.memory_maps()):
@@ -218,7 +222,7 @@ def wait_for(
 
 
 def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tuple[str, list[Row]]:
-    """One command, disturbed once: its line of the table, and what is claimed of it."""
+    """Disturb one command once; return its line of the table and its rows."""
     out = work / "out"
     shutil.rmtree(out, ignore_errors=True)
     if before.exists():
@@ -317,7 +321,7 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
             ),
             judged(
                 claim,
-                "lines said, but one",
+                "lines printed, less one",
                 "1",
                 len(lines),
                 0,
@@ -338,7 +342,7 @@ def disturb(case: Case, stage: Stage, name: str, before: Path, work: Path) -> tu
 def compared(
     old: dict[str, int], after: dict[str, int]
 ) -> tuple[list[str], list[str], list[str], list[str]]:
-    """Files that are unfinished, and of the others those that are gone, written anew, and new."""
+    """Files that are unfinished, and of the others those lost, rewritten, and new."""
     hidden = [path for path in after if any(part.startswith(".") for part in Path(path).parts)]
     lost = [path for path in old if path not in after]
     changed = [path for path in after if path in old and after[path] != old[path]]
@@ -347,16 +351,17 @@ def compared(
 
 
 def tally(old: dict[str, int], after: dict[str, int]) -> str:
-    """Files by their kind, in words."""
+    """Numbers of files by their kind, in words."""
     hidden, lost, changed, new = compared(old, after)
-    return f"{len(old) - len(lost) - len(changed)} old, {len(changed) + len(new)} new, {len(hidden)} unfinished"
+    kept = len(old) - len(lost) - len(changed)
+    return f"{kept} old, {len(changed) + len(new)} new, {len(hidden)} unfinished"
 
 
 def measure(quick: bool) -> list[Row]:
     found: list[Row] = []
     signal.signal(
         signal.SIGINT, signal.default_int_handler
-    )  # else what is started with "&" would pass on that it is ignored
+    )  # a command started with "&" would pass on that it ignores the signal
     with tempfile.TemporaryDirectory() as folder:
         work = Path(folder)
         (work / "small.toml").write_text(RADAR)

@@ -1,22 +1,27 @@
 """Small faults put into the core one at a time: which of them does no test notice?
 
-A mutant is a copy of the tree with one change: a constant 7 % larger or one more, + for -, * for /, one comparison for another, a
-dropped `not`, minus sign or conj, sin for cos, min for max, all for any, swapped arguments of arctan2, another axis. Docstrings,
-messages, annotations, decorators and assertions are left alone. Mutants are drawn in turn from motion, radar, signal, process,
-clouds, scatter and rcs, the same for the same seed; those of a smaller --count are the first of a larger.
+A mutant is a copy of the tree with one change: a constant 7 % larger or one more, + for -, * for /,
+one comparison for another, a dropped `not`, minus sign or conj, sin for cos, min for max, all for
+any, swapped arguments of arctan2, or another axis. Docstrings, messages, annotations, decorators
+and assertions are not changed. Mutants are drawn in turn from motion, radar, signal, process,
+clouds, scatter and rcs, the same for the same seed; those of a smaller --count are the first of a
+larger one.
 
-Each is run against the tests that call the changed function, of the nearest test files and the fastest first, up to a limit of
-time, until one fails; recordings are not used. Which test calls what is traced once a test file, on the copy as it is. Numba's
-functions cannot be traced: their tests are those that call any function of their module, or of the modules that import it. Tests
-that fail without a change are not used.
+Each runs against the tests that call the changed function, from the nearest test files and the
+fastest first, up to a limit of time, until one fails; recordings are not used. Which test calls
+what is traced once for each test file, on the unchanged copy. Numba's functions cannot be traced:
+their tests are those that call any function of their module, or of the modules that import it.
+Tests that fail without a change are not used.
 
-Compiled code comes from a cache that the unchanged copy filled. For a mutant whose function Numba compiles, or takes into others,
-the modules that import its module, however indirectly, begin without; so no mutant passes on old code.
+Compiled code comes from a cache that the unchanged copy filled. For a mutant whose function Numba
+compiles or inlines, the modules that import its module, however indirectly, begin without a cache,
+so that no mutant passes with old code.
 
-Survivors are printed with their change. Those that cannot be noticed stand in `mutation_equivalent.json`, each with its reason.
-With --json, what was run before is not run again. Not a claim of `rtradar validate`: it takes an hour, and judges the tests.
+Survivors are printed with their change. Those that cannot be noticed are listed in
+`mutation_equivalent.json`, each with its reason. With --json, finished mutants are not run again.
+This is no claim of `rtradar validate`: it takes an hour, and it judges the tests.
 
-    nice python validation/robustness/mutation.py [--count 80] [--seed 0] [--only formats/markers] [--json FILE]
+    nice python validation/robustness/mutation.py [--count 80] [--only motion/formats] [--json FILE]
 """
 
 from __future__ import annotations
@@ -43,10 +48,10 @@ PACKAGES = ("motion", "radar", "signal", "process", "clouds", "scatter", "rcs")
 EQUIVALENT = Path(__file__).with_name("mutation_equivalent.json")
 
 MOST_FILES, MOST_SECONDS = 4, 25.0
-"""Test files that are asked about one module, nearest first, and how long a mutant's tests of one may take without the change."""
+"""Test files for one module, nearest first, and the time for a mutant's tests of one file [s]."""
 
 LIMIT_S, COMPILING_S = 60.0, 120.0
-"""A mutant that takes longer has not ended: that is noticed. What compiles anew may take longer."""
+"""A mutant that takes longer counts as noticed; one that must compile first has more time [s]."""
 
 OPERATORS = {
     ast.Add: ("+", "-"),
@@ -77,7 +82,7 @@ NAMES = {one: other for pair in _PAIRS for one, other in (pair, pair[::-1])}
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change: ``text`` for what stands between two places of a file."""
+    """One change: ``text`` in place of what lies between two positions of a file."""
 
     file: str
     function: str
@@ -94,7 +99,7 @@ class Mutant:
 
     @property
     def key(self) -> str:
-        """Stays as long as the line does, wherever it goes in its function."""
+        """Name that stays as long as the line does, wherever it moves in its function."""
         return f"{self.file} {self.function}: {self.change}"
 
 
@@ -138,7 +143,7 @@ class _Finder(ast.NodeVisitor):
         if at >= 0:
             self._add(begin + at, begin + at + len(sign), other)
 
-    # -- what is left alone ---------------------------------------------------------------------------------------------
+    # -- what is left alone ------------------------------------------------------------------------
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> None:
         self._function.append(node.name)
@@ -167,7 +172,7 @@ class _Finder(ast.NodeVisitor):
     def visit_JoinedStr(self, node: ast.JoinedStr) -> None:
         """A message."""
 
-    # -- what is changed ------------------------------------------------------------------------------------------------
+    # -- what is changed ---------------------------------------------------------------------------
 
     def visit_Constant(self, node: ast.Constant) -> None:
         if isinstance(node.value, bool):
@@ -242,12 +247,12 @@ class _Finder(ast.NodeVisitor):
 
 
 def mutants_of(file: str) -> list[Mutant]:
-    """All there are."""
+    """All mutants of a file."""
     return _Finder(file, (CHECKOUT / file).read_text(encoding="utf-8")).found
 
 
 def is_python(mutant: Mutant) -> bool:
-    """Whether it can be read at all."""
+    """Whether the mutant is valid Python."""
     try:
         ast.parse(changed((CHECKOUT / mutant.file).read_text(encoding="utf-8"), mutant))
     except SyntaxError:
@@ -260,7 +265,7 @@ def changed(source: str, mutant: Mutant) -> str:
 
 
 def draw(count: int, seed: int, only: str) -> list[Mutant]:
-    """So many, from each package in turn."""
+    """A number of mutants, from each package in turn."""
     chance = random.Random(seed)
     piles = []
     for package in PACKAGES:
@@ -338,7 +343,7 @@ class Tree:
         return found
 
     def importers(self, file: str) -> list[set[str]]:
-        """Files that import it, then those that import these, and so on."""
+        """Files that import a file, then those that import these, and so on."""
         rings, known = [], {file}
         while True:
             ring = {
@@ -352,7 +357,7 @@ class Tree:
             rings.append(ring)
 
     def test_files(self, file: str) -> list[str]:
-        """Those that most likely notice a change: they import it, are called alike, and speak of what it defines."""
+        """Test files that most likely notice a change: they import it, or share its names."""
         path = Path(file)
         top = ast.parse((self._root / file).read_text(encoding="utf-8")).body
         named = (
@@ -379,7 +384,7 @@ class Tree:
         return sorted(ranks, key=lambda name: (ranks[name], name))[:MOST_FILES]
 
     def traced(self, test_file: str) -> dict[str, dict[str, object]]:
-        """Seconds and calls of each of its tests that passes."""
+        """Seconds and calls of each test of a file that passes."""
         if test_file not in self._traced:
             out = self._root.parent / "trace.json"
             out.unlink(missing_ok=True)
@@ -394,7 +399,7 @@ class Tree:
         return self._traced[test_file]
 
     def tests(self, mutant: Mutant, test_file: str) -> list[str]:
-        """What is to be run of a file, fastest first."""
+        """Tests of a file that are to be run, the fastest first."""
         own = mutant.file.removeprefix("rtradar/")
         near = tuple(
             f"{name.removeprefix('rtradar/')}::"
@@ -417,7 +422,7 @@ class Tree:
         return sorted(seconds, key=lambda name: seconds[name])[:fits]
 
     def is_compiled(self, mutant: Mutant) -> bool:
-        """Whether Numba has its function, or the constants of its module."""
+        """Whether Numba compiles its function, or uses the constants of its module."""
         tree = ast.parse((CHECKOUT / mutant.file).read_text(encoding="utf-8"))
         by_numba = {
             node.name
@@ -432,7 +437,10 @@ class Tree:
         )
 
     def run(self, mutant: Mutant) -> tuple[str, str, int]:
-        """What came of it - ``noticed``, ``timeout``, ``survived`` or ``untested`` -, by which test, and how many ran at most."""
+        """Outcome, the test that noticed it, and the number of tests.
+
+        Outcomes are ``noticed``, ``timeout``, ``survived`` and ``untested``.
+        """
         path = self._root / mutant.file
         source = path.read_text(encoding="utf-8")
         compiled = self.is_compiled(mutant)
@@ -493,7 +501,7 @@ class Tree:
             "no:cacheprovider",
             *arguments,
         ]
-        # In a group of its own, for tests start processes, too.
+        # In a process group of its own, because tests start processes, too.
         run = subprocess.Popen(
             command,
             cwd=self._root,
@@ -515,7 +523,7 @@ class Tree:
 def outcomes(
     mutants: list[Mutant], tree: Tree, path: Path | None
 ) -> Iterator[tuple[Mutant, dict[str, object]]]:
-    """What came of each; what the file has is not run again."""
+    """Outcome of each mutant; those in the file are not run again."""
     known = (
         {row["key"]: row for row in json.loads(path.read_text())["mutants"]}
         if path and path.exists()
@@ -525,13 +533,13 @@ def outcomes(
         if mutant.key not in known:
             began = time.monotonic()
             outcome, by, count = tree.run(mutant)
-            told = {
+            result = {
                 "outcome": outcome,
                 "by": by,
                 "tests": count,
                 "seconds": round(time.monotonic() - began, 1),
             }
-            known[mutant.key] = {"key": mutant.key, **asdict(mutant), **told}
+            known[mutant.key] = {"key": mutant.key, **asdict(mutant), **result}
             if path:
                 path.write_text(json.dumps({"mutants": list(known.values())}, indent=1) + "\n")
         yield mutant, known[mutant.key]
@@ -541,15 +549,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--count", type=int, default=80)
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--only", default="", help="files whose path holds this text")
+    parser.add_argument("--only", default="", help="only files whose path contains this text")
     parser.add_argument(
-        "--json", type=Path, help="outcomes are kept there; those that it holds are not found again"
+        "--json", type=Path, help="file of the outcomes; those in it are not found again"
     )
     parser.add_argument("--list", action="store_true", help="print the mutants, run nothing")
     parser.add_argument(
         "--folder",
         type=Path,
-        help="of the copy and its compiled code, used again (default: a temporary one)",
+        help="folder of the copy and its compiled code, to use again (default: a temporary one)",
     )
     options = parser.parse_args()
     mutants = draw(options.count, options.seed, options.only)
@@ -565,14 +573,15 @@ def main() -> int:
     survivors = []
     with tempfile.TemporaryDirectory() as temporary:
         tree = Tree((options.folder or Path(temporary)).resolve())
-        for number, (mutant, told) in enumerate(outcomes(mutants, tree, options.json), 1):
+        for number, (mutant, result) in enumerate(outcomes(mutants, tree, options.json), 1):
             outcome = (
-                f"{told['outcome']}: equivalent"
-                if mutant.key in reasons and told["outcome"] == "survived"
-                else told["outcome"]
+                f"{result['outcome']}: equivalent"
+                if mutant.key in reasons and result["outcome"] == "survived"
+                else result["outcome"]
             )
             print(
-                f"{number:3d} {outcome:22s} {told['seconds']:6.1f} s {told['tests']:4d} tests  {mutant.file}:{mutant.line}",
+                f"{number:3d} {outcome:22s} {result['seconds']:6.1f} s {result['tests']:4d} tests  "
+                f"{mutant.file}:{mutant.line}",
                 flush=True,
             )
             if outcome in ("survived", "untested"):

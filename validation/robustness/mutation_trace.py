@@ -1,6 +1,7 @@
-"""For `mutation.py`: a plug-in of pytest that writes down which functions of rtradar each test calls, and how long it takes.
+"""Plug-in of pytest for `mutation.py`: the functions of rtradar that each test calls, and its time.
 
-Only calls are traced, not lines, and not while Numba compiles, so a run is hardly slower. What Numba compiled is not seen.
+Only calls are traced, not lines, and not while Numba compiles, so a run is hardly slower. Functions
+that Numba compiled are not seen.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ def _called(frame: FrameType, event: str, argument: object) -> None:
 
 
 class _WhileCompiling(event.Listener):
-    """Of the compiler's millions of calls none is rtradar's."""
+    """Pauses tracing while Numba compiles: of its millions of calls none is rtradar's."""
 
     def on_start(self, _: event.Event) -> None:
         sys.settrace(None)
