@@ -1,4 +1,4 @@
-"""``rtradar validate``: run the validation scripts, a claim each, and say which of their figures keep their limits."""
+"""``rtradar validate``: run the validation scripts, and report which figures keep their limits."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import os
 import platform
 import sys
 from collections.abc import Iterator, Sequence
+from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,42 +15,32 @@ from tqdm import tqdm
 
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
-from rtradar.validate.claims import Claim, choose, claims, validation_folder
-from rtradar.validate.outcome import Outcome, Row, by_key, run_claim, used_up, worst
-from rtradar.validate.readme import BEGIN, END, KEYS, around_table, markdown, write_readme
+from rtradar.validate.claims import Outcome, choose, claims, run_claim, validation_folder
+from rtradar.validate.readme import around_table, markdown, write_readme
+from rtradar.validate.rows import worst
 
-__all__ = [
-    "BEGIN",
-    "END",
-    "KEYS",
-    "Claim",
-    "Outcome",
-    "Row",
-    "claims",
-    "markdown",
-    "used_up",
-    "validate",
-    "validation_folder",
-]
+__all__ = ["claims", "validate", "validation_folder"]
 
-_HEAD = f"{'key':<14} {'script':<18} {'rows':>5} {'judged':>6} {'failed':>6} {'error/limit':>11} {'seconds':>8}"
+_LINE = "{:<14} {:<18} {:>5} {:>6} {:>6} {:>11} {:>8}"
+_HEAD = _LINE.format("key", "script", "rows", "judged", "failed", "error/limit", "seconds")
 
 
 def _lines(outcome: Outcome) -> Iterator[str]:
-    """The outcome of one script: a line a key, and each figure outside its limit."""
-    seconds = f"{outcome.seconds:8.1f}"
-    for key, rows in by_key(outcome.rows).items():
-        of_judged = [row for row in rows if row["tolerance"] is not None]
+    """Lines of a script: one for each key, and one for each figure outside its limit."""
+    name, seconds = outcome.claim.name, f"{outcome.seconds:.1f}"
+    for key in outcome.keys:
+        rows = [row for row in outcome.rows if row.key == key]
+        judged = sum(row.tolerance is not None for row in rows)
+        failed = sum(not row.passed for row in rows)
         nearest = worst(rows)
-        share = "-" if nearest is None else f"{used_up(nearest['error'], nearest['tolerance']):.3g}"
-        failed = sum(not row["passed"] for row in rows)
-        yield f"{key:<14} {outcome.claim.name:<18} {len(rows):5d} {len(of_judged):6d} {failed:6d} {share:>11} {seconds}"
+        used = "-" if nearest is None else f"{nearest.used:.3g}"
+        yield _LINE.format(key, name, len(rows), judged, failed, used, seconds)
         seconds = ""
     for row in outcome.failed:
-        limit = "must be a number" if row["tolerance"] is None else f"limit {row['tolerance']:.4g}"
-        yield f"  FAILED  {row['claim']}: {row['quantity']}: {row['error']:.4g} {row['unit']}, {limit}"
+        limit = "must be a number" if row.tolerance is None else f"limit {row.tolerance:.4g}"
+        yield f"  FAILED  {row.claim}: {row.quantity}: {row.error:.4g} {row.unit}, {limit}"
     if outcome.trouble:
-        yield f"  FAILED  {outcome.claim.name} {outcome.trouble}"
+        yield f"  FAILED  {name} {outcome.trouble}"
 
 
 def validate(
@@ -60,30 +51,30 @@ def validate(
     figures: Path | None = None,
     readme: Path | None = None,
 ) -> int:
-    """Run the validation scripts, print a line a script and key, and return the exit status.
+    """Run the validation scripts, and print a line for each script and key.
 
     Parameters
     ----------
     quick : bool
-        Fewer cases of each.
+        True to measure fewer cases.
     only : str, optional
         Key of a claim, or name of a script.
     json_path : path, optional
-        All rows are written there.
+        File for all rows.
     figures : path, optional
-        Folder for one picture a script.
+        Folder for a picture of each script.
     readme : path, optional
         File whose table of figures, between the markers `BEGIN` and `END`, is replaced.
 
     Returns
     -------
     int
-        0, or 1 where a row fails or a script does not finish.
+        Exit status: 0, or 1 where a row fails or a script does not finish.
 
     Raises
     ------
     InputError
-        Where ``only`` names nothing, or a file cannot be written; nothing has run then.
+        If ``only`` names nothing, or a file cannot be written; nothing has run then.
     """
     check_place(json_path)
     if readme is not None:
@@ -104,18 +95,17 @@ def validate(
     with tqdm(chosen, unit="script", disable=None) as bar:
         for claim, key in bar:
             bar.set_description(claim.name)
-            outcome = run_claim(claim, key=key, quick=quick, figures=figures)
-            outcomes.append(outcome)
-            for line in _lines(outcome):
+            outcomes.append(run_claim(claim, key=key, quick=quick, figures=figures))
+            for line in _lines(outcomes[-1]):
                 tqdm.write(line)
             sys.stdout.flush()
     rows = [row for outcome in outcomes for row in outcome.rows]
-    of_judged = [row for row in rows if row["tolerance"] is not None]
-    passed = all(row["passed"] for row in rows) and not any(outcome.trouble for outcome in outcomes)
-    kept = sum(row["passed"] for row in of_judged)
+    judged = [row for row in rows if row.tolerance is not None]
+    passed = all(row.passed for row in rows) and not any(outcome.trouble for outcome in outcomes)
     print(
-        f"{'passed' if passed else 'FAILED'}: {kept} of {len(of_judged)} judged figures within their limits, "
-        f"{len(rows) - len(of_judged)} reported; {len(outcomes)} scripts, {sum(outcome.seconds for outcome in outcomes):.0f} s"
+        f"{'passed' if passed else 'FAILED'}: {sum(row.passed for row in judged)} of {len(judged)} "
+        f"judged figures within their limits, {len(rows) - len(judged)} reported; "
+        f"{len(outcomes)} scripts, {sum(outcome.seconds for outcome in outcomes):.0f} s"
     )
     if json_path is not None:
         _write_json(json_path, outcomes, passed, quick)
@@ -125,6 +115,9 @@ def validate(
 
 
 def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bool) -> None:
+    def number(value: object) -> object:  # JSON has neither NaN nor infinity
+        return None if isinstance(value, float) and not math.isfinite(value) else value
+
     content = {
         "passed": passed,
         "quick": quick,
@@ -134,7 +127,7 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
         "scripts": [
             {
                 "script": outcome.claim.script.name,
-                "keys": list(by_key(outcome.rows)),
+                "keys": outcome.keys,
                 "seconds": round(outcome.seconds, 2),
                 "cpu_seconds": round(outcome.cpu_seconds, 2),
                 "failed": len(outcome.failed),
@@ -142,13 +135,9 @@ def _write_json(path: Path, outcomes: Sequence[Outcome], passed: bool, quick: bo
             }
             for outcome in outcomes
         ],
-        # JSON has no NaN and no infinity.
         "rows": [
             {"script": outcome.claim.script.name}
-            | {
-                name: None if isinstance(value, float) and not math.isfinite(value) else value
-                for name, value in row.items()
-            }
+            | {name: number(value) for name, value in asdict(row).items()}
             for outcome in outcomes
             for row in outcome.rows
         ],

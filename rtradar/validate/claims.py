@@ -1,101 +1,127 @@
-"""The validation scripts: which there are, and which of them a choice means.
+"""Validation scripts: which exist, which a choice selects, and the run of one in its own process.
 
-A script is one that has a function ``measure`` and takes ``main`` from ``rows``. The keys of its rows are the texts given as
-``key=`` in it, and its own name where there are none; they are read from its source, for a choice of one claim must not run
-the others.
+A script has a function ``measure`` and imports ``main`` from `rtradar.validate.rows`. The keys of
+its rows are the texts given as ``key=`` in it, or its own name if there are none. They are read
+from its source, so that the choice of one claim does not run the others.
 """
 
 from __future__ import annotations
 
-import ast
+import json
+import os
+import re
+import subprocess
+import sys
+import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
 from rtradar.errors import InputError
+from rtradar.system.files import temporary_folder
+from rtradar.validate.rows import Row
+
+_MEASURE = re.compile(r"^def measure\(", re.MULTILINE)
+_MAIN = re.compile(
+    r"^from rtradar\.validate\.rows import (?:\([^)]*|[^\n(]*)\bmain\b", re.MULTILINE
+)
+_KEY = re.compile(r'\bkey="([^"{}]+)"')
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One script.
-
-    Parameters
-    ----------
-    script : path
-    keys : tuple of str
-        Those that its rows may have.
-    """
+    """A validation script, and the keys that its rows may have."""
 
     script: Path
     keys: tuple[str, ...]
 
     @property
     def name(self) -> str:
-        """Of the script, without its ending."""
+        """Name of the script, without its ending."""
         return self.script.stem
 
 
+@dataclass(frozen=True)
+class Outcome:
+    """Result of a script: rows with the chosen key, elapsed time and CPU time of all cores [s]."""
+
+    claim: Claim
+    rows: list[Row]
+    seconds: float
+    cpu_seconds: float
+    trouble: str  # reason why it did not finish, in one line; empty if it did
+
+    @property
+    def failed(self) -> list[Row]:
+        """Rows outside their limits."""
+        return [row for row in self.rows if not row.passed]
+
+    @property
+    def keys(self) -> list[str]:
+        """Keys of the rows, in their order."""
+        return list(dict.fromkeys(row.key for row in self.rows))
+
+
 def validation_folder() -> Path:
-    """Folder of the scripts that come with rtradar: inside the installed package, or at the top of a checkout."""
+    """Folder of the scripts: inside the installed package, or at the top of a checkout."""
     installed = Path(str(resources.files("rtradar"))) / "validation"
     return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "validation"
 
 
 def claims(folder: Path) -> list[Claim]:
-    """All scripts of a folder that measure a claim, by name."""
+    """All scripts of a folder that measure a claim, sorted by name."""
     found = []
     for script in sorted(folder.rglob("*.py"), key=lambda path: path.stem):
-        tree = ast.parse(script.read_text(encoding="utf-8"), str(script))
-        measures = any(
-            isinstance(node, ast.FunctionDef) and node.name == "measure" for node in tree.body
-        )
-        asks = any(
-            isinstance(node, ast.ImportFrom)
-            and node.module == "rtradar.validate.rows"
-            and any(alias.name == "main" for alias in node.names)
-            for node in tree.body
-        )
-        if measures and asks:
-            found.append(Claim(script, _keys(tree) or (script.stem,)))
+        text = script.read_text(encoding="utf-8")
+        if _MEASURE.search(text) and _MAIN.search(text):
+            keys = tuple(dict.fromkeys(_KEY.findall(text)))
+            found.append(Claim(script, keys or (script.stem,)))
     return found
 
 
-def _keys(tree: ast.Module) -> tuple[str, ...]:
-    named = [
-        keyword.value.value
-        for node in ast.walk(tree)
-        if isinstance(node, ast.Call)
-        for keyword in node.keywords
-        if keyword.arg == "key" and isinstance(keyword.value, ast.Constant)
-    ]
-    return tuple(dict.fromkeys(name for name in named if isinstance(name, str) and name))
-
-
 def choose(found: Sequence[Claim], only: str | None) -> list[tuple[Claim, str | None]]:
-    """Scripts to run, each with the key that its rows are limited to, if any.
-
-    Raises
-    ------
-    InputError
-        Where no script is there, or none has that name or key.
-    """
+    """Scripts to run, each with the key to which its rows are limited, if any."""
     if not found:
         raise InputError(
-            f"there are no validation scripts in '{validation_folder()}'; install rtradar again, or use a checkout"
+            f"there are no validation scripts in '{validation_folder()}'; "
+            "install rtradar again, or use a checkout"
         )
     if only is None:
         return [(claim, None) for claim in found]
-    by_name = [(claim, None) for claim in found if claim.name == only.removesuffix(".py")]
-    named = {claim.name for claim, _ in by_name}
-    chosen: list[tuple[Claim, str | None]] = [
-        *by_name,
-        *((claim, only) for claim in found if only in claim.keys and claim.name not in named),
-    ]
-    if not chosen:
+    by_name = [claim for claim in found if claim.name == only.removesuffix(".py")]
+    by_key = [claim for claim in found if only in claim.keys and claim not in by_name]
+    if not by_name and not by_key:
         keys = sorted({key for claim in found for key in claim.keys})
         names = sorted({claim.name for claim in found} - set(keys))
         raise InputError(
-            f"--only {only}: no such claim; allowed keys: {', '.join(keys)}; or a script: {', '.join(names)}"
+            f"--only {only}: no such claim; allowed keys: {', '.join(keys)}; "
+            f"or a script: {', '.join(names)}"
         )
-    return chosen
+    return [*((claim, None) for claim in by_name), *((claim, only) for claim in by_key)]
+
+
+def run_claim(
+    claim: Claim, *, key: str | None = None, quick: bool = False, figures: Path | None = None
+) -> Outcome:
+    """Run one script in a process of its own, and read its rows."""
+    began, spent = time.perf_counter(), sum(os.times()[2:4])
+    with temporary_folder("rtradar-validate-") as folder:
+        written = folder / "rows.json"
+        command = [sys.executable, str(claim.script), "--json", str(written)]
+        command += ["--quick"] if quick else []
+        command += ["--figure", str(figures)] if figures else []
+        done = subprocess.run(
+            command, capture_output=True, text=True, errors="replace", check=False
+        )
+        said = done.stderr.strip().splitlines() or ["nothing on stderr"]
+        rows, trouble = [], f"ended with status {done.returncode} and left no rows: {said[-1]}"
+        with suppress(OSError, ValueError, KeyError, TypeError):
+            rows = [Row(**row) for row in json.loads(written.read_text(encoding="utf-8"))["rows"]]
+            trouble = "" if rows else "gave no rows"
+    if rows and done.returncode not in (0, int(not all(row.passed for row in rows))):
+        trouble = f"ended with status {done.returncode}: {said[-1]}"
+    kept = [row for row in rows if key is None or row.key == key]
+    seconds, cpu_seconds = time.perf_counter() - began, sum(os.times()[2:4]) - spent  # of children
+    return Outcome(claim, kept, seconds, cpu_seconds, " ".join(trouble.split()))

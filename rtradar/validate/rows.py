@@ -1,4 +1,4 @@
-"""What the validation scripts share: rows of figures, their table, and the options that all of them take."""
+"""Rows of figures that the validation scripts measure, their table, and the options of a script."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import json
 import math
 import sys
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, astuple, dataclass, field, fields, replace
 from pathlib import Path
-
-from rtradar.validate.outcome import used_up
+from typing import TypedDict, Unpack
 
 _MOST_DRAWN = 40
 
@@ -20,84 +19,80 @@ def script_name() -> str:
     return Path(sys.argv[0]).stem
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Row:
-    """One figure: what is claimed, what the reference says, what we say, how far apart they may be."""
+    """One figure: its claim, the values of the reference and of rtradar, and their difference."""
 
-    claim: str
-    quantity: str
+    claim: str  # the case that is tested
+    quantity: str  # what is measured there
     unit: str
-    reference: float | None
+    reference: float | None = None  # None: zero by definition
     ours: float
-    error: float
-    tolerance: float | None  # None: reported, not judged
-    passed: bool
-    key: str = field(
-        default_factory=script_name
-    )  # of the claim, as `rtradar validate --only` takes it
-    says: str = ""  # the claim in words; rows that say the same, with the same limit, are one line of docs/validation.md's table
+    error: float = math.nan
+    tolerance: float | None = None  # None: the figure is reported, not judged
+    passed: bool = False
+    key: str = field(default_factory=script_name)  # for `rtradar validate --only`
+    says: str = ""  # the claim in words; those with the same words are one line of the table
     cases: int = 1  # of which this is the worst
+
+    @property
+    def used(self) -> float:
+        """Fraction of the tolerance that the error uses, see `used_up`; 0 without a tolerance."""
+        return 0.0 if self.tolerance is None else used_up(self.error, self.tolerance)
+
+
+class Details(TypedDict, total=False):
+    """Fields of a `Row` that have a default."""
+
+    reference: float | None
+    key: str
+    says: str
+    cases: int
+
+
+def used_up(error: float, tolerance: float) -> float:
+    """Fraction of a limit that a figure uses; for a level below zero, the limit over the level."""
+    if not math.isfinite(error):
+        return math.inf
+    if tolerance > 0:
+        return max(error, 0.0) / tolerance
+    if tolerance < 0:
+        return tolerance / error if error < 0 else math.inf
+    return math.inf if error > 0 else 0.0
+
+
+def worst(rows: Sequence[Row]) -> Row | None:
+    """Judged row that is nearest to its limit, or farthest beyond it; None if none is judged."""
+    judged_ones = (row for row in rows if row.tolerance is not None)
+    return max(judged_ones, key=lambda row: (not row.passed, row.used), default=None)
 
 
 def judged(
-    claim: str,
-    quantity: str,
-    unit: str,
-    ours: float,
-    tolerance: float,
-    *,
-    reference: float | None = None,
-    key: str = "",
-    says: str = "",
-    cases: int = 1,
+    claim: str, quantity: str, unit: str, ours: float, tolerance: float, **details: Unpack[Details]
 ) -> Row:
-    """A figure that must not exceed its tolerance: |ours - reference| where there is a reference, else ours."""
-    error = float(abs(ours - reference) if reference is not None else ours)
-    known = None if reference is None else float(reference)
-    passed = math.isfinite(error) and error <= float(tolerance)
-    figures = (known, float(ours), error, float(tolerance))
-    return Row(claim, quantity, unit, *figures, passed, key or script_name(), says, cases)
+    """Make a row whose error, |ours - reference| or else ours, must not exceed its tolerance."""
+    row = reported(claim, quantity, unit, ours, **details)
+    error = row.error if row.reference is None else abs(row.error)
+    limit = float(tolerance)
+    return replace(row, error=error, tolerance=limit, passed=row.passed and error <= limit)
 
 
-def reported(
-    claim: str,
-    quantity: str,
-    unit: str,
-    ours: float,
-    *,
-    reference: float | None = None,
-    key: str = "",
-) -> Row:
-    """A figure without a limit; it only has to be a number."""
-    error = float(ours - reference if reference is not None else ours)
-    known = None if reference is None else float(reference)
-    return Row(
-        claim,
-        quantity,
-        unit,
-        known,
-        float(ours),
-        error,
-        None,
-        math.isfinite(error),
-        key or script_name(),
-    )
+def reported(claim: str, quantity: str, unit: str, ours: float, **details: Unpack[Details]) -> Row:
+    """Make a row without a tolerance; its value only has to be a finite number."""
+    reference = details.get("reference")
+    error = float(ours if reference is None else ours - reference)
+    row = Row(claim=claim, quantity=quantity, unit=unit, ours=float(ours), **details)
+    return replace(row, error=error, passed=math.isfinite(error))
 
 
 def table(rows: Sequence[Row]) -> str:
-    """The rows, aligned."""
-    head = ("key", "claim", "quantity", "unit", "reference", "ours", "error", "tolerance", "passed")
-    lines: list[tuple[str, ...]] = [head]
+    """Text table of rows, with aligned columns."""
+    lines = [("key", *(column.name for column in fields(Row)[:8]))]
     for row in rows:
-        figures = (
-            "-" if value is None else f"{value:.4g}"
-            for value in (row.reference, row.ours, row.error, row.tolerance)
-        )
-        verdict = (
-            "reported" if row.tolerance is None and row.passed else ("yes" if row.passed else "NO")
-        )
+        figures = ("-" if value is None else f"{value:.4g}" for value in astuple(row)[3:7])
+        verdict = "NO" if not row.passed else "reported" if row.tolerance is None else "yes"
         lines.append((row.key, row.claim, row.quantity, row.unit, *figures, verdict))
-    widths = [max(len(line[column]) for line in lines) for column in range(len(head))]
+    widths = [max(map(len, column)) for column in zip(*lines, strict=True)]
     return "\n".join(
         "  ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True)).rstrip()
         for line in lines
@@ -105,29 +100,25 @@ def table(rows: Sequence[Row]) -> str:
 
 
 def draw(rows: Sequence[Row], path: Path, title: str) -> None:
-    """Judged rows, the nearest to their limits, as a share of these limits."""
+    """Draw the judged rows nearest to their limits, by the fractions of the limits they use."""
     import matplotlib as mpl
 
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    shares = [(used_up(row.error, row.tolerance), row) for row in rows if row.tolerance is not None]
-    shares = sorted(shares, key=lambda pair: pair[0], reverse=True)[:_MOST_DRAWN]
-    nearest = [row for _, row in shares]
-    figure, axes = plt.subplots(
-        figsize=(9.0, 1.5 + 0.19 * max(len(nearest), 4)), layout="constrained"
-    )
-    # A failure and an exact zero stand at the ends of the axis.
-    places = [min(max(share, 1e-6), 100.0) for share, _ in shares]
+    of_judged = (row for row in rows if row.tolerance is not None)
+    nearest = sorted(of_judged, key=lambda row: row.used, reverse=True)[:_MOST_DRAWN]
+    size = (9.0, 1.5 + 0.19 * max(len(nearest), 4))
+    figure, axes = plt.subplots(figsize=size, layout="constrained")
+    # Infinite values and exact zeros are drawn at the ends of the axis.
+    places = [min(max(row.used, 1e-6), 100.0) for row in nearest]
     colours = ["tab:green" if row.passed else "tab:red" for row in nearest]
     axes.scatter(places, range(len(nearest)), c=colours, s=18, zorder=2)
     axes.axvline(1.0, color="black", linewidth=1)
-    axes.set_xscale("log")
-    axes.set_yticks(
-        range(len(nearest)), [f"{row.claim}: {row.quantity}"[:90] for row in nearest], fontsize=6
-    )
+    names = [f"{row.claim}: {row.quantity}"[:90] for row in nearest]
+    axes.set_yticks(range(len(nearest)), names, fontsize=6)
+    axes.set(xscale="log", xlabel="error / tolerance")
     axes.invert_yaxis()
-    axes.set_xlabel("error / tolerance")
     axes.set_title(title, fontsize=9)
     axes.grid(axis="x", alpha=0.3)
     figure.savefig(path, dpi=130)
@@ -139,28 +130,21 @@ def main(
     measure: Callable[[bool], list[Row]],
     figure: Callable[[list[Row], Path], None] | None = None,
 ) -> int:
-    """Read the options, measure, print the table; 1 where a row fails.
+    """Read the options of a script, measure, print the table, and return the exit status.
 
-    ``figure`` draws into a PNG; without one, rows are drawn as shares of their limits.
+    ``measure`` gets True for ``--quick``. ``figure`` draws rows into a PNG file, `draw` by default.
     """
     parser = argparse.ArgumentParser(description=description)
-    parser.add_argument("--json", type=Path, help="write the rows there as well")
-    parser.add_argument(
-        "--quick", action="store_true", help="fewer cases, seconds instead of minutes"
-    )
-    parser.add_argument(
-        "--figure",
-        type=Path,
-        metavar="DIR",
-        help="draw the main rows there, as a PNG of this script's name",
-    )
+    add = parser.add_argument
+    add("--json", type=Path, help="also write the rows to this file")
+    add("--quick", action="store_true", help="measure fewer cases, in seconds instead of minutes")
+    add("--figure", type=Path, metavar="DIR", help="draw the rows as a PNG file in this folder")
     options = parser.parse_args()
     rows = measure(options.quick)
     print(table(rows))
     if options.json:
-        options.json.write_text(
-            json.dumps({"rows": [asdict(row) for row in rows]}, indent=1) + "\n"
-        )
+        content = {"rows": [asdict(row) for row in rows]}
+        options.json.write_text(json.dumps(content, indent=1, default=float) + "\n")
     if options.figure:
         options.figure.mkdir(parents=True, exist_ok=True)
         path = options.figure / f"{script_name()}.png"

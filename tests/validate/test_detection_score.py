@@ -1,4 +1,4 @@
-"""Truth, precision and missing rate of detections, against counts by hand and noise that is measured."""
+"""Truth, precision and missing rate of detections, against counts by hand and measured noise."""
 
 from __future__ import annotations
 
@@ -18,12 +18,7 @@ from rtradar.radar import Radar
 from rtradar.validate import validation_folder
 
 sys.path.append(str(validation_folder() / "closed_forms"))
-from detection_score import (
-    DetectionScore,
-    cell_noise_power,
-    score,
-    target_cells,
-)
+from detection_score import DetectionScore, cell_noise_power, score, target_cells
 
 sys.path.pop()
 
@@ -81,7 +76,8 @@ def test_noise_power_of_a_cell_is_what_noise_leaves_there(channel: int | None) -
         )
         means.append(power_map(cube, SMALL, channel=channel).mean())
     error = np.std(means, ddof=1) / math.sqrt(len(means))
-    # Four standard errors; they are 1.2 % (one channel) and 0.1 % (96), so a wrong window or a lost factor 2 shows.
+    # Four standard errors, 1.2 % (one channel) and 0.1 % (96), so that a wrong window or a lost
+    # factor of 2 shows.
     assert abs(np.mean(means) - cell_noise_power(0.7, SMALL, looks)) < 4 * error
 
 

@@ -1,4 +1,4 @@
-"""`rtradar validate`: which scripts it runs, what it makes of their rows, and how it says no."""
+"""`rtradar validate`: the scripts that it runs, its table of their rows, and its refusals."""
 
 from __future__ import annotations
 
@@ -10,13 +10,17 @@ import pytest
 from rtradar import validate
 from rtradar.cli import main
 from rtradar.errors import InputError
+from rtradar.validate.claims import Claim, Outcome
+from rtradar.validate.readme import BEGIN, END, KEYS, markdown
+from rtradar.validate.rows import Row, used_up
 
 GOOD = """
 import sys
-from rtradar.validate.rows import Row, judged, main, reported
+from rtradar.validate.rows import judged, main, reported
 def measure(quick):
-    share = 0.5 if quick else 0.25
-    round_ = judged("a ball", "round", "m", share, 1.0, key="sphere", says="balls are round", cases=3)
+    error = 0.5 if quick else 0.25
+    about = {"says": "balls are round", "cases": 3}
+    round_ = judged("a ball", "round", "m", error, 1.0, key="sphere", **about)
     return [round_, reported("a ball", "red", "", 3.0, key="colour")]
 if __name__ == "__main__":
     sys.exit(main("Balls.", measure))
@@ -26,7 +30,8 @@ import sys
 from rtradar.validate.rows import judged, main
 def measure(quick):
     print("what goes to stdout does not matter")
-    return [judged("a floor", "flat", "dB", -70.0, -80.0), judged("a wall", "straight", "dB", float("nan"), 1.0)]
+    floor = judged("a floor", "flat", "dB", -70.0, -80.0)
+    return [floor, judged("a wall", "straight", "dB", float("nan"), 1.0)]
 if __name__ == "__main__":
     sys.exit(main("Floors.", measure))
 """
@@ -34,7 +39,7 @@ BROKEN = """
 from rtradar.validate.rows import main
 def measure(quick): ...
 if __name__ == "__main__":
-    raise RuntimeError("the judge is ill")
+    raise RuntimeError("no measurement")
 """
 HELPER = "def measure(quick): ...\n"  # takes no `main` of rtradar.validate.rows: not a claim
 
@@ -106,7 +111,7 @@ def test_a_script_that_breaks_fails(folder: Path, capsys: pytest.CaptureFixture[
     (folder / "zz.py").write_text(BROKEN)
     assert main(["validate"]) == 1
     assert (
-        "FAILED  zz ended with status 1 and left no rows: RuntimeError: the judge is ill"
+        "FAILED  zz ended with status 1 and left no rows: RuntimeError: no measurement"
         in capsys.readouterr().out
     )
 
@@ -146,11 +151,11 @@ def test_the_table_of_a_readme_is_replaced(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     readme = tmp_path / "README.md"
-    readme.write_text(f"before\n{validate.BEGIN}\nold\n{validate.END}\nafter\n")
+    readme.write_text(f"before\n{BEGIN}\nold\n{END}\nafter\n")
     assert main(["validate", "--readme", str(readme)]) == 0
     text = readme.read_text()
-    assert text.startswith(f"before\n{validate.BEGIN}\n")
-    assert text.endswith(f"{validate.END}\nafter\n")
+    assert text.startswith(f"before\n{BEGIN}\n")
+    assert text.endswith(f"{END}\nafter\n")
     assert "| `sphere` | balls are round | 0.25 m | 1 m | 3 | `balls.py` |" in text
     assert "1 of 1 judged figures are within their limits; 1 more are reported." in text
     assert "old" not in text
@@ -159,27 +164,17 @@ def test_the_table_of_a_readme_is_replaced(
     assert readme.read_text() == text
 
 
-def outcome(name: str, *rows: dict[str, object]) -> validate.Outcome:
-    """Of a script with these rows, that passed and have a limit of 2 m unless they say otherwise."""
-    usual = {
-        "key": name,
-        "claim": "a case",
-        "quantity": "length",
-        "unit": "m",
-        "error": 1.0,
-        "tolerance": 2.0,
-        "passed": True,
-    }
-    return validate.Outcome(
-        validate.Claim(Path(f"{name}.py"), (name,)), [usual | row for row in rows], 1.0, 1.0, ""
-    )
+def outcome(name: str, *rows: dict[str, object]) -> Outcome:
+    """Outcome of a script with these rows, which pass a limit of 2 m unless they say otherwise."""
+    usual = {"key": name, "claim": "a case", "quantity": "length", "unit": "m"}
+    usual |= {"ours": 1.0, "error": 1.0, "tolerance": 2.0, "passed": True}
+    claim = Claim(Path(f"{name}.py"), (name,))
+    return Outcome(claim, [Row(**(usual | row)) for row in rows], 1.0, 1.0, "")
 
 
 def test_rows_that_say_the_same_are_one_line_with_the_worst_of_them() -> None:
     says = {"says": "lengths |far| and near", "cases": 10}
-    table = validate.markdown(
-        [outcome("path", says, says | {"error": 1.5}, says | {"tolerance": 3.0})]
-    )
+    table = markdown([outcome("path", says, says | {"error": 1.5}, says | {"tolerance": 3.0})])
     assert table.splitlines()[2:4] == [
         "| `path` | lengths \\|far\\| and near | 1.5 m | 2 m | 20 | `path.py` |",
         "| `path` | lengths \\|far\\| and near | 1 m | 3 m | 10 | `path.py` |",
@@ -188,13 +183,13 @@ def test_rows_that_say_the_same_are_one_line_with_the_worst_of_them() -> None:
 
 def test_a_failure_stands_out_in_the_table() -> None:
     wrong = {"error": 2.5, "passed": False}
-    table = validate.markdown([outcome("path", {"error": 1.9}, wrong)])
+    table = markdown([outcome("path", {"error": 1.9}, wrong)])
     assert "| `path` | length | **2.5 m: FAILED** | 2 m | 2 | `path.py` |" in table
     assert "1 of 2 judged figures" in table
 
 
 def test_the_main_claims_come_first_in_the_table() -> None:
-    table = validate.markdown([outcome(name, {}) for name in ("angle", "cfar", "path", "sphere")])
+    table = markdown([outcome(name, {}) for name in ("angle", "cfar", "path", "sphere")])
     assert [line.split("`")[1] for line in table.splitlines()[2:6]] == [
         "sphere",
         "path",
@@ -203,16 +198,12 @@ def test_the_main_claims_come_first_in_the_table() -> None:
     ]
 
 
-def test_a_script_that_did_not_finish_is_told_below_the_table() -> None:
-    claim = validate.Claim(Path("path.py"), ("path",))
-    assert "`path.py` left no rows." in validate.markdown(
-        [validate.Outcome(claim, [], 1.0, 1.0, "left no rows")]
-    )
+def test_a_script_that_did_not_finish_is_named_below_the_table() -> None:
+    claim = Claim(Path("path.py"), ("path",))
+    assert "`path.py` left no rows." in markdown([Outcome(claim, [], 1.0, 1.0, "left no rows")])
 
 
-@pytest.mark.parametrize(
-    "content", ["no markers", f"{validate.END} {validate.BEGIN}", validate.BEGIN]
-)
+@pytest.mark.parametrize("content", ["no markers", f"{END} {BEGIN}", BEGIN])
 def test_a_readme_without_its_place_is_refused(content: str, folder: Path, tmp_path: Path) -> None:
     (tmp_path / "README.md").write_text(content)
     with pytest.raises(InputError, match="must hold"):
@@ -221,13 +212,13 @@ def test_a_readme_without_its_place_is_refused(content: str, folder: Path, tmp_p
 
 
 def test_a_readme_is_not_written_from_a_part(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "README.md").write_text(f"{validate.BEGIN}{validate.END}")
+    (tmp_path / "README.md").write_text(f"{BEGIN}{END}")
     with pytest.raises(InputError, match="leave out"):
         validate.validate(readme=tmp_path / "README.md", quick=True)
 
 
 @pytest.mark.parametrize(
-    ("error", "tolerance", "share"),
+    ("error", "tolerance", "fraction"),
     [
         (0.05, 0.1, 0.5),
         (-3.0, 0.1, 0.0),
@@ -239,14 +230,14 @@ def test_a_readme_is_not_written_from_a_part(folder: Path, tmp_path: Path) -> No
         (float("nan"), 1.0, float("inf")),
     ],
 )
-def test_how_much_of_a_limit_is_used(error: float, tolerance: float, share: float) -> None:
-    assert validate.used_up(error, tolerance) == share
+def test_how_much_of_a_limit_is_used(error: float, tolerance: float, fraction: float) -> None:
+    assert used_up(error, tolerance) == fraction
 
 
 def test_the_claims_of_this_checkout_have_their_scripts() -> None:
     found = validate.claims(validate.validation_folder())
     keys = {key for claim in found for key in claim.keys}
-    assert set(validate.KEYS) <= keys
+    assert set(KEYS) <= keys
     assert {claim.script.parent.name for claim in found} == {
         "closed_forms",
         "other_methods",

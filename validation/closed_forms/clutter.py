@@ -183,8 +183,8 @@ def room_rows(name: str) -> Iterator[Row]:
         ours = spectra_of(by_package(method, still + moving, radar, options))
         expected = spectra_of(by_hand(method, truth, radar, **options))
         left_db = 20 * math.log10(abs(ours - expected).max() / strongest)
-        room = f"a room {ROOM_DB:g} dB above the moving points"
-        quantity = f"residual of {room}, over its strongest cell"
+        about = f"a room {ROOM_DB:g} dB above the moving points"
+        quantity = f"residual of {about}, over its strongest cell"
         yield judged(
             claim, quantity, "dB", left_db, MOST_LEFT_DB, says=f"clutter removal: {quantity}"
         )

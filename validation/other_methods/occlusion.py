@@ -20,7 +20,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -228,17 +228,8 @@ def covered_rows(quick: bool) -> Iterator[Row]:
                 if 0.02 < fraction < 0.98:
                     crossing.append(errors[-1])
                     quantity = f"{fraction:3.0%} covered: field over the free one"
-                    yield Row(
-                        claim,
-                        quantity,
-                        "",
-                        abs(optics),
-                        abs(got),
-                        errors[-1],
-                        None,
-                        bool(np.isfinite(errors[-1])),
-                        "edge",
-                    )
+                    row = reported(claim, quantity, "", abs(got), reference=abs(optics))
+                    yield replace(row, error=errors[-1])
             # All or nothing is wrong by half where half of the field is left, and PO overshoots.
             says = "a part half behind an edge by `specular`, seen or not: worst complex error"
             yield judged(
