@@ -1,4 +1,4 @@
-"""The doctor finds what is there, advises where something is missing, and says by its status whether rays can be traced."""
+"""The doctor finds what is there, and advises where something is missing."""
 
 from __future__ import annotations
 

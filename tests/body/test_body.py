@@ -70,7 +70,8 @@ def test_ellipsoids_sit_on_their_bones(activity: str, share: float) -> None:
 
 def test_frames_never_flip(body: Body) -> None:
     frames = body.at(np.arange(0, body.duration_s, 1e-3)).frames
-    # Under 40 rad/s a frame turns by less than 0.04 rad in a millisecond; a flip would change an entry by 1 or 2.
+    # Under 40 rad/s a frame turns by less than 0.04 rad in a millisecond; a flip would change an
+    # entry by 1 or 2.
     assert np.abs(np.diff(frames, axis=0)).max() < 0.05
 
 

@@ -1,4 +1,4 @@
-"""Long recordings: read, made, placed and asked for by blocks of frames, which nobody can tell from the result."""
+"""Long recordings are read, made and placed by blocks of frames, and the result is the same."""
 
 from __future__ import annotations
 

@@ -73,8 +73,8 @@ def test_turning_and_resampling_commute(seed: int, yaw: float, share: float) -> 
     motion = random_motion(seed)
     time = [share * motion.duration_s]
     turn = Rotation.from_euler("z", yaw)
-    # Turning first turns what the spline goes through: the same curve. PCHIP on the root does it axis by axis and is not
-    # linear, so the root is left at the origin.
+    # Turning first turns what the spline goes through: the same curve. PCHIP on the root does it
+    # axis by axis and is not linear, so the root is left at the origin.
     still = dataclasses.replace(motion, root_positions=np.zeros_like(motion.root_positions))
     np.testing.assert_allclose(
         still.turned(yaw).at(time)[0][0], turn.apply(still.at(time)[0][0]), atol=1e-11
@@ -99,7 +99,8 @@ def test_constant_turn_is_met_between_frames() -> None:
     )
     times = np.linspace(0.05, 0.15, 501)
     tip = motion.at(times)[0][:, 1]
-    # h^4 / 384 of the fourth derivative of the half-angle sine: (6 / 120)^4 / 384 = 1.6e-8 rad, doubled.
+    # h^4 / 384 of the fourth derivative of the half-angle sine: (6 / 120)^4 / 384 = 1.6e-8 rad,
+    # doubled.
     np.testing.assert_allclose(
         tip, np.stack([np.cos(12 * times), np.sin(12 * times), 0 * times], axis=1), atol=1e-7
     )
@@ -111,7 +112,8 @@ def test_velocity_does_not_step_at_frames() -> None:
     at = motion.frame_times[2:-2]
     before = (motion.at(at)[0] - motion.at(at - d)[0]) / d
     after = (motion.at(at + d)[0] - motion.at(at)[0]) / d
-    # Over 1 us an acceleration of some 1e4 m/s^2 changes the velocity by 1e-2 m/s; steps would be of some 10 m/s.
+    # Over 1 us an acceleration of some 1e4 m/s^2 changes the velocity by 1e-2 m/s; steps would be
+    # of some 10 m/s.
     assert np.abs(after - before).max() < 0.1
     assert np.abs(after).max() > 10
 

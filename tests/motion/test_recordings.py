@@ -128,7 +128,8 @@ def test_c3d_and_amc_of_one_take_agree(mocap: Path) -> None:
     c3d = load_motion(mocap / "cmu/135_02.c3d")
     amc = to_nodes(load_motion(mocap / "cmu/135_02.amc", mocap / "cmu/135.asf"))
     assert c3d.rate_hz == amc.rate_hz
-    # Of the half that the offsets of the markers were not set by; validation/measurements/c3d_take.py tells more.
+    # The offsets of the markers were set by the other half of the take
+    # (validation/measurements/c3d_take.py).
     apart = np.linalg.norm(c3d.positions - amc.positions, axis=2)[2601:]
     assert (np.median(apart, axis=0) < 0.06).all()
 

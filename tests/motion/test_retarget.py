@@ -26,7 +26,7 @@ def test_31_to_24_to_22() -> None:
 def bvh_like(
     spine: tuple[str, ...], *, toe_end: bool = True, hand_end: bool = True, seed: int = 0
 ) -> Motion:
-    """A person with Mixamo names in random poses; the spine has these joints between hips and neck."""
+    """A person with Mixamo names in random poses, with these joints between hips and neck."""
     tree: list[tuple[str, str, tuple[float, float, float]]] = [("Hips", "", (0, 0, 0))]
     below = "Hips"
     for name in spine:
@@ -85,7 +85,8 @@ def test_any_spine_becomes_three_parts(spine: tuple[str, ...]) -> None:
     lengths = np.linalg.norm(nodes.offsets[1:], axis=1)
     assert lengths.min() > 0.05
     three = sum(lengths[NODES.index(node) - 1] for node in ("lowerback", "upperback", "thorax"))
-    # Of a chain with more joints than nodes a part is the chord: shorter than the chain, by its bends of 0.2 rad.
+    # Where a chain has more joints than nodes, a part is the chord, which the bends of 0.2 rad make
+    # shorter than the chain.
     assert three == pytest.approx(0.4, rel=0.03 if len(spine) > 2 else 1e-12)
     ends = (
         nodes.positions[:, NODES.index("thorax")]
@@ -153,7 +154,7 @@ def test_a_skeleton_of_no_known_kind_is_told_the_kinds() -> None:
     )
     with pytest.raises(
         InputError,
-        match=r"robot: its joints \(base, arm, ...\) are named as in no kind .*ASF \(HDM05, CMU\); ",
+        match=r"robot: its joints \(base, arm, ...\) are named as in no kind .*ASF \(HDM05, CMU\)",
     ):
         to_nodes(motion)
 

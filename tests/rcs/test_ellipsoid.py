@@ -25,11 +25,13 @@ def test_it_is_pi_times_both_radii_of_curvature(
     normal = np.array([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
     squares = np.square(axes)
     point = squares * normal / np.sqrt(normal @ (squares * normal))
-    # Shape operator of |A^-1 p| = 1 on its tangent plane: the curvatures are its eigenvalues, 0 belongs to the normal.
+    # Shape operator of |A^-1 p| = 1 on its tangent plane: the curvatures are its eigenvalues, 0
+    # belongs to the normal.
     across = np.eye(3) - np.outer(normal, normal)
     shape = across @ np.diag(1 / squares) @ across / np.linalg.norm(point / squares)
     curvatures = np.linalg.eigvalsh(shape)[1:]
-    # Curvatures differ by up to (1/0.03)^3, and where both are alike the quadratic keeps half of the digits.
+    # Curvatures differ by up to (1/0.03)^3, and where both are alike the quadratic keeps half of
+    # the digits.
     np.testing.assert_allclose(ellipsoid_radii(*axes, theta, phi), 1 / curvatures[::-1], rtol=1e-5)
     np.testing.assert_allclose(ellipsoid(*axes, theta, phi), np.pi / np.prod(curvatures), rtol=1e-8)
 
@@ -69,7 +71,8 @@ def test_naming_the_axes_otherwise_changes_nothing(
         section(np.array(axes), direction),
         section(np.array(axes)[swap], direction[swap]),
     )
-    # arccos loses digits near the poles: 1e-8 of an angle, times the square of up to 1e4 between the axes.
+    # arccos loses digits near the poles: 1e-8 of an angle, times the square of up to 1e4 between
+    # the axes.
     np.testing.assert_allclose(named_anew, there, rtol=1e-3)
 
 

@@ -20,13 +20,15 @@ def frequency_of(ka: float, radius: float = 0.1) -> float:
 def test_mie_agrees_with_miepython(ka: float) -> None:
     ours = abs(sphere(0.1, frequency_of(ka))) ** 2 / (np.pi * 0.1**2)
     back = miepython.efficiencies_mx(1 - 1e6j, ka)[2]
-    # Its metal has the index 1e6, not infinity: that leaves 2e-6, and more where the backscatter nearly vanishes.
+    # Its metal has the index 1e6, not infinity: that leaves 2e-6, and more where the backscatter
+    # nearly vanishes.
     np.testing.assert_allclose(ours, back, rtol=1e-5, atol=1e-5)
 
 
 def test_a_small_sphere_scatters_as_rayleigh_has_it() -> None:
     ka = 1e-3
-    # sigma = 9 pi a^2 (ka)^4 for a conductor: electric and magnetic dipole add up in the backward direction.
+    # sigma = 9 pi a^2 (ka)^4 for a conductor: electric and magnetic dipole add up in the backward
+    # direction.
     np.testing.assert_allclose(
         abs(sphere(0.1, frequency_of(ka))) ** 2, 9 * np.pi * 0.1**2 * ka**4, rtol=1e-5
     )
@@ -43,7 +45,8 @@ def test_optics_tend_to_mie(method: str) -> None:
 
 @given(st.floats(0.5, 200.0))
 def test_physical_optics_is_its_integral(ka: float) -> None:
-    # Over slices of equal depth z the lit half gives j k / sqrt(pi) * 2 pi a * Int_0^a (z/a) exp(2jkz) dz.
+    # Over slices of equal depth z the lit half gives j k / sqrt(pi) * 2 pi a * Int_0^a (z/a)
+    # exp(2jkz) dz.
     radius, k = 0.1, ka / 0.1
     z = radius * (NODES + 1) / 2
     integral = (
@@ -74,7 +77,8 @@ def test_it_broadcasts() -> None:
 
 
 def test_huge_spheres_stay_finite() -> None:
-    # Bessel functions of the second kind of high order leave the range of float64 long before their terms matter.
+    # Bessel functions of the second kind of high order leave the range of float64 long before their
+    # terms matter.
     assert np.isfinite(sphere(10.0, np.array([1e6, 1e9, 16e9]))).all()
 
 

@@ -1,4 +1,4 @@
-"""The meshes that come along: made again to the same bit, closed where they should be, as large as they say."""
+"""The built-in meshes are made again to the same bit, are closed, and have their sizes."""
 
 from __future__ import annotations
 
@@ -77,7 +77,8 @@ def test_corner_reflectors(name: str) -> None:
     normals = np.cross(b - a, c - a)
     areas = np.linalg.norm(normals, axis=1) / 2
     normals /= 2 * areas[:, None]
-    # They look out of the corner, along +x alike, and stand at right angles to each other or are one plate.
+    # They look out of the corner, along +x alike, and stand at right angles to each other or are
+    # one plate.
     expected = 1 / np.sqrt(3) if name == "trihedral" else 1 / np.sqrt(2)
     np.testing.assert_allclose(normals[:, 0], expected, atol=1e-15)
     angles = normals @ normals.T

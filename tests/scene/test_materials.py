@@ -54,7 +54,8 @@ def test_figures_of_the_recommendation(
 
 @pytest.mark.parametrize(
     ("ghz", "permittivity", "sigma"),
-    # Tissue tables of IFAC-CNR after Gabriel et al. 1996, "Skin (Dry)"; 60 GHz also in Wu et al. 2015: 7.98 - j 10.90.
+    # Tissue tables of IFAC-CNR after Gabriel et al. 1996, "Skin (Dry)"; 60 GHz also in Wu et al.
+    # 2015: 7.98 - j 10.90.
     [(1.0, 40.94, 0.900), (2.45, 38.01, 1.464), (10.0, 31.29, 8.014), (60.0, 7.98, 36.40)],
 )
 def test_skin_against_published_figures(ghz: float, permittivity: float, sigma: float) -> None:
@@ -65,7 +66,8 @@ def test_skin_against_published_figures(ghz: float, permittivity: float, sigma: 
 
 @pytest.mark.parametrize(
     ("khz", "permittivity", "sigma"),
-    # Table 3 of doi:10.1186/s12938-018-0473-9, dry skin after Gabriel: slower than radars, so the law itself is asked.
+    # Table 3 of doi:10.1186/s12938-018-0473-9, dry skin after Gabriel: slower than radars, so the
+    # law itself is asked.
     [
         (10, 1133.6, 0.00020),
         (100, 1119.2, 0.00045),

@@ -246,7 +246,10 @@ def test_broken_triangles(tmp_path: Path, text: str, reason: str) -> None:
 
 def test_promises_of_a_header_are_not_believed(tmp_path: Path) -> None:
     for element in ("vertex", "face", "surprise"):
-        head = f"ply\nformat binary_little_endian 1.0\nelement {element} 99999999999999999999\nproperty float x\nend_header\n"
+        head = (
+            f"ply\nformat binary_little_endian 1.0\nelement {element} 99999999999999999999\n"
+            "property float x\nend_header\n"
+        )
         (tmp_path / "huge.ply").write_text(head)
         assert "promises more" in refusal(tmp_path / "huge.ply")
     comments = "comment nothing\n" * 9000

@@ -173,7 +173,8 @@ def test_materials_must_be_known_over_the_whole_sweep() -> None:
 
 def test_meshes_are_read_by_a_library_that_loads_when_the_first_one_is() -> None:
     code = (
-        "import sys, rtradar, rtradar.scene; rtradar.Scene.load('free-space'); assert 'trimesh' not in sys.modules; "
+        "import sys, rtradar, rtradar.scene; rtradar.Scene.load('free-space'); "
+        "assert 'trimesh' not in sys.modules; "
         "rtradar.Scene.load('bedroom'); assert 'trimesh' in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -236,7 +236,7 @@ def test_long_and_broken_lines_stay_one_line(tmp_path: Path, text: str) -> None:
     assert len(refusal(tmp_path, text)) < 1000
 
 
-# -- anything at all -------------------------------------------------------------------------------------------------
+# -- anything at all -------------------------------------------------------------------------------
 
 _WORDS = st.sampled_from(
     ["chair", "trihedral", "concrete", "metal", "felt", "../x.ply", "x.ply", "", "\n", "near"]

@@ -1,4 +1,4 @@
-"""The scenes under scenes/: usable at 12 and 77 GHz, closed, inside their rooms, room for the person and the radar."""
+"""The built-in scenes are usable at 12 and 77 GHz, with room for the person and the radar."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ polarizations = st.sampled_from(["te", "tm"])
 def chain(
     eta: complex, thickness_m: float, frequency_hz: float, cosine: float, polarization: Polarization
 ) -> tuple[complex, complex]:
-    """Reflection and transmission by the ABCD matrix of a line as long as the slab is thick: tangential fields."""
+    """Reflection and transmission of tangential fields by the ABCD matrix of a line."""
     k0 = 2 * np.pi * frequency_hz / SPEED_OF_LIGHT_MPS
     inner = np.sqrt(complex(eta - 1 + cosine**2))
     inner = -inner if inner.imag > 0 else inner
@@ -35,7 +35,8 @@ def chain(
     a, b, c = np.cos(phase), 1j * inner_z * np.sin(phase), 1j * np.sin(phase) / inner_z
     total = 2 * a + b / outer_z + c * outer_z
     tangential = (b / outer_z - c * outer_z) / total
-    # The tangential TM field of a reflected wave is that along the wave's own unit vector, turned round.
+    # The tangential TM field of a reflected wave is that along the wave's own unit vector, turned
+    # round.
     return complex(tangential if polarization == "te" else -tangential), complex(2 / total)
 
 
@@ -171,7 +172,8 @@ def test_grazing_incidence_reflects_all(polarization: Polarization) -> None:
 
 
 def test_total_reflection_inside_a_thinner_medium_decays() -> None:
-    # A plasma-like permittivity below 1: beyond the critical angle a thick layer passes nothing, a thin one tunnels.
+    # A plasma-like permittivity below 1: beyond the critical angle a thick layer passes nothing, a
+    # thin one tunnels.
     for thickness, least, most in ((1.0, 0.0, 1e-50), (0.001, 0.5, 1.0)):
         _, transmitted = slab(0.2, thickness, 12e9, 0.1, "te")
         assert least <= abs(transmitted) <= most

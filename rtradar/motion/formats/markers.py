@@ -154,8 +154,8 @@ def _bend(shoulder: Array, elbow: Array, wrist: Array, thorax: Array, sign: floa
     """Direction (frame, 3) in which the forearm leaves the upper arm's line, or would leave it."""
     arm, fore = _unit(elbow - shoulder), _unit(wrist - elbow)
     bent = fore - np.sum(fore * arm, axis=1, keepdims=True) * arm
-    # An arm that hangs down, out and forward bends forward and up; the smallest rotation takes it to
-    # where this arm points.
+    # An arm that hangs down, out and forward bends forward and up; the smallest rotation takes it
+    # to where this arm points.
     rest, ahead = _unit(np.array([0.5, 0.5 * sign, -0.7])), _unit(np.array([0.7, 0.0, 0.5]))
     local = np.einsum("tji,tj->ti", thorax, arm)
     half = rest + local

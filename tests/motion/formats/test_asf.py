@@ -19,8 +19,9 @@ def test_poses_by_hand(asf_files: tuple[Path, Path]) -> None:
     # Mocap (x, y, z) is world (z, x, y). Frame 1: root (1, 2, 3), first 10 up, second 5 along x.
     mocap = np.array([[1, 2, 3], [1, 12, 3], [6, 12, 3]])
     np.testing.assert_allclose(motion.positions[0], UNIT * mocap[:, [2, 0, 1]], atol=1e-12)
-    # Frame 2: the root turns x to -z, `first` by 450 = 90 degrees about z (y to -x), so `first` points to +z and `second`,
-    # turned by 90 about its own x axis C x = y: x to -z; then by `first`: -z; then by the root: -x.
+    # Frame 2: the root turns x to -z, `first` by 450 = 90 degrees about z (y to -x), so `first`
+    # points to +z and `second`, turned by 90 about its own x axis C x = y: x to -z; then by
+    # `first`: -z; then by the root: -x.
     mocap = np.array([[1, 2, 3], [1, 2, 13], [-4, 2, 13]])
     np.testing.assert_allclose(motion.positions[1], UNIT * mocap[:, [2, 0, 1]], atol=1e-12)
 
@@ -124,7 +125,8 @@ def test_any_cut_of_a_file_is_refused_or_whole(asf_files: tuple[Path, Path]) -> 
         else:
             whole += 1
             assert len(motion.root_positions) in (1, 2)
-    # Whole: after frame 1 (its last line with or without its end, and nothing of the next), and in the last number.
+    # Whole: after frame 1 (its last line with or without its end, and nothing of the next), and in
+    # the last number.
     assert whole <= 6
 
 

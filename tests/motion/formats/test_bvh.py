@@ -76,8 +76,8 @@ def test_poses_by_hand(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         motion.positions[0], [[0, 0, 1.0], [0, 0, 0.5], [0, 0, 0]], atol=1e-12
     )
-    # The hip turns by 90 about x: down (-y) becomes -z. The knee's channels are Y, Z, X: Z by 90 first takes -y to +x,
-    # which the hip's turn leaves alone. World is (z, x, y) of mocap.
+    # The hip turns by 90 about x: down (-y) becomes -z. The knee's channels are Y, Z, X: Z by 90
+    # first takes -y to +x, which the hip's turn leaves alone. World is (z, x, y) of mocap.
     np.testing.assert_allclose(
         motion.positions[1], [[0.2, 0.1, 1], [-0.3, 0.1, 1], [-0.3, 0.6, 1]], atol=1e-12
     )
@@ -90,7 +90,8 @@ def test_carrying_joint_becomes_root_and_positions_replace_offsets(tmp_path: Pat
     np.testing.assert_allclose(
         motion.positions[0], [[0, 0, 1.0], [0, 0, 0.6], [0, 0, 0.1], [0, 0, 1.3]], atol=1e-12
     )
-    # The world joint turns by 90 about y, x to -z: the hip at mocap (5, 100, 0) stands at (0, 100, -5).
+    # The world joint turns by 90 about y, x to -z: the hip at mocap (5, 100, 0) stands at (0, 100,
+    # -5).
     np.testing.assert_allclose(motion.positions[1, 0], [-0.05, 0, 1.0], atol=1e-12)
 
 

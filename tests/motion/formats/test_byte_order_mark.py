@@ -1,4 +1,4 @@
-"""A byte order mark before the text of a file, as Windows' editors write it, is no part of that text."""
+"""The byte order mark that editors of Windows write before a text is not part of the text."""
 
 from __future__ import annotations
 

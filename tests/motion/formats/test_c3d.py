@@ -1,4 +1,4 @@
-"""C3D files, written by an independent library: what a person's markers say of the joints, and what is refused."""
+"""C3D files that an independent library writes: joints from markers, and what is refused."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ HDM05 = [
     *("RTHI", "RKNE", "RSHN", "RANK", "RHEE", "RTOE", "RMT5"),
 ]
 
-# A person at the origin who looks along +x, forearms forward, thumbs up [m]; the left side of what is on both.
+# A person at the origin who looks along +x, forearms forward, thumbs up [m]; the left side of what
+# is on both.
 STANDING = {
     "FHD": (0.10, 0.07, 1.62),
     "BHD": (-0.08, 0.05, 1.62),
@@ -153,13 +154,15 @@ def test_joints_stand_where_the_table_puts_them(
 
 
 def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
-    """Markers of somebody of this height, and the centres of the joints, of the left side: forward, left, up [m].
+    """Return markers and joint centres of a person's left side: forward, left, up [m].
 
-    He stands with his forearms forward, his thumbs up and his gaze level. Heights and breadths are fractions of the standing
-    height after Drillis and Contini (see `rtradar.motion.synthetic.figure`): chin 0.870, eyes 0.936, shoulders 0.818 high and
-    0.129 to the side, hips 0.530 and 0.048, knees 0.285, ankles 0.039. Markers lie on the skin, about 3 to 6 cm from the centre
-    of a limb; waist markers are worn on the crest of the hip bone, 0.60 high, and wrist bars stand off the back of the hand's
-    wrist. The head is carried before the spine: the ear lies 50 degrees above the horizontal of the seventh cervical vertebra.
+    The person stands with forearms forward, thumbs up and a level gaze. Heights and breadths are
+    fractions of the standing height after Drillis and Contini (see
+    `rtradar.motion.synthetic.figure`): chin 0.870, eyes 0.936, shoulders 0.818 high and 0.129 to
+    the side, hips 0.530 and 0.048, knees 0.285, ankles 0.039. Markers lie on the skin, about 3 to 6
+    cm from the centre of a limb; waist markers are worn on the crest of the hip bone, 0.60 high,
+    and wrist bars stand off the back of the hand's wrist. The head is carried before the spine: the
+    ear lies 50 degrees above the horizontal of the seventh cervical vertebra.
     """
     arm, elbow = 0.118, 0.818 - 0.186
     joints = {
@@ -200,7 +203,7 @@ def anatomical(height: float) -> tuple[dict[str, np.ndarray], dict[str, np.ndarr
 
 @pytest.mark.parametrize("height", [1.2, 1.77, 2.05])
 def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> None:
-    """Within 3 % of the height, 5.3 cm of a grown man: a mean person's markers are no nearer to anybody's own joints."""
+    """Joints agree to 3 % of the height, 5.3 cm of an adult: mean offsets fit no one better."""
     markers, joints = anatomical(height)
 
     def mirrored(places: dict[str, np.ndarray], name: str, side: str, plain: str) -> np.ndarray:
@@ -227,7 +230,7 @@ def test_joints_stand_where_anatomy_has_them(tmp_path: Path, height: float) -> N
 
 @pytest.mark.parametrize("down", [0.0, 0.3, 1.0])
 def test_straight_arms_of_both_sides_mirror_each_other(tmp_path: Path, down: float) -> None:
-    """A straight arm does not say where it would bend; both sides must be guessed alike, whichever way the arms point."""
+    """A straight arm does not say where it would bend; the guess must be alike on both sides."""
     markers, _ = anatomical(1.77)
     way = np.array([0.0, 1.0 - down, -down]) / np.hypot(1.0 - down, down)
     shoulder = markers["SHO"]
@@ -302,7 +305,8 @@ def test_short_gaps_are_bridged(tmp_path: Path, walk: np.ndarray, lost: float) -
     for name, begin in (("LKNE", 30), ("RWRA", 50), ("LTHI", 0)):  # the last is not needed at all
         walk[begin : begin + longest, HDM05.index(name)] = lost
     bridged = load_motion(write(tmp_path / "gaps.c3d", walk))
-    # 0.1 s of a turning walk: a cubic spline misses its sines by h^4/384 times 9^4 x 0.02 m, and less than that: 40 um.
+    # 0.1 s of a turning walk: a cubic spline misses its sines by h^4/384 times 9^4 x 0.02 m, and
+    # less than that: 40 um.
     assert 0 < np.abs(bridged.positions - whole.positions).max() < 40e-6
 
 
@@ -369,7 +373,7 @@ def test_names_of_two_lines_are_told_in_one(tmp_path: Path, walk: np.ndarray) ->
 
 
 def test_a_file_gives_no_more_than_it_has(tmp_path: Path) -> None:
-    """Damaged rates make the reader ask for terabytes, for which Python takes the memory before it looks."""
+    """Damaged rates make the reader ask for terabytes, which Python would reserve at once."""
     (tmp_path / "x.c3d").write_bytes(b"12345")
     with _Bounded(io.FileIO(tmp_path / "x.c3d")) as file:
         assert file.read(2) == b"12"

@@ -16,7 +16,7 @@ STILL = np.tile(np.eye(3), (FRAMES, 1, 1))
 
 
 def swinging() -> np.ndarray:
-    """Joints (frame, node, 3) whose bones all swing far, each in its own way, and keep their lengths."""
+    """Joints (frame, node, 3) whose bones all swing far and differently, and keep their lengths."""
     random = np.random.default_rng(2)
     time = np.arange(FRAMES)[:, None] / 60
     rates, phases = random.uniform(1, 4, (2, 21)), random.uniform(0, 6, (2, 21))

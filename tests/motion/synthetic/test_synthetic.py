@@ -66,7 +66,8 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
     heels = ankles + quaternion_rotate(feet, height * np.array([HEEL_X, 0.0, -ANKLE]))
     carried = []
     for points, level in ((toes, TOE_HEIGHT * height), (heels, 0.0)):
-        # On the floor (to 0.01 mm, in both frames) it stands still: what still moves there is about to lift or just landed.
+        # On the floor (to 0.01 mm, in both frames) it stands still: what still moves there is about
+        # to lift or just landed.
         down = np.maximum(points[1:, :, 2], points[:-1, :, 2]) < level + 1e-5
         across = np.linalg.norm(np.diff(points[..., :2], axis=0), axis=2)[down] * motion.rate_hz
         assert np.quantile(across, 0.98) < 0.02
@@ -80,7 +81,7 @@ def test_standing_feet_do_not_slide(subject: dict) -> None:
 @settings(max_examples=25)
 @given(subjects)
 def test_motion_is_smooth(subject: dict) -> None:
-    """Halving the frame interval halves the steps of acceleration: it is continuous, so the motion is C2."""
+    """Halving the frame interval halves the steps of acceleration, so the motion is C2."""
     jumps = []
     for rate in (480.0, 960.0):
         motion = synthetic_motion(**subject | {"duration_s": 1.5}, rate_hz=rate)
@@ -157,10 +158,11 @@ def test_punch(seed: int, side: str) -> None:
 def test_who_strikes_stands_on_bent_knees(
     activity: str, least_deg: float, most_deg: float, height_m: float
 ) -> None:
-    """How high the root is follows from where the feet stand, how long the legs are and how far a fighter's knees are bent.
+    """The height of the root follows from the feet, the legs and the bend of a fighter's knees.
 
-    Leg lengths are those of Drillis and Contini: thigh 0.245 and shank 0.246 of the standing height, and the root lies 0.04
-    above the hip joints. A root 2 % of the height lower or higher would bend the knees by 10 degrees more or less.
+    Leg lengths are those of Drillis and Contini: thigh 0.245 and shank 0.246 of the standing
+    height, and the root lies 0.04 above the hip joints. A root 2 % of the height lower or higher
+    would bend the knees by 10 degrees more or less.
     """
     for seed in range(4):
         motion = synthetic_motion(activity, seed, height_m=height_m, side="left")
