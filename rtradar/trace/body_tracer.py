@@ -1,189 +1,126 @@
-"""Ask Mitsuba what rays meet on a posed body.
+"""Ask Mitsuba which lines of sight past a body of ellipsoids are clear.
 
-Mitsuba works in float32. So the scene is centred on the body, each ray starts where it enters the ball around it, and
-all that is taken from Mitsuba is which part is met first, on which triangle and where in it. A place comes from the
-triangle and its barycentric coordinates in float64; lengths of paths are never taken from here.
+Every ellipsoid is the exact unit `sphere` of Mitsuba in axes of its own, so there is no scene to
+pose: each ray is taken into the axes of the part that it comes near. The answers are held against
+float64 in `validation/other_methods/occlusion.py`.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.meshes import unit_sphere
-from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene
-from rtradar.trace.near_rays import near_rays
-from rtradar.trace.rays import rays_of
-from rtradar.trace.unit_sphere import UnitSphere
+from rtradar.body.body import Poses
+from rtradar.kernels.scatter.near_rays import near_rays
+from rtradar.system.threads import in_threads
+from rtradar.trace.rays import any_met
 
-SUBDIVISIONS = 4
-"""5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
+_LINES_A_THREAD = 1 << 14
+"""For fewer, waking threads costs more than the work."""
 
 
-@dataclass(frozen=True)
-class Hits:
-    """What rays met first.
+class UnitSphere:
+    """The unit sphere in a Mitsuba scene of its own, made for the first rays.
 
     Parameters
     ----------
-    part : (ray,) int64
-        Body part; -1 where nothing was met.
-    distance : (ray,) float64
-        From the origin of the ray [m], of float32 quality: enough to say who is in front. Infinite where nothing was met.
-    local : (ray, 3) float64
-        The place in the part's own axes, on its ellipsoid [m]; NaN where nothing was met.
+    mi : module or callable
+        Mitsuba with its variant set, or what loads it.
     """
 
-    part: NDArray[np.int64]
-    distance: NDArray[np.float64]
-    local: NDArray[np.float64]
+    def __init__(self, mi: ModuleType | Callable[[], ModuleType]) -> None:
+        self._mi: Any = mi
+        self._scene: Any = None
+
+    def meets(self, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+        """Which rays (7, ray) meet it: start, unit direction and length in its axes."""
+        if self._scene is None and rays.size:
+            self._mi = self._mi() if callable(self._mi) else self._mi
+            self._scene = self._mi.load_dict({"type": "scene", "sphere": {"type": "sphere"}})
+        return any_met(self._mi, self._scene, rays)
 
 
 class BodyTracer:
-    """A body of ellipsoids in a Mitsuba scene, posed again and again.
+    """A body of ellipsoids, posed again and again.
 
     Parameters
     ----------
-    mi : module
-        Mitsuba with its variant set.
+    mi : module or callable
+        Mitsuba with its variant set, or what loads it for the first ray.
     semi_axes : (part, 3) float64
-        [m].
+        Semi-axes of the parts [m].
     """
 
-    def __init__(self, mi: Any, semi_axes: NDArray[np.float64]) -> None:
-        self._mi = mi
-        self._scalar = mi.variant().startswith("scalar")
-        self._semi_axes = np.asarray(semi_axes, dtype=np.float64)
+    def __init__(
+        self, mi: ModuleType | Callable[[], ModuleType], semi_axes: NDArray[np.float64]
+    ) -> None:
+        self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         self._sphere = UnitSphere(mi)
-        self._vertices, self._faces = unit_sphere(SUBDIVISIONS)
-        self._scene = build_body_scene(mi, self._vertices, self._faces, len(self._semi_axes))
-        self._parameters = mi.traverse(self._scene)
-        self._centre = np.zeros(3)
-        self._ball = 0.0
         self._pose: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-        self._waiting = False
-        self._part_of: Any
-        shapes = sorted(self._scene.shapes(), key=lambda shape: shape.id())
-        if self._scalar:
-            self._part_of = {shape.id(): part for part, shape in enumerate(shapes)}
-        else:
-            import drjit as dr
-
-            registry = [
-                int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0]) for shape in shapes
-            ]
-            self._part_of = np.full(max(registry) + 1, -1, dtype=np.int64)
-            self._part_of[registry] = np.arange(len(registry))
 
     def pose(self, centres: NDArray[np.float64], frames: NDArray[np.float64]) -> None:
-        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes; Mitsuba hears of it by the first ray."""
-        # Several ask about one pose in turn, and to place it is most of the cost of a few rays.
-        if self._pose is None or not all(map(np.array_equal, self._pose, (centres, frames))):
-            self._pose, self._waiting = (centres.copy(), frames.copy()), True
-
-    def _place(self) -> None:
-        """See to it that Mitsuba has the pose."""
-        if self._pose is None:
-            raise RuntimeError("BodyTracer: pose the body before rays are sent")
-        if not self._waiting:
-            return
-        centres, frames = self._pose
-        self._waiting = False
-        self._centre = (centres.max(axis=0) + centres.min(axis=0)) / 2
-        self._ball = (
-            float(
-                (np.linalg.norm(centres - self._centre, axis=1) + self._semi_axes.max(axis=1)).max()
-            )
-            * 1.01
-        )
-        matrices = np.zeros((len(centres), 4, 4))
-        matrices[:, :3, :3] = frames * self._semi_axes[:, None, :]
-        matrices[:, :3, 3] = centres - self._centre
-        matrices[:, 3, 3] = 1
-        pose_body_scene(self._mi, self._parameters, matrices)
+        """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``, world axes."""
+        self._pose = centres, frames
 
     def sees(
         self, origins: NDArray[np.float64], targets: NDArray[np.float64], own: NDArray[np.int64]
     ) -> NDArray[np.bool_]:
-        """Whether no other part stands between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
+        """Whether no other part is between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
 
-        A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba decides about every line of sight
-        and every part that the line comes near.
+        A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba decides
+        about every line of sight and every part that the line comes near.
         """
         if self._pose is None:
             raise RuntimeError("BodyTracer: pose the body before rays are sent")
-        rays, line = near_rays(origins, targets, own, *self._pose, self._semi_axes)
-        seen = np.ones(len(origins), dtype=bool)
-        seen[line[self._sphere.meets(rays)]] = False
-        return seen
+        parts = len(self._semi_axes)
+        posed = Poses(self._pose[0][None], self._pose[1][None], self._semi_axes)
+        # The last group is that of targets on no part.
+        whose = np.append(np.arange(parts), -1), np.zeros(parts + 1, dtype=np.int64)
+        return self.clear(origins, targets, own % (parts + 1), *whose, posed)
 
-    def first_hits(self, origins: NDArray[np.float64], targets: NDArray[np.float64]) -> Hits:
-        """What rays from ``origins (ray, 3)`` through ``targets (ray, 3)`` meet first; world [m]."""
-        if len(origins) == 0:
-            # Dr.Jit takes the process down over arrays without entries.
-            return Hits(np.empty(0, dtype=np.int64), np.empty(0), np.empty((0, 3)))
-        self._place()
-        directions = targets - origins
-        directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
-        starts = origins - self._centre
-        # Distance along the ray to where it enters the ball around the body; rays that miss it miss the body.
-        along = -np.einsum("ij,ij->i", starts, directions)
-        half_chord = np.sqrt(
-            np.maximum(self._ball**2 - np.einsum("ij,ij->i", starts, starts) + along**2, 0.0)
-        )
-        ahead = np.maximum(along - half_chord, 0.0)
-        starts = starts + ahead[:, None] * directions
-        part, distance, triangle, barycentric = (
-            self._trace_scalar if self._scalar else self._trace
-        )(starts, directions)
-        met = part >= 0
-        local = np.full(origins.shape, np.nan)
-        corners = self._vertices[self._faces[triangle[met]]]
-        weights = np.column_stack([1 - barycentric[met].sum(axis=1), barycentric[met]])
-        on_sphere = np.einsum("rc,rci->ri", weights, corners)
-        on_sphere /= np.linalg.norm(on_sphere, axis=1, keepdims=True)
-        local[met] = on_sphere * self._semi_axes[part[met]]
-        return Hits(part, np.where(met, distance + ahead, np.inf), local)
+    def clear(
+        self,
+        origins: NDArray[np.float64],
+        targets: NDArray[np.float64],
+        group: NDArray[np.int64],
+        own: NDArray[np.int64],
+        pose: NDArray[np.int64],
+        poses: Poses,
+    ) -> NDArray[np.bool_]:
+        """Whether no part is in the way of lines of sight past the body in several poses.
 
-    def _trace(
-        self, starts: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[Any, Any, Any, Any]:
-        import drjit as dr
+        Parameters
+        ----------
+        origins, targets : (line, 3) float64
+            Ends of the lines, world [m].
+        group : (line,) int64
+            Lines of one group have their targets on one part, in one pose.
+        own, pose : (group,) int64
+            That part, which cannot occlude them, -1 for none; and the pose.
+        poses : Poses
+            Poses of the body.
 
-        mi = self._mi
-        found = self._scene.ray_intersect_preliminary(
-            rays_of(mi, starts, directions), coherent=False
-        )
-        instance = dr.reinterpret_array(mi.UInt32, found.instance)
-        dr.eval(found.t, found.prim_index, found.prim_uv, instance)
-        distance = found.t.numpy().astype(np.float64)
-        part = np.where(np.isfinite(distance), self._part_of[instance.numpy()], -1)
-        # A ray that misses leaves its coordinates unset, and what stands there need not be a number.
-        barycentric = np.where(part >= 0, found.prim_uv.numpy(), np.float32(0))
-        return (
-            part,
-            distance,
-            found.prim_index.numpy().astype(np.int64),
-            barycentric.astype(np.float64).T,
-        )
+        Returns
+        -------
+        (line,) bool
+        """
+        floats = (origins, targets, poses.centres, poses.frames, self._semi_axes)
+        starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
 
-    def _trace_scalar(
-        self, starts: NDArray[np.float64], directions: NDArray[np.float64]
-    ) -> tuple[Any, Any, Any, Any]:
-        mi = self._mi
-        rays = len(starts)
-        part, triangle = np.full(rays, -1, dtype=np.int64), np.zeros(rays, dtype=np.int64)
-        distance, barycentric = np.full(rays, np.inf), np.zeros((rays, 2))
-        for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
-            found = self._scene.ray_intersect_preliminary(
-                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
+        def near(begin: int) -> tuple[NDArray[np.float32], NDArray[np.int64]]:
+            own_lines = slice(begin, begin + _LINES_A_THREAD)
+            rays, line = near_rays(
+                starts[own_lines], ends[own_lines], group[own_lines], own, pose, *body
             )
-            if found.is_valid():
-                part[ray] = self._part_of[found.instance.id()]
-                distance[ray] = found.t
-                triangle[ray] = found.prim_index
-                barycentric[ray] = found.prim_uv.x, found.prim_uv.y
-        return part, distance, triangle, barycentric
+            return rays, line + begin
+
+        found = in_threads(near, range(0, len(starts), _LINES_A_THREAD))
+        seen = np.ones(len(starts), dtype=bool)
+        if found:
+            rays, line = (np.concatenate(arrays, axis=-1) for arrays in zip(*found, strict=True))
+            seen[line[self._sphere.meets(rays)]] = False
+        return seen

@@ -6,15 +6,17 @@ part of a body, or the face of a mesh. The place follows in float64 from the ray
 
 from __future__ import annotations
 
-from typing import Any, Literal, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.scene.mitsuba_scene import triangle_mesh
-from rtradar.trace.backends.jit_threads import grow_for
-from rtradar.trace.body_tracer import BodyTracer
-from rtradar.trace.rays import rays_of
+from rtradar.body.meshes import unit_sphere
+from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene, triangle_mesh
+from rtradar.trace.rays import first_met, into_ball
+
+SUBDIVISIONS = 4
+"""5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
 _LIFT_OF_PART = 1e-3
 """Of the largest semi-axis: the traced triangles of a part lie up to 0.07 % outside it, and must not stop rays that leave it."""
@@ -55,46 +57,6 @@ class Surfaces(Protocol):
         ...
 
 
-class _PartTracer(BodyTracer):
-    """A posed body that tells which part is met, and no place: most rays ask no more."""
-
-    def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
-        """Part (ray,) met first, -1 for none, and distance (ray,) [m]; ``directions (ray, 3)`` are unit vectors."""
-        if len(origins) == 0:
-            # Dr.Jit takes the process down over arrays without entries.
-            return np.empty(0, dtype=np.int64), np.empty(0)
-        self._place()
-        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
-        if self._scalar:
-            part, distance, _, _ = self._trace_scalar(starts, directions)
-            return part, distance + ahead
-        instance, distance = first_hits(self._mi, self._scene, starts, directions, "instance")
-        return np.where(np.isfinite(distance), self._part_of[instance], -1), distance + ahead
-
-
-def first_hits(
-    mi: Any, scene: Any, starts: Array, directions: Array, what: Literal["instance", "prim_index"]
-) -> tuple[NDArray[np.uint32], Array]:
-    """Number (ray,) of what vector variants meet first, without meaning where the distance (ray,) is infinite."""
-    import drjit as dr
-
-    grow_for(mi, len(starts))
-    found = scene.ray_intersect_preliminary(rays_of(mi, starts, directions), coherent=False)
-    met = dr.reinterpret_array(mi.UInt32, getattr(found, what))
-    dr.eval(found.t, met)
-    return met.numpy(), found.t.numpy().astype(np.float64)
-
-
-def into_ball(starts: Array, directions: Array, radius: float) -> tuple[Array, Array]:
-    """Where rays enter the ball about 0, (ray, 3), and how far that is: float32 is too coarse for a far antenna."""
-    along = -np.einsum("ij,ij->i", starts, directions)
-    # Of the nearest point, not of the start: squares of 1e6 m would swallow it.
-    nearest = starts + along[:, None] * directions
-    half_chord = np.sqrt(np.maximum(radius**2 - np.einsum("ij,ij->i", nearest, nearest), 0.0))
-    ahead = np.maximum(along - half_chord, 0.0)
-    return starts + ahead[:, None] * directions, ahead
-
-
 class BodySurfaces:
     """Ellipsoids, posed; a surface is a part.
 
@@ -109,20 +71,44 @@ class BodySurfaces:
     flat = False
 
     def __init__(self, mi: Any, semi_axes: Array) -> None:
-        self._tracer = _PartTracer(mi, semi_axes)
+        self._mi = mi
         self._axes = np.asarray(semi_axes, dtype=np.float64)
-        self._centres, self._frames = np.zeros_like(self._axes), np.zeros((len(self._axes), 3, 3))
+        self._scene = build_body_scene(mi, *unit_sphere(SUBDIVISIONS), len(self._axes))
+        self._parameters = mi.traverse(self._scene)
+        # The instances by their numbers in Dr.Jit's registry, which scalar variants have none of.
+        self._instances = np.empty(0, dtype=np.int64)
+        if not mi.variant().startswith("scalar"):
+            import drjit as dr
+
+            shapes = sorted(self._scene.shapes(), key=lambda shape: shape.id())
+            pointers = (dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape)) for shape in shapes)
+            registry = [int(pointer[0]) for pointer in pointers]
+            self._instances = np.full(max(registry) + 1, -1, dtype=np.int64)
+            self._instances[registry] = np.arange(len(registry))
 
     def pose(self, centres: Array, frames: Array) -> None:
         """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``."""
-        self._tracer.pose(centres, frames)
         self._centres, self._frames = centres, frames
+        self._centre = (centres.max(axis=0) + centres.min(axis=0)) / 2
+        reach = np.linalg.norm(centres - self._centre, axis=1) + self._axes.max(axis=1)
+        self._ball = float(reach.max()) * 1.01
+        matrices = np.zeros((len(centres), 4, 4))
+        matrices[:, :3, :3] = frames * self._axes[:, None, :]
+        matrices[:, :3, 3] = centres - self._centre
+        matrices[:, 3, 3] = 1
+        pose_body_scene(self._mi, self._parameters, matrices)
+
+    def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
+        """Part (ray,) met first, -1 for none, and distance (ray,) [m] along unit vectors (ray, 3)."""
+        starts, ahead = into_ball(origins - self._centre, directions, self._ball)
+        part, distance = first_met(self._mi, self._scene, starts, directions, self._instances)
+        return part, distance + ahead
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """As `Surfaces.sees`; a part does not hide itself here, for its normal tells that."""
         directions = points - antennas
         range_m = np.sqrt(np.einsum("ij,ij->i", directions, directions))
-        part, distance = self._tracer.first_parts(antennas, directions / range_m[:, None])
+        part, distance = self.first_parts(antennas, directions / range_m[:, None])
         return ~((part != own) & (distance < range_m * (1 - _BEHIND)))
 
     def meets(
@@ -130,7 +116,7 @@ class BodySurfaces:
     ) -> tuple[NDArray[np.int64], Array]:
         """As `Surfaces.meets`."""
         lifted = points + _LIFT_OF_PART * self._axes.max(axis=1)[own][:, None] * normals
-        return self._tracer.first_parts(lifted, directions)
+        return self.first_parts(lifted, directions)
 
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
         """As `Surfaces.distance`: where the line enters the ellipsoid."""
@@ -161,15 +147,21 @@ class MeshSurfaces:
     mi : module
         Mitsuba with its variant set.
     vertices, faces : (vertex, 3) float64, (face, 3) int
-        [m].
+        Vertices, world [m], and the numbers of the three of each face.
+    same : float
+        A hit nearer to a point than this fraction of the mesh's size is the point; float32 knows
+        distances to a millionth.
     """
 
     flat = True
 
-    def __init__(self, mi: Any, vertices: Array, faces: NDArray[np.integer]) -> None:
+    def __init__(
+        self, mi: Any, vertices: Array, faces: NDArray[np.integer], *, same: float = 1e-6
+    ) -> None:
         corners = np.asarray(vertices, dtype=np.float64)[faces]
+        self._same = same
         used = corners.reshape(-1, 3)
-        self._mi, self._scalar = mi, mi.variant().startswith("scalar")
+        self._mi = mi
         self._centre = (used.max(axis=0) + used.min(axis=0)) / 2
         self._ball = float(np.linalg.norm(used - self._centre, axis=1).max()) * 1.01
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -184,8 +176,7 @@ class MeshSurfaces:
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """As `Surfaces.sees`."""
         face, met = self._first_hits(antennas, points - antennas)
-        # Within the ball float32 knows distances to a millionth of its radius.
-        nearer = met < np.linalg.norm(points - antennas, axis=1) - 1e-6 * self._ball
+        nearer = met < np.linalg.norm(points - antennas, axis=1) - self._same * self._ball
         return ~((face != own) & nearer)
 
     def meets(
@@ -208,25 +199,7 @@ class MeshSurfaces:
 
     def _first_hits(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
         """Face (ray,) met first, -1 for none, and distance (ray,) [m], infinite for none."""
-        if len(origins) == 0:
-            # Dr.Jit takes the process down over arrays without entries.
-            return np.empty(0, dtype=np.int64), np.empty(0)
         directions = directions / np.linalg.norm(directions, axis=1, keepdims=True)
         starts, ahead = into_ball(origins - self._centre, directions, self._ball)
-        if self._scalar:
-            face, distance = self._trace_scalar(starts, directions)
-        else:
-            number, distance = first_hits(self._mi, self._scene, starts, directions, "prim_index")
-            face = np.where(np.isfinite(distance), number.astype(np.int64), -1)
+        face, distance = first_met(self._mi, self._scene, starts, directions)
         return face, distance + ahead
-
-    def _trace_scalar(self, starts: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
-        mi = self._mi
-        face, distance = np.full(len(starts), -1, dtype=np.int64), np.full(len(starts), np.inf)
-        for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
-            found = self._scene.ray_intersect_preliminary(
-                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
-            )
-            if found.is_valid():
-                face[ray], distance[ray] = found.prim_index, found.t
-        return face, distance

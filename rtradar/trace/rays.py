@@ -1,44 +1,124 @@
-"""Rays for the variants of Mitsuba that trace many at once, so that one compiled kernel serves any number of them."""
+"""Ask Mitsuba about rays, on every backend, and count what it was asked.
+
+Mitsuba works in float32. So scenes are centred, each ray starts where it enters the ball around its
+scene, and of the answer only what is met, and roughly how far, is used.
+"""
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.trace.backends.jit_threads import grow_for
+
 _LANES = 16
-"""Of float32 in the widest vectors."""
+"""Numbers of float32 in the widest vectors."""
+
+_LEAST_RAYS = 4096
+"""Rays traced at once, with idle ones among them: else the memory that Dr.Jit keeps for itself would
+grow with the largest number that ever came."""
+
+_ONE_AT_A_TIME = threading.Lock()
+
+_counted = 0
 
 
-def rays_of(mi: Any, starts: ArrayLike, ways: ArrayLike, reach: ArrayLike | None = None) -> Any:
-    """Rays from starts along directions.
+def rays_traced() -> int:
+    """Return how many rays this process has asked Mitsuba about."""
+    return _counted
 
-    Dr.Jit compiles anew for memory that does not begin where a vector may, and for rows cut from one array of another width:
-    so each row is handed over by itself, from where a vector may begin.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with a variant that is not scalar.
-    starts, ways : (ray, 3) float
-        Where they begin, and unit vectors; at least one ray, as Dr.Jit takes the process down over arrays without entries.
-    reach : (ray,) float, optional
-        How far they go; as far as there is anything unless given.
+def any_met(mi: Any, scene: Any, rays: NDArray[np.float32]) -> NDArray[np.bool_]:
+    """Whether rays (7, ray) meet anything: start, unit direction, and length."""
+    count = _count(rays.shape[1])
+    if count == 0:
+        return np.zeros(0, dtype=np.bool_)
+    if mi.variant().startswith("scalar"):
+        found = []
+        for x, y, z, *direction, length in rays.T.tolist():
+            ray = mi.Ray3f(mi.Point3f(x, y, z), mi.Vector3f(*direction))
+            ray.maxt = length
+            found.append(bool(scene.ray_test(ray)))
+        return np.array(found)
+    padded = np.zeros((7, max(count, _LEAST_RAYS)), dtype=np.float32)
+    padded[:, :count] = rays
+    padded[3, count:] = 1  # from the middle, no way at all
+    with _ONE_AT_A_TIME:
+        met = scene.ray_test(rays_of(mi, padded), coherent=True)
+        return np.asarray(met.numpy())[:count]
 
-    Returns
-    -------
-    mitsuba.Ray3f
+
+def first_met(
+    mi: Any,
+    scene: Any,
+    starts: NDArray[np.float64],
+    directions: NDArray[np.float64],
+    instances: NDArray[np.int64] | None = None,
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Return what rays (ray, 3) meet first, -1 for nothing, and how far it is, else infinite.
+
+    What is met is the number of a triangle; or with ``instances``, by number in Mitsuba's registry,
+    that of the instance.
     """
-    rows = np.concatenate(
-        [np.transpose(starts), np.transpose(ways)]
-        + ([] if reach is None else [np.asarray(reach)[None]])
-    )
-    values = [mi.Float(row) for row in _aligned(rows)]
+    count = _count(len(starts))
+    if count == 0:
+        return np.empty(0, dtype=np.int64), np.empty(0)
+    if mi.variant().startswith("scalar"):
+        number, distance = np.full(count, -1, dtype=np.int64), np.full(count, np.inf)
+        for ray, (start, direction) in enumerate(zip(starts, directions, strict=True)):
+            found = scene.ray_intersect_preliminary(
+                mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*direction))
+            )
+            if found.is_valid():
+                # Instances are named by their numbers, see `build_body_scene`.
+                own = found.prim_index if instances is None else found.instance.id()[4:]
+                number[ray], distance[ray] = int(own), found.t
+        return number, distance
+    import drjit as dr
+
+    grow_for(mi, count)
+    rays = rays_of(mi, np.concatenate([starts.T, directions.T]))
+    found = scene.ray_intersect_preliminary(rays, coherent=False)
+    met = dr.reinterpret_array(mi.UInt32, found.prim_index if instances is None else found.instance)
+    dr.eval(found.t, met)
+    distance = found.t.numpy().astype(np.float64)
+    number = met.numpy().astype(np.int64) if instances is None else instances[met.numpy()]
+    return np.where(np.isfinite(distance), number, -1), distance
+
+
+def into_ball(
+    starts: NDArray[np.float64], directions: NDArray[np.float64], radius: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Where rays enter the ball about 0, (ray, 3), and how far that is (ray,)."""
+    along = -np.einsum("ij,ij->i", starts, directions)
+    # From the nearest point, not from the start: squares of 1e6 m would swallow it.
+    nearest = starts + along[:, None] * directions
+    half_chord = np.sqrt(np.maximum(radius**2 - np.einsum("ij,ij->i", nearest, nearest), 0.0))
+    ahead = np.maximum(along - half_chord, 0.0)
+    return starts + ahead[:, None] * directions, ahead
+
+
+def rays_of(mi: Any, rows: ArrayLike) -> Any:
+    """Make rays of Mitsuba from rows (6 or 7, ray): starts, directions, and lengths if they end.
+
+    Dr.Jit compiles anew for memory that does not begin where a vector may, and for rows cut from
+    one array of another width: so each row is handed over by itself, from where a vector may begin.
+    """
+    values = [mi.Float(row) for row in _aligned(np.asarray(rows))]
     ray = mi.Ray3f(mi.Point3f(*values[:3]), mi.Vector3f(*values[3:6]))
-    if reach is not None:
+    if len(values) == 7:
         ray.maxt = values[6]
     return ray
+
+
+def _count(rays: int) -> int:
+    global _counted
+    with _ONE_AT_A_TIME:
+        _counted += rays
+    return rays
 
 
 def _aligned(rows: NDArray[Any]) -> NDArray[np.float32]:

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.scene import Scene
-from rtradar.trace.rays import rays_of
+from rtradar.scene.mitsuba_scene import triangle_mesh
+from rtradar.trace.rays import any_met
 
 CLEAR_M = 1e-3
 """Both ends of a leg are drawn in by this, so that a point on a surface is not hidden by that surface: a thousand times what
@@ -43,17 +44,7 @@ class RoomTracer:
             )
             self._centre = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
             self._ball = float(np.linalg.norm(vertices - self._centre, axis=1).max()) * 1.01
-            mesh = mi.Mesh(
-                "furniture",
-                len(vertices),
-                len(faces),
-                has_vertex_normals=False,
-                has_vertex_texcoords=False,
-            )
-            parameters = mi.traverse(mesh)
-            parameters["vertex_positions"] = np.ravel(vertices - self._centre).astype(np.float32)
-            parameters["faces"] = np.ravel(faces).astype(np.uint32)
-            parameters.update()
+            mesh = triangle_mesh(mi, vertices - self._centre, faces)
             self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
 
     def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
@@ -86,24 +77,7 @@ class RoomTracer:
         # Only legs that enter the ball have to be followed.
         asked = np.flatnonzero((chord > 0) & (last > first))
         met = np.zeros(len(starts), dtype=bool)
-        if len(asked):  # Dr.Jit takes the process down over arrays without entries
-            entry = starts[asked] + first[asked, None] * ways[asked]
-            met[asked] = self._met(entry, ways[asked], (last - first)[asked])
+        entry = starts[asked] + first[asked, None] * ways[asked]
+        rays = np.concatenate([entry.T, ways[asked].T, (last - first)[None, asked]])
+        met[asked] = any_met(self._mi, self._scene, rays.astype(np.float32))
         return met.reshape(out.shape)
-
-    def _met(
-        self, starts: NDArray[np.float64], ways: NDArray[np.float64], reach: NDArray[np.float64]
-    ) -> NDArray[np.bool_]:
-        mi = self._mi
-        if mi.variant().startswith("scalar"):
-            found = []
-            for start, way, limit in zip(
-                starts.tolist(), ways.tolist(), reach.tolist(), strict=True
-            ):
-                ray = mi.Ray3f(mi.Point3f(*start), mi.Vector3f(*way))
-                ray.maxt = limit
-                found.append(bool(self._scene.ray_test(ray)))
-            return np.array(found)
-        return np.asarray(
-            self._scene.ray_test(rays_of(mi, starts, ways, reach), coherent=False).numpy()
-        )

@@ -333,7 +333,7 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         ),
         (
             "rtradar.kernels.small_vectors.dot",
-            "rtradar.scatter.fresnel_zones.visible_fraction._zone_shares",
+            "rtradar.kernels.scatter.fresnel_zones.zone_sums",
             "rtradar.scatter.specular_point.solver._mirror",
         ),
         (

@@ -15,7 +15,7 @@ from rtradar.body import Body
 from rtradar.scatter import build_model
 from rtradar.system.threads import THREADS_VARIABLE, in_threads
 from rtradar.trace.backends.backend import Backend, use
-from rtradar.trace.unit_sphere import UnitSphere
+from rtradar.trace.body_tracer import UnitSphere
 
 SMALL = rt.Radar(name="small", tx_y=2, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=64)
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from rtradar.trace.backends.backend import Backend, use
+from rtradar.trace.body_tracer import UnitSphere
 from rtradar.trace.rays import rays_of
-from rtradar.trace.unit_sphere import UnitSphere
 
 
 def test_any_number_of_rays_from_anywhere_in_memory_is_one_kernel(backend: Backend) -> None:
@@ -36,13 +36,9 @@ def test_rays_begin_lead_and_end_where_they_are_told(backend: Backend) -> None:
     if backend.kind == "scalar":
         pytest.skip("the scalar backend takes rays one by one")
     mi = use(backend)
-    starts, ways, reach = (
-        np.arange(15.0).reshape(5, 3),
-        -np.arange(15.0).reshape(5, 3),
-        np.arange(5.0),
-    )
-    ray = rays_of(mi, starts, ways, reach)
-    np.testing.assert_array_equal(ray.o.numpy().T, starts)
-    np.testing.assert_array_equal(ray.d.numpy().T, ways)
-    np.testing.assert_array_equal(ray.maxt.numpy(), reach)
-    assert np.all(rays_of(mi, starts, ways).maxt.numpy() > 1e30)
+    rows = np.arange(35.0).reshape(7, 5)
+    ray = rays_of(mi, rows)
+    np.testing.assert_array_equal(ray.o.numpy(), rows[:3])
+    np.testing.assert_array_equal(ray.d.numpy(), rows[3:6])
+    np.testing.assert_array_equal(ray.maxt.numpy(), rows[6])
+    assert np.all(rays_of(mi, rows[:6]).maxt.numpy() > 1e30)

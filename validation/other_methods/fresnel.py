@@ -43,6 +43,7 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+SHADOW_RAYS = (16, 64, 256)
 TARGETS = {
     "thigh": TARGET,
     "head": np.array([0.06, 0.06, 0.1]),
@@ -54,7 +55,6 @@ OCCLUDERS = {
     "forearm": np.array([0.03, 0.03, 0.14]),
 }
 EDGE_ERROR = 0.05
-SHADOW_RAYS = (16, 64, 256)
 
 
 # -- the reference ---------------------------------------------------------------------------------
@@ -113,7 +113,7 @@ def scene(target: Array, occluder: Array, place: Array, turn: Array) -> rt.Ellip
     return rt.Ellipsoids([np.zeros(3), place], frames, [target, occluder])
 
 
-def ours(ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = 64) -> Complex:
+def ours(ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = 256) -> Complex:
     """Field by `fresnel` at each frequency."""
     antenna = np.broadcast_to(ANTENNA, (len(frequency), 3))
     return fresnel_scattering(ellipsoids, antenna, antenna, frequency, shadow_rays=shadow_rays)
@@ -127,7 +127,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
     for band in BANDS:
         frequencies = band.centre + np.array([-2e9, 0.0, 2e9])
         density = 2.0 if band.start < 50e9 else 1.2
-        counts = SHADOW_RAYS[1:2] if quick else SHADOW_RAYS
+        counts = SHADOW_RAYS[2:] if quick else SHADOW_RAYS
         everything: dict[int, list[Array]] = {rays: [] for rays in counts}
         for index, (name, occluder) in enumerate(OCCLUDERS.items()):
             errors, rough = [], []
@@ -162,7 +162,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                                 (ours(ellipsoids, frequencies, rays) - before) / free - optics
                             )
                             everything[rays].append(wrong)
-                            if rays == 64:
+                            if rays == 256:
                                 errors.append(wrong[partly])
                                 rough.append(np.abs(np.round(np.abs(optics)) - optics)[partly])
             claim = f"{band.name}, edge of a {name}"

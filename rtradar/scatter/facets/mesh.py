@@ -19,7 +19,7 @@ from rtradar.scatter.facets.integral import facet_integral
 from rtradar.scatter.facets.surfaces import mesh_facets
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.mesh_visibility import MeshTracer
+from rtradar.trace.bounces import MeshSurfaces
 
 LARGEST_KA = 400.0
 """Of a smooth mesh; a larger one must have the facets that an ellipsoid of its surface would need."""
@@ -44,6 +44,10 @@ _HALVES = np.array(
 )
 """Corners of those four, barycentric, turned as the whole."""
 
+_SAME = 1e-4
+"""Fraction of the mesh's size within which a hit is the point itself: at shared edges float32 does
+not know which face it met."""
+
 Array = NDArray[np.float64]
 
 
@@ -66,9 +70,8 @@ def mesh_scattering(
     """
     _refuse_coarse(mesh, float(wavenumber.max()))
     corners, closed = np.ascontiguousarray(mesh.corners), mesh.closed
-    tracer = MeshTracer(
-        use(select(variant)), corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
-    )
+    triangles = corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3)
+    tracer = MeshSurfaces(use(select(variant)), *triangles, same=_SAME)
     middle = corners.mean(axis=(0, 1))
     field = np.empty(len(tx), dtype=np.complex128)
     for pair in range(len(tx)):
@@ -145,7 +148,7 @@ def _divide_bent(
 
 
 def _seen(
-    tracer: MeshTracer,
+    tracer: MeshSurfaces,
     corners: Array,
     face: NDArray[np.int64],
     antennas: Array,
@@ -174,18 +177,17 @@ def _seen(
 
 
 def _sampled(
-    tracer: MeshTracer, corners: Array, face: NDArray[np.int64], antenna: Array, closed: bool
+    tracer: MeshSurfaces, corners: Array, face: NDArray[np.int64], antenna: Array, closed: bool
 ) -> Array:
     """Share of four points of each facet that the antenna sees; those that face away from it are not asked about."""
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     facing = np.flatnonzero((np.sum(normal * (antenna - corners[:, 0]), axis=1) > 0) | (not closed))
     points = _FOUR @ corners[facing]
     share = np.zeros(len(corners))
-    share[facing] = (
-        tracer.sees(antenna, points.reshape(-1, 3), np.repeat(face[facing], 4))
-        .reshape(-1, 4)
-        .mean(axis=1)
-    )
+    points = points.reshape(-1, 3)
+    from_there = np.broadcast_to(antenna, points.shape)
+    seen = tracer.sees(from_there, points, np.repeat(face[facing], 4))
+    share[facing] = seen.reshape(-1, 4).mean(axis=1)
     return share
 
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.triangle_fraction import positive_share
 from rtradar.scatter.facets.surfaces import Facets
-from rtradar.scatter.facets.triangle_fraction import positive_share
 from rtradar.trace.clearance import beside_ball, into_ball
 from rtradar.trace.facet_visibility import FacetTracer
 

@@ -1,60 +1,71 @@
-"""Shares of the return left to the parts of a moving body, antenna by antenna: at anchors, and smoothly between them.
+"""Fractions of the returns left to the parts of a moving body: at keyframes, and smoothly between.
 
-Over the array V is a polynomial through at most six nodes along a line of Tx and three along a line of Rx: half a metre
-of array sees an edge half a metre before a part move by several Fresnel zones (``validation/other_methods/fresnel.py``: 1.0 % rms at
-12 GHz; two along the line of Rx give 1.9 %, four along that of Tx 7 %). In time it is a cubic through anchors 10 ms
-apart, and 1.25 ms (12 GHz) or 0.5 ms (77 GHz) apart for each part and interval in which it bends; slopes are those of
-the parabola through neighbours, so that what comes out has no corners, whatever the spacing on either side. Rays are
-traced at the anchors 10 ms apart; in between the outlines of the parts that they met at either end are followed in
-closed form.
+Over the array V is a polynomial through at most six nodes along a line of Tx and three along a line
+of Rx: half a metre of array sees an edge half a metre before a part move by several Fresnel zones
+(``validation/other_methods/fresnel.py``: 1.0 % rms at 12 GHz; two along the line of Rx give 1.9 %,
+four along that of Tx 7 %). In time it is a cubic through keyframes 10 ms apart, and 1.25 ms (12
+GHz) or 0.5 ms (77 GHz) apart for each part and interval in which it bends. Slopes are those of the
+parabola through neighbours, so that the result has no corners, whatever the spacing on either side.
 """
 
 from __future__ import annotations
 
 from collections import OrderedDict
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.blends import hermite_weights
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.scatter.fresnel_zones import blend_fractions
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import array_nodes
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.poses import anchor_step
-from rtradar.scatter.fresnel_zones.interval import FresnelInterval
-from rtradar.scatter.fresnel_zones.occluders import RX_NODES, TX_NODES, middle_zones
-from rtradar.scatter.fresnel_zones.visible_fraction import zone_shares
+from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
+from rtradar.scatter.specular_point.solver import mirror
+from rtradar.trace.body_tracer import BodyTracer
 
-_KEPT_ANCHORS = 1024
-"""Anchors remembered, 10 s of them in some 40 MB, so that the pass that measures power and the pass that makes the signal trace
-once; longer recordings trace again from there on."""
+TX_NODES, RX_NODES = 6, 3
+"""Antennas along a line of Tx and of Rx at which fractions are computed."""
 
-_PASSING = 32
-"""Anchors, and intervals between them, that are held at a time: a block of chirps and what lies around it."""
+_KEPT_KEYFRAMES = 1024
+"""Keyframes remembered, 10 s of them in some 40 MB, so that the pass that measures power and the
+pass that makes the signal trace once; longer recordings trace again from there on."""
+
+_AT_ONCE = 16
+"""Intervals whose rays are traced together."""
+
+_PASSING = 8 * _AT_ONCE
+"""Keyframes held at a time beyond those, and intervals: each interval needs six keyframes."""
 
 _FINE, _FINE_FREQUENCY_HZ = 8, 14e9
-"""Anchors to 10 ms where the share bends, at that frequency; Fresnel zones are as narrow as the root of the wavelength."""
+"""Keyframes to 10 ms where the fraction bends, at that frequency; Fresnel zones are as narrow as
+the root of the wavelength."""
 
 _BEND = 0.02
-"""Second difference over 10 ms that asks for finer anchors: a cubic misses an eighth of it or less."""
+"""Second difference over 10 ms that asks for finer keyframes: a cubic misses at most an eighth."""
 
 
-class ZoneShares:
-    """Shares of the returns of a moving body over a capture.
+class ZoneFractions:
+    """Visible fractions of the returns of a moving body over a capture.
 
     Parameters
     ----------
     radar : Radar
+        Radar that sees the body.
     body : Body
+        Body whose parts occlude each other.
     frequency : (frequency,) float64
-        Where shares are wanted [Hz].
-    occluders : callable
-        ``occluders(time)``: which parts may stand before others (part, part) bool, hidden first, at an anchor [s] and 10 ms
-        after, such as `TracedHiders`; parts with none are in full view.
+        Frequencies at which fractions are computed [Hz].
+    tracer : BodyTracer
+        Tracer of the same body.
+    wanted : callable, optional
+        ``wanted(time)``: which parts (part,) bool are computed at a keyframe [s]; the others are 1.
+        All parts if left out.
+    shadow_rays : int
+        Points on each part to which rays are traced from each node of the array.
     """
 
     def __init__(
@@ -62,31 +73,33 @@ class ZoneShares:
         radar: Radar,
         body: Body,
         frequency: NDArray[np.float64],
-        occluders: Callable[[float], NDArray[np.bool_]],
+        tracer: BodyTracer,
+        wanted: Callable[[float], NDArray[np.bool_]] | None = None,
+        shadow_rays: int = SHADOW_RAYS,
     ) -> None:
-        self._radar, self._body, self._occluders = radar, body, occluders
+        self._radar, self._body, self._tracer, self._wanted = radar, body, tracer, wanted
+        self._shadow_rays = shadow_rays
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, TX_NODES, RX_NODES)
         self._step = anchor_step(radar)
-        self._fine = min(
-            round(_FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5),
-            self._step,
+        finer = _FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5
+        self._fine = min(round(finer), self._step)
+        self._keyframes: FirstCome[int, NDArray[np.complex128]] = FirstCome(
+            _KEPT_KEYFRAMES, _PASSING
         )
-        self._anchors: FirstCome[int, tuple[NDArray[np.bool_], NDArray[np.complex128]]] = FirstCome(
-            _KEPT_ANCHORS, _PASSING
-        )
-        self._intervals: OrderedDict[int, FresnelInterval] = OrderedDict()
+        self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
     ) -> NDArray[np.complex128]:
-        """Shares V at these chirps, numbered from the start of the capture.
+        """Fractions V at these chirps, numbered from the start of the capture.
 
         Parameters
         ----------
         chirps : (chirp,) int64
+            Chirps to evaluate.
         parts : (part,) int64, optional
-            Which are wanted; all if left out.
+            Parts to evaluate; all if left out.
 
         Returns
         -------
@@ -95,111 +108,126 @@ class ZoneShares:
         chirps = np.asarray(chirps, dtype=np.int64)
         if parts is None:
             parts = np.arange(len(self._body.part_names))
-        out = np.empty(
-            (len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts)), dtype=np.complex128
-        )
+        shape = (len(self._wavenumber), len(chirps), self._radar.n_rx, len(parts))
+        out = np.empty(shape, dtype=np.complex128)
         spread = self._nodes.weights[self._radar.tx_of_chirp(chirps)]
-        number = chirps // self._step
-        for interval in np.unique(number):
-            inside = np.flatnonzero(number == interval)
-            where = (chirps[inside] / self._step - interval) * self._fine
-            if where.any():
-                fine, nodes, slopes = self._cubics(int(interval), parts)
-            else:
-                # At an anchor alone neighbours do not matter.
-                nodes = np.stack([self._anchor(int(interval))[1][..., parts]] * 2)
-                fine, slopes = np.zeros(nodes.shape[-1], dtype=bool), np.zeros_like(nodes)
-            _blend(nodes, slopes, fine, where, spread[inside], inside, out)
+        interval, chirp = np.divmod(chirps, self._step)
+        where = chirp / self._step * self._fine
+        numbers = np.unique(interval)
+        for begin in range(0, len(numbers), _AT_ONCE):
+            some = numbers[begin : begin + _AT_ONCE]
+            # At a keyframe alone neighbours do not matter.
+            whole = {int(number) for number in interval[where > 0] if number in some}
+            self._look_up(whole, set(some.tolist()) - whole, parts)
+            for number in some.tolist():
+                inside = np.flatnonzero(interval == number)
+                if number in whole:
+                    fine, nodes, slopes = self._cubics(number, parts)
+                else:
+                    nodes = np.stack([self._keyframe(number)[..., parts]] * 2)
+                    fine, slopes = np.zeros(len(parts), dtype=bool), np.zeros_like(nodes)
+                blend_fractions(nodes, slopes, fine, where[inside], spread[inside], inside, out)
         return out
 
-    def _shares(
-        self,
-        times: NDArray[np.float64],
-        pose: NDArray[np.int64],
-        part: NDArray[np.int64],
-        occluders: NDArray[np.bool_],
+    def _look_up(self, whole: set[int], alone: set[int], parts: NDArray[np.int64]) -> None:
+        """Trace what the cubics over whole intervals, and single keyframes, need, all at once."""
+        around = {number + i for number in whole for i in range(-2, 4)}
+        self._find_keyframes(around | alone)
+        # Of the neighbours of an interval no more than the node beside it.
+        nodes: dict[int, set[int]] = {}
+        for number in whole:
+            nodes.setdefault(number, set()).update(range(self._fine - 1))
+            if self._fine > 1:
+                nodes.setdefault(number - 1, set()).add(self._fine - 2)
+                nodes.setdefault(number + 1, set()).add(0)
+        self._find_nodes(nodes, parts)
+
+    def _fractions(
+        self, times: NDArray[np.float64], pose: NDArray[np.int64], part: NDArray[np.int64]
     ) -> NDArray[np.complex128]:
-        """Shares (share, frequency, pair), each of a part at one of the times (time,) [s], behind ``occluders (part, part)``."""
-        centres, frames, semi_axes = self._body.at(times)
-        used, place = np.unique(part, return_inverse=True)
-        tx, rx, points, k = middle_zones(
-            self._radar, centres[:, used], frames[:, used], semi_axes[used]
-        )
-        return zone_shares(
-            tx[place],
-            rx[place],
-            points[place, pose],
-            part,
-            pose,
-            (centres, frames, semi_axes),
-            np.broadcast_to(self._nodes.antennas, (len(part), *self._nodes.antennas.shape)),
-            self._nodes.pairs,
-            occluders[part],
-            np.broadcast_to(self._wavenumber, (len(part), len(self._wavenumber))),
-            k[place],
+        """Fractions (zone, frequency, pair), each of a part at one of the times (time,) [s]."""
+        poses = self._body.at(times)
+        radar, zones = self._radar, len(part)
+        tx, rx = (np.tile(a.mean(axis=0), (len(times), 1)) for a in (radar.tx, radar.rx))
+        _, _, points = mirror(tx, rx[:, None], *poses, points=True)
+        k = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
+        antennas = np.broadcast_to(self._nodes.antennas, (zones, *self._nodes.antennas.shape))
+        laid_for = np.full(zones, k)
+        given = Zones(tx[pose], rx[pose], points[pose, 0, part], part, pose, antennas, laid_for)
+        wavenumber = np.broadcast_to(self._wavenumber, (zones, len(self._wavenumber)))
+        return zone_fractions(
+            self._tracer, given, poses, self._nodes.pairs, wavenumber, self._shadow_rays
         )
 
-    def _time(self, chirp: float) -> float:
-        # Past the end of the recording the body rests in its last pose; before the capture nothing moved.
-        return min((max(chirp, 0.0) + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
+    def _times(self, chirps: NDArray[np.float64]) -> NDArray[np.float64]:
+        # Past the end of the recording the body rests in its last pose; before it nothing moved.
+        times = (np.maximum(chirps, 0.0) + 0.5) * self._radar.chirp_interval_s
+        return np.minimum(times, self._body.duration_s)
 
-    def _anchor(self, number: int) -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
-        """Who hides whom at an anchor (part, part), and shares (frequency, pair, part)."""
+    def _keyframe(self, number: int) -> NDArray[np.complex128]:
+        """Fractions (frequency, pair, part) at a keyframe."""
         number = max(number, 0)
+        if number not in self._keyframes:
+            self._find_keyframes([number])
+        return self._keyframes.get(number, lambda: self._keyframe(number))
 
-        def find() -> tuple[NDArray[np.bool_], NDArray[np.complex128]]:
-            time = self._time(number * self._step)
-            occluders = self._occluders(time)
-            shares = np.ones(
-                (len(self._wavenumber), len(self._nodes.pairs), len(occluders)), dtype=np.complex128
-            )
-            hidden = np.flatnonzero(occluders.any(axis=1))
-            if len(hidden):
-                pose = np.zeros(len(hidden), dtype=np.int64)
-                shares[..., hidden] = np.moveaxis(
-                    self._shares(np.array([time]), pose, hidden, occluders), 0, -1
-                )
-            return occluders, shares
+    def _find_keyframes(self, numbers: Iterable[int]) -> None:
+        missing = sorted({n for n in (max(n, 0) for n in numbers) if n not in self._keyframes})
+        if not missing:
+            return
+        times = self._times(np.array(missing) * float(self._step))
+        wanted = np.ones((len(times), len(self._body.part_names)), dtype=bool)
+        if self._wanted is not None:
+            wanted = np.stack([self._wanted(float(time)) for time in times])
+        pose, part = np.nonzero(wanted)
+        shape = (len(times), len(self._wavenumber), len(self._nodes.pairs), wanted.shape[1])
+        fractions = np.ones(shape, dtype=np.complex128)
+        fractions[pose, :, :, part] = self._fractions(times, pose, part)
+        for number, found in zip(missing, fractions, strict=True):
+            self._keyframes.keep(number, found)
 
-        return self._anchors.get(number, find)
-
-    def _interval(self, number: int, nodes: slice, parts: NDArray[np.int64]) -> FresnelInterval:
-        """An interval of which these nodes in between are known, of these parts."""
+    def _interval(self, number: int) -> _Interval:
         interval = self._intervals.get(number)
         if interval is None:
-            anchors = [self._anchor(number + i) for i in (-1, 0, 1, 2)]
-            around = np.stack([shares for _, shares in anchors])
+            around = np.stack([self._keyframe(number + i) for i in (-1, 0, 1, 2)])
             bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
-            fine = (
-                (bend > _BEND)
-                if self._fine > 1 and number >= 0
-                else np.zeros(bend.shape, dtype=bool)
-            )
-            interval = FresnelInterval(
-                fine, around[1:3].copy(), anchors[1][0] | anchors[2][0], self._fine - 1
-            )
+            fine = (bend > _BEND) & (self._fine > 1 and number >= 0)
+            interval = _Interval(fine, around[1:3].copy(), self._fine - 1)
             self._intervals[number] = interval
             if len(self._intervals) > _PASSING:
                 self._intervals.popitem(last=False)
         self._intervals.move_to_end(number)
-        node, part = interval.missing(nodes, parts)
-        if len(node):
-            used, pose = np.unique(node, return_inverse=True)
-            times = np.array(
-                [self._time((number + (i + 1) / self._fine) * self._step) for i in used]
-            )
-            interval.keep(node, part, self._shares(times, pose, part, interval.occluders))
         return interval
+
+    def _find_nodes(self, nodes: dict[int, set[int]], parts: NDArray[np.int64]) -> None:
+        """Compute what is not known of these nodes of intervals, of these parts."""
+        wanted: list[tuple[_Interval, NDArray[np.int64], NDArray[np.int64]]] = []
+        chirps, pose, part, count = [], [], [], 0
+        for number, some in sorted(nodes.items()):
+            interval = self._interval(number)
+            node, own = interval.missing(np.array(sorted(some), dtype=np.int64), parts)
+            if not len(node):
+                continue
+            used, place = np.unique(node, return_inverse=True)
+            wanted.append((interval, node, own))
+            chirps.append((number + (used + 1) / self._fine) * self._step)
+            pose.append(place + count)
+            part.append(own)
+            count += len(used)
+        if not wanted:
+            return
+        found = self._fractions(
+            self._times(np.concatenate(chirps)), np.concatenate(pose), np.concatenate(part)
+        )
+        ends = np.cumsum([len(node) for _, node, _ in wanted])[:-1]
+        for (interval, node, own), fractions in zip(wanted, np.split(found, ends), strict=True):
+            interval.keep(node, own, fractions)
 
     def _cubics(
         self, number: int, parts: NDArray[np.int64]
     ) -> tuple[NDArray[np.bool_], NDArray[np.complex128], NDArray[np.complex128]]:
-        """Of an interval: which parts are fine, nodes and slopes (node, frequency, pair, part), a fine spacing the unit."""
-        # Of its neighbours no more than the node beside it.
-        before, here, after = (
-            self._interval(number + i, inner, parts)
-            for i, inner in ((-1, slice(self._fine - 2, None)), (0, slice(None)), (1, slice(0, 1)))
-        )
+        """Which parts are fine, nodes and slopes (node, frequency, pair, part) of an interval."""
+        before, here, after = (self._interval(number + i) for i in (-1, 0, 1))
         nodes = here.nodes(parts)
         slopes = np.empty_like(nodes)
         slopes[1:-1] = (nodes[2:] - nodes[:-2]) / 2
@@ -209,47 +237,51 @@ class ZoneShares:
             )
             rise_left = (nodes[end] - left.beside(-1, parts)) / wide_left
             rise_right = (right.beside(0, parts) - nodes[end]) / wide_right
-            slopes[end] = (rise_left * wide_right + rise_right * wide_left) / (
-                wide_left + wide_right
-            )
+            slopes[end] = rise_left * wide_right + rise_right * wide_left
+            slopes[end] /= wide_left + wide_right
         return here.fine[parts], nodes, slopes
 
 
-@compiled()
-def _blend(nodes, slopes, fine, where, spread, inside, out):
-    """Cubics in time, then the polynomials over the array."""
-    frequencies, pairs, parts = nodes.shape[1:]
-    last = nodes.shape[0] - 1
-    value = np.empty(pairs, dtype=np.complex128)
-    for f in range(frequencies):
-        for part in range(parts):
-            still = True
-            for node in range(last + 1):
-                if node == 0 or node == last or fine[part]:
-                    for pair in range(pairs):
-                        if (
-                            nodes[node, f, pair, part] != nodes[0, f, 0, part]
-                            or slopes[node, f, pair, part] != 0
-                        ):
-                            still = False
-            for i in range(len(inside)):
-                if still:
-                    # Exactly: the polynomials add up to 1 only nearly.
-                    out[f, inside[i], :, part] = nodes[0, f, 0, part]
-                    continue
-                width = 1 if fine[part] else last
-                first = min(int(where[i]), last - 1) if fine[part] else 0
-                h0, h1, g0, g1 = hermite_weights((where[i] - first) / width, width)
-                for pair in range(pairs):
-                    value[pair] = (
-                        h0 * nodes[first, f, pair, part]
-                        + h1 * nodes[first + width, f, pair, part]
-                        + g0 * slopes[first, f, pair, part]
-                        + g1 * slopes[first + width, f, pair, part]
-                    )
-                for receiver in range(out.shape[2]):
-                    total = 0j
-                    for pair in range(pairs):
-                        if spread[i, receiver, pair] != 0:
-                            total += spread[i, receiver, pair] * value[pair]
-                    out[f, inside[i], receiver, part] = total
+class _Interval:
+    """Fractions over 10 ms: at both ends, and at nodes in between for parts that are ``fine``.
+
+    ``fine (part,)`` bool, ``ends (2, frequency, pair, part)``, and how many nodes are in between.
+    """
+
+    def __init__(self, fine: NDArray[np.bool_], ends: NDArray[np.complex128], inner: int) -> None:
+        self.fine, self.ends = fine, ends
+        # A column for each part that is fine, for all parts would be many.
+        self._column = np.cumsum(fine) - 1
+        self._between = np.empty((inner, *ends.shape[1:-1], int(fine.sum())), dtype=np.complex128)
+        self._known = np.zeros((inner, self._between.shape[-1]), dtype=bool)
+
+    def missing(
+        self, nodes: NDArray[np.int64], parts: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Node and part of each fraction that is not known, of these nodes in between and parts."""
+        own = parts[self.fine[parts]]
+        node, which = np.nonzero(~self._known[np.ix_(nodes, self._column[own])])
+        return nodes[node], own[which]
+
+    def keep(
+        self, node: NDArray[np.int64], part: NDArray[np.int64], fractions: NDArray[np.complex128]
+    ) -> None:
+        """Remember ``fractions (fraction, frequency, pair)``."""
+        column = self._column[part]
+        self._between[node, :, :, column], self._known[node, column] = fractions, True
+
+    def nodes(self, parts: NDArray[np.int64]) -> NDArray[np.complex128]:
+        """All nodes (node, frequency, pair, part); parts that are not fine use first and last."""
+        ends, fine = self.ends[..., parts], self.fine[parts]
+        nodes = np.repeat(ends[:1], len(self._between) + 2, axis=0)
+        nodes[-1] = ends[1]
+        nodes[1:-1, :, :, fine] = self._between[..., self._column[parts[fine]]]
+        return nodes
+
+    def beside(self, end: int, parts: NDArray[np.int64]) -> NDArray[np.complex128]:
+        """The node next to the first (0) or the last (-1) one: (frequency, pair, part)."""
+        fine = self.fine[parts]
+        node = self.ends[-1 - end][..., parts]
+        if fine.any():
+            node[..., fine] = self._between[end][..., self._column[parts[fine]]]
+        return node

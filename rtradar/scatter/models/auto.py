@@ -18,7 +18,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
-from rtradar.scatter.fresnel_zones.keyframes import ZoneShares
+from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.models.auto_errors import (
     ANALYTIC,
@@ -56,11 +56,10 @@ _KEPT_CHUNKS, _PASSING = 25, 4
 
 
 class Planned(NamedTuple):
-    """Some instants: ``chosen (time, part)``; ``in_view (time, part)``, ``occluders (time, part, part)`` of a `Forecast`."""
+    """Some instants: ``chosen (time, part)``, and ``in_view (time, part)`` of a `Forecast`."""
 
     chosen: NDArray[np.int64]
     in_view: NDArray[np.bool_]
-    occluders: NDArray[np.bool_]
 
 
 class _Group(NamedTuple):
@@ -221,13 +220,11 @@ class Auto(BuiltInModel):
         weights[LEFT_OUT] = 0
         return weights, cut
 
-    def _occluders(self, time: float) -> NDArray[np.bool_]:
-        """What may stand before the parts that go by `fresnel` within an instant or two of a time [s], (part, part)."""
+    def _at_edges(self, time: float) -> NDArray[np.bool_]:
+        """Parts (part,) that go by `fresnel` within an instant or two of a time [s]."""
         before = int(time / self._radar.chirp_interval_s) // self._step
         instants = [self._plan(max(0, before + i)) for i in (-1, 0, 1, 2)]
-        edges = np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
-        occluders = np.any([planned.occluders[row] for planned, row in instants], axis=0)
-        return np.asarray(occluders & edges[:, None])
+        return np.any([planned.chosen[row] == FRESNEL for planned, row in instants], axis=0)
 
     def _plan(self, instant: int) -> tuple[Planned, int]:
         """The chunk of instants that holds this one, and its row."""
@@ -239,7 +236,7 @@ class Auto(BuiltInModel):
         instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
         times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
         poses = self._body.at(np.minimum(times, self._body.duration_s))
-        told = forecast(self._radar, poses, spreading=self._spreading)
+        told = forecast(self._radar, poses, self._tracer, spreading=self._spreading)
         chosen = choose(told, self._power_share, self._complex_share)[1:-1]
         told = Forecast(**{name: array[1:-1] for name, array in told._asdict().items()})
         # Later ones are looked at again in the next pass, and are not to count twice.
@@ -247,7 +244,7 @@ class Auto(BuiltInModel):
             self._counted |= 1 << chunk
             self._count(chosen, told)
         # Copies, which do not hold what they are cut from.
-        return Planned(chosen.copy(), told.in_view.copy(), told.occluders.copy())
+        return Planned(chosen.copy(), told.in_view.copy())
 
     def _by(
         self,
@@ -290,16 +287,23 @@ class Auto(BuiltInModel):
         return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
 
     @cached_property
-    def _specular_points(self) -> MirrorVisibility:
+    def _tracer(self) -> BodyTracer:
+        return BodyTracer(self._mitsuba, self._body.semi_axes)
+
+    def _mitsuba(self) -> Any:
+        """Load Mitsuba for the first ray."""
         backend = select(self._variant)
         self.variant = backend.kind
-        return MirrorVisibility(
-            self._radar, self._body, BodyTracer(use(backend), self._body.semi_axes)
-        )
+        return use(backend)
 
     @cached_property
-    def _zones(self) -> ZoneShares:
-        return ZoneShares(self._radar, self._body, zone_nodes(self._radar), self._occluders)
+    def _specular_points(self) -> MirrorVisibility:
+        return MirrorVisibility(self._radar, self._body, self._tracer)
+
+    @cached_property
+    def _zones(self) -> ZoneFractions:
+        frequency = zone_nodes(self._radar)
+        return ZoneFractions(self._radar, self._body, frequency, self._tracer, self._at_edges)
 
     @cached_property
     def _physical_optics(self) -> EchoModel:

@@ -1,8 +1,8 @@
 """What each way of modelling a part would leave wrong, told beforehand at little cost.
 
-The body is looked at from the middle of the array, in closed form alone: the specular point's return G, the far-field
-cross-section's A, the share V of the Fresnel zones that others leave in view, and the radii of curvature. What is true
-is taken to be G V; then
+The body is looked at from the middle of the array: the specular point's return G, the far-field
+cross-section's A, and the radii of curvature in closed form, and by rays the fraction V of the
+Fresnel zones that others leave in view. What is true is taken to be G V; then
 
     analytic         |A exp(jk dL) - G V|     dL between both paths
     specular         |G (v - V)|              v whether the specular point itself is in view
@@ -19,22 +19,19 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import prange
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.kernels.jit import compiled
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.common.array_interpolation import array_nodes
 from rtradar.scatter.common.poses import ChirpPoses
-from rtradar.scatter.fresnel_zones.grid import RIM
-from rtradar.scatter.fresnel_zones.visible_fraction import zone_shares
+from rtradar.scatter.fresnel_zones.visible_fraction import Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import mirror
-from rtradar.trace.clearance import clearance
+from rtradar.trace.body_tracer import BodyTracer
 
 WAYS = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
 """Ways of modelling a part, cheapest first; the first is no echo, for parts that are hidden."""
@@ -51,8 +48,7 @@ class Forecast(NamedTuple):
 
     ``true (time, part)`` power [m^2]; ``power (time, way, part)`` that each way would give; ``wrong (time, way, part)``
     squared complex error of each way [m^2], without ``optics (time, way, part)``, what curvature adds to it; ``in_view``
-    and ``hidden (time, part)`` bool: wholly, or so that neither specular point nor zones are seen; ``occluders (time, part,
-    part)`` bool: what may stand before a part's zones, hidden first, as seen from any antenna.
+    and ``hidden (time, part)`` bool: wholly, or so that neither specular point nor zones are seen.
     """
 
     true: NDArray[np.float64]
@@ -61,10 +57,9 @@ class Forecast(NamedTuple):
     optics: NDArray[np.float64]
     in_view: NDArray[np.bool_]
     hidden: NDArray[np.bool_]
-    occluders: NDArray[np.bool_]
 
 
-def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
+def forecast(radar: Radar, poses: Poses, tracer: BodyTracer, *, spreading: bool = True) -> Forecast:
     """Forecast for these poses.
 
     Parameters
@@ -72,6 +67,8 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     radar : Radar
     poses : Poses
         Poses of the body at the instants to evaluate.
+    tracer : BodyTracer
+        Tracer of the same body.
     spreading : bool
         Whether powers hold 1 / (R1 R2)^2.
 
@@ -101,7 +98,7 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     )
     near = (gain * near).reshape(times, pairs, parts)
 
-    share, seen, radius, occluders = _views(radar, poses, wavenumber)
+    share, seen, radius = _views(radar, poses, tracer, wavenumber)
     free = (near**2).mean(axis=1)
     true = free * np.abs(share) ** 2
     power = np.zeros((times, len(WAYS), parts))
@@ -117,75 +114,33 @@ def forecast(radar: Radar, poses: Poses, *, spreading: bool = True) -> Forecast:
     wrong[:, FRESNEL] = free * (_AT_AN_EDGE * cut) ** 2
     wrong[:, PHYSICAL_OPTICS] = true * _INTERPOLATED**2
     in_view = np.abs(share - 1) < 1 - _IN_VIEW
-    return Forecast(
-        true,
-        power,
-        wrong,
-        optics,
-        in_view & seen,
-        ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW),
-        occluders,
-    )
+    hidden = ~seen & (np.abs(share) ** 2 < 1 - _IN_VIEW)
+    return Forecast(true, power, wrong, optics, in_view & seen, hidden)
 
 
 def _views(
-    radar: Radar, poses: Poses, wavenumber: float
-) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64], NDArray[np.bool_]]:
-    """From the middle of the array (time, part): share V, specular point seen, mean radius of curvature [m]; and who may hide."""
+    radar: Radar, poses: Poses, tracer: BodyTracer, wavenumber: float
+) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64]]:
+    """Look at the parts (time, part) from the middle of the array.
+
+    Returned are V, whether the specular point is seen, and the mean radius of curvature there [m].
+    """
     times, parts = poses.centres.shape[:2]
     eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
     eyes = np.tile(eye, (times, 1))
-    _, _, points = mirror(eyes, eyes[:, None], *poses, points=True)
-    points = points[:, 0]
+    points = mirror(eyes, eyes[:, None], *poses, points=True)[2][:, 0]
     sight = np.einsum("tpji,tpj->tpi", poses.frames, eye - points)
-    distance = np.linalg.norm(sight, axis=-1)
-    normal = sight / distance[..., None]
+    normal = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     angles = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])
     a, b, c = poses.semi_axes.T
     smaller, larger = ellipsoid_radii(a, b, c, *angles)
-    # The zones' reach on the surface, along its flattest direction, where k times the excess path is RIM squared.
-    reach = RIM / np.sqrt(wavenumber * (1 / distance + 1 / larger))
-    reach = np.minimum(reach, np.sqrt((np.sort(poses.semi_axes, axis=1)[:, 1:] ** 2).sum(axis=1)))
-    clearance = np.empty((times, parts, parts))
-    centres, frames, semi_axes = (np.ascontiguousarray(array) for array in poses)
-    _clearances(eye, points, centres, frames, semi_axes, clearance)
-    seen = np.asarray((clearance > 0).all(axis=2))
-    # A ray moved by so much comes nearer to another unit sphere by at most that over its shortest semi-axis: the reach, and
-    # as much of the way to the farthest antenna as is left where it passes the other part.
-    array = np.linalg.norm(np.concatenate([radar.tx, radar.rx]) - eye, axis=1).max()
-    apart = np.linalg.norm(
-        points[:, :, None] - poses.centres[:, None], axis=-1
-    ) + poses.semi_axes.max(axis=1)
-    moved = reach[..., None] + array * np.minimum(apart / distance[..., None], 1.0)
-    occluders = np.asarray(clearance < moved / poses.semi_axes.min(axis=1))
-    share = np.ones((times, parts), dtype=np.complex128)
-    pose, part = np.nonzero(occluders.any(axis=2))
-    if len(pose):
-        here = np.tile(eye, (len(pose), 1))
-        k = np.full(len(pose), wavenumber)
-        one = np.zeros((1, 2), dtype=np.int64)
-        zone = (here, here, points[pose, part], part.astype(np.int64), pose.astype(np.int64))
-        found = zone_shares(
-            *zone,
-            (centres, frames, semi_axes),
-            here[:, None],
-            one,
-            occluders[pose, part],
-            k[:, None],
-            k,
-        )
-        share[pose, part] = found[:, 0, 0]
-    return share, seen, np.asarray(np.sqrt(smaller * larger)), occluders
-
-
-@compiled(parallel=True)
-def _clearances(eye, points, centres, frames, semi_axes, out):
-    """How far outside each other part, stretched to a unit sphere, the ray from ``eye`` to each part's point passes."""
-    times, parts = points.shape[:2]
-    for time in prange(times):
-        for part in range(parts):
-            for other in range(parts):
-                pose = (centres[time, other], frames[time, other], semi_axes[other])
-                out[time, part, other] = (
-                    math.inf if other == part else clearance(eye, points[time, part], *pose)
-                )
+    # One zone a part, those of one pose after the other.
+    pose, part = np.divmod(np.arange(times * parts), parts)
+    here, targets = np.tile(eye, (len(part), 1)), points.reshape(-1, 3)
+    seen = tracer.clear(here, targets, np.arange(len(part)), part, pose, poses)
+    k = np.full(len(part), wavenumber)
+    zones = Zones(here, here, targets, part, pose, here[:, None], k)
+    pair = np.zeros((1, 2), dtype=np.int64)
+    share = zone_fractions(tracer, zones, poses, pair, k[:, None])[:, 0, 0]
+    shape = (times, parts)
+    return share.reshape(shape), seen.reshape(shape), np.asarray(np.sqrt(smaller * larger))

@@ -11,11 +11,11 @@ from scipy.spatial.transform import Rotation
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.triangle_fraction import positive_share
 from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.facets.integral import facet_integral
 from rtradar.scatter.facets.surfaces import ellipsoid_facets, mesh_facets, subdivisions_for
 from rtradar.scatter.facets.target import facet_scattering
-from rtradar.scatter.facets.triangle_fraction import positive_share
 from rtradar.trace.backends.backend import use
 from rtradar.trace.clearance import clearance
 from rtradar.trace.facet_visibility import FacetTracer

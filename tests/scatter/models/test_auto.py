@@ -33,7 +33,8 @@ from rtradar.scatter.models.auto_errors import (
     forecast,
 )
 from rtradar.scatter.models.auto_plan import choose
-from rtradar.trace.backends.backend import Backend
+from rtradar.trace.backends.backend import Backend, select, use
+from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
 RADAR = rt.Radar.preset("paper-12ghz")
@@ -48,8 +49,12 @@ def two_spheres(aside: float) -> Poses:
     return Poses(centres, np.broadcast_to(np.eye(3), (1, 2, 3, 3)), SPHERE)
 
 
+def look(radar: Radar, poses: Poses) -> Forecast:
+    return forecast(radar, poses, BodyTracer(use(select("cpu")), poses.semi_axes))
+
+
 def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() -> None:
-    told = forecast(RADAR, two_spheres(0.0))
+    told = look(RADAR, two_spheres(0.0))
     assert told.hidden.tolist() == [[True, False]]
     assert told.in_view.tolist() == [[False, True]]
     assert told.true[0, 0] == 0
@@ -58,7 +63,7 @@ def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() ->
 
 
 def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
-    told = forecast(RADAR, two_spheres(1.0))
+    told = look(RADAR, two_spheres(1.0))
     assert told.in_view.all()
     # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by both ways.
     distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
@@ -72,7 +77,7 @@ def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
 def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
     poses = two_spheres(1.0)
     beam = dataclasses.replace(RADAR, tx_antenna=Antenna(pattern="cosine", exponent=9.0))
-    told, plain = (forecast(radar, poses) for radar in (beam, RADAR))
+    told, plain = (look(radar, poses) for radar in (beam, RADAR))
     way = poses.centres[0] - np.asarray(RADAR.position_m)
     # By the directions of the centres; those of the specular points lie up to a degree beside them.
     expected = (way[:, 0] / np.linalg.norm(way, axis=1)) ** 9
@@ -88,7 +93,7 @@ def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_poi
     distance = np.linalg.norm(np.asarray(RADAR.position_m))
     # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a right triangle.
     near = distance - 1.0
-    told = forecast(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
+    told = look(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
     free = np.pi * 0.2**2 / ((distance - 0.2) ** 2 * distance**2)
     # A curved edge leaves a little more or less than the straight one's half of the field.
     assert np.sqrt(told.true[0, 0] / free) == pytest.approx(0.5, abs=0.1)
@@ -111,7 +116,6 @@ def forecast_of(
         optics=np.zeros_like(squares),
         in_view=np.ones((1, len(true)), dtype=bool),
         hidden=np.array([hidden or [False] * len(true)]),
-        occluders=np.zeros((1, len(true), len(true)), dtype=bool),
     )
 
 
@@ -162,7 +166,6 @@ def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(
         optics=np.zeros((5, len(WAYS), 6)),
         in_view=np.zeros((5, 6), dtype=bool),
         hidden=rng.random((5, 6)) < 0.1,
-        occluders=np.zeros((5, 6, 6), dtype=bool),
     )
     chosen = choose(told, power_share, complex_share)[:, None]
     whole = true.sum(axis=1)
@@ -182,20 +185,22 @@ class Passing:
     semi_axes: Array = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "semi_axes", np.array([[0.1, 0.1, 0.1], [0.25, 0.25, 0.25]]))
+        if self.semi_axes is None:
+            object.__setattr__(self, "semi_axes", np.array([[0.1, 0.1, 0.1], [0.25, 0.25, 0.25]]))
 
     def at(self, times: Array) -> Poses:
         y = 2.0 * (np.asarray(times) - 0.1)
-        centres = np.zeros((len(y), 2, 3))
-        centres[:, 1, 0], centres[:, 1, 1] = -0.5, y
-        return Poses(centres, np.broadcast_to(np.eye(3), (len(y), 2, 3, 3)), self.semi_axes)
+        n = len(self.semi_axes)
+        centres = np.zeros((len(y), n, 3))
+        centres[:, 1:, 0], centres[:, 1:, 1] = -0.5, y[:, None]
+        return Poses(centres, np.broadcast_to(np.eye(3), (len(y), n, 3, 3)), self.semi_axes)
 
 
 def passing_radar() -> Radar:
     return Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, chirp_duration_s=1e-3, position_m=(-4.0, 0.0, 0.0))
 
 
-def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic_and_nothing_is_traced() -> None:
+def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic() -> None:
     body = Body.from_motion(place(rt.synthetic_motion("jumping_jack", seed=0, duration_s=0.5)))
     model = build_model("auto", RADAR, body, tolerance_db=10.0)
     chirps = np.arange(0, 48)
@@ -203,6 +208,12 @@ def test_with_nothing_hidden_and_a_wide_tolerance_it_is_analytic_and_nothing_is_
     np.testing.assert_array_equal(ours.part, theirs.part)
     np.testing.assert_array_equal(ours.length, theirs.length)
     np.testing.assert_allclose(ours.amplitude, theirs.amplitude, rtol=1e-12)
+
+
+def test_nothing_is_loaded_where_no_part_comes_near_a_line_of_sight() -> None:
+    alone = Passing(part_names=("target",), semi_axes=np.full((1, 3), 0.1))
+    model = Auto(passing_radar(), alone, tolerance_db=10.0)  # type: ignore[arg-type]
+    assert model.echoes(np.arange(3)).part.tolist() == [0]
     assert model.variant is None
 
 

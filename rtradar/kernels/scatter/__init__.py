@@ -1,0 +1,1 @@
+"""Compiled loops of the echo models: lines of sight, Fresnel zones, footprints."""

@@ -1,0 +1,543 @@
+"""Fresnel zones on ellipsoids: their cells, points on them, and sums over what is visible of them.
+
+Round the specular point p0 the excess path dL = |T - p| + |R - p| - |T - p0| - |R - p0| grows as
+x.H x / 2 with the Hessian H of `rtradar.scatter.specular_point.solver`. So x = rho sqrt(2/k)
+H^(-1/2) (cos, sin) makes k dL about rho^2: circles of rho are the borders of Fresnel zones. A place
+(x, y) in the plane of rho goes to the ellipsoid along a great circle of the unit sphere that
+A = frame diag(semi_axes) stretches to it. The zones reach to `RIM`, or to where the lit side ends.
+
+They are added up over `CELLS` cells along each of `MERIDIANS` meridians. Rays are traced to the
+corners of wider cells, several cells along a meridian. Where some corners of such a cell are
+blocked, the edge through it is the straight line in the plane of rho between the two places at
+which it crosses the sides of the cell.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
+
+from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.phasor import phasor
+from rtradar.kernels.scatter.triangle_fraction import positive_share
+from rtradar.kernels.small_vectors import apply, apply_transposed, dot, normalize, subtract
+
+RIM = 7.0
+"""Largest sqrt(k dL) of the zones that are added up: 7.8 wavelengths of excess path."""
+
+MERIDIANS, CELLS = 24, 48
+"""Meridians, and cells along each, over which the zones are added up."""
+
+_TAPER = 0.4
+"""Fraction of the way to the rim up to which the window is 1."""
+
+_MOST = 2.0
+"""Bound of |V|: a round hole that leaves the first Fresnel zone alone open doubles the free field,
+and no single opening does more (a straight edge 1.17, a slit 1.34, a rectangle 1.80). More comes
+out for parts about as small as the wavelength: their free sum, by which the lost one is divided,
+has not settled where their lit side ends."""
+
+
+class ZoneMaps(NamedTuple):
+    """Maps from the plane of rho to ellipsoids, one a zone.
+
+    ``stretch`` A and ``back`` its inverse (zone, 3, 3); ``centre (zone, 3)`` [m]; ``pole (zone,
+    3)``, the specular point on the unit sphere; ``along (zone, 2, 3)``, the tangents there of two
+    steps of rho = 1, a right angle apart; ``caps (zone, 2, 3)``, both antennas in the axes of the
+    unit sphere; ``rim (zone, meridian)``, rho where each meridian ends; ``exists (zone,)``, whether
+    there is a specular point at all.
+    """
+
+    stretch: NDArray[np.float64]
+    back: NDArray[np.float64]
+    centre: NDArray[np.float64]
+    pole: NDArray[np.float64]
+    along: NDArray[np.float64]
+    caps: NDArray[np.float64]
+    rim: NDArray[np.float64]
+    exists: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, zones: int) -> ZoneMaps:
+        """Room for so many zones."""
+        shapes = (3, 3), (3, 3), (3,), (3,), (2, 3), (2, 3), (MERIDIANS,)
+        arrays = [np.empty((zones, *shape)) for shape in shapes]
+        return cls._make([*arrays, np.empty(zones, dtype=np.bool_)])
+
+
+class Edges(NamedTuple):
+    """What rays say about the wide cells, as each antenna sees them.
+
+    ``blocked (zone, antenna, meridian, corner)`` bool, corners from the specular point outwards;
+    places (x, y) at which edges cross the sides whose ends differ: ``radial (zone, antenna,
+    meridian, band, 2)`` of sides along meridians, and ``ring (zone, antenna, meridian, corner, 2)``
+    of those from each meridian to the next.
+    """
+
+    blocked: NDArray[np.bool_]
+    radial: NDArray[np.float64]
+    ring: NDArray[np.float64]
+
+
+@inlined()
+def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back, pole, along):
+    """Fill in the map of one zone; False where there is no specular point."""
+    for i in range(3):
+        for j in range(3):
+            stretch[i, j] = frame[i, j] * axes[j]
+            back[j, i] = frame[i, j] / axes[j]
+    work = np.empty((7, 3))
+    normal, e, f, way_t, way_r = work[0], work[1], work[2], work[3], work[4]
+    curve_e, curve_f = work[5], work[6]
+    # The specular point on the unit sphere, and the unit normal of the ellipsoid there.
+    subtract(point, centre, normal)
+    apply(back, normal, pole)
+    normalize(pole)
+    apply_transposed(back, pole, normal)
+    gradient = normalize(normal)
+    # Tangents that rotate with nothing but the normal, so that the pattern does not jump: one level.
+    e[0], e[1], e[2] = -normal[1], normal[0], 0.0
+    if normal[0] ** 2 + normal[1] ** 2 < 1e-8:
+        e[0], e[1], e[2] = 0.0, normal[2], -normal[1]
+    normalize(e)
+    f[0] = normal[1] * e[2] - normal[2] * e[1]
+    f[1] = normal[2] * e[0] - normal[0] * e[2]
+    f[2] = normal[0] * e[1] - normal[1] * e[0]
+    # The Hessian of the path in these tangents.
+    subtract(tx, point, way_t)
+    subtract(rx, point, way_r)
+    range_t, range_r = normalize(way_t), normalize(way_r)
+    facing = dot(way_t, normal) + dot(way_r, normal)
+    apply(back, e, curve_e)
+    apply(back, f, curve_f)
+    bend = facing / gradient
+    te, tf, re, rf = dot(way_t, e), dot(way_t, f), dot(way_r, e), dot(way_r, f)
+    h_ee = (1 - te * te) / range_t + (1 - re * re) / range_r + bend * dot(curve_e, curve_e)
+    h_ff = (1 - tf * tf) / range_t + (1 - rf * rf) / range_r + bend * dot(curve_f, curve_f)
+    h_ef = -te * tf / range_t - re * rf / range_r + bend * dot(curve_e, curve_f)
+    determinant = h_ee * h_ff - h_ef * h_ef
+    if not (facing > 0 and determinant > 0):
+        return False
+    # Square root of H^-1 = (h_ff, -h_ef; -h_ef, h_ee) / det, by
+    # M^(1/2) = (M + sqrt(det M)) / sqrt(tr M + 2 sqrt(det M)).
+    root = 1 / math.sqrt(determinant)
+    scale = math.sqrt(2 / wavenumber) / math.sqrt((h_ee + h_ff) / determinant + 2 * root)
+    s_ee, s_ff = (h_ff / determinant + root) * scale, (h_ee / determinant + root) * scale
+    s_ef = -h_ef / determinant * scale
+    for i in range(3):
+        along[0, i] = s_ee * curve_e[i] + s_ef * curve_f[i]
+        along[1, i] = s_ef * curve_e[i] + s_ff * curve_f[i]
+    return True
+
+
+@inlined()
+def _meridian(angle, pole, along, caps, step):
+    """Fill in a meridian's direction on the unit sphere; return radians a unit of rho, and its rim."""
+    for i in range(3):
+        step[i] = math.cos(angle) * along[0, i] + math.sin(angle) * along[1, i]
+    pace = normalize(step)
+    # An antenna at T lights the cap u.T' > 1, T' = A^-1 (T - centre).
+    end = math.inf
+    for cap in range(2):
+        ahead, aside = dot(caps[cap], pole), dot(caps[cap], step)
+        half = math.acos(min(1.0, 1 / math.hypot(ahead, aside)))
+        end = min(end, math.atan2(aside, ahead) + half)
+    return pace, min(RIM, end / pace)
+
+
+@compiled()
+def lay_zones(tx, rx, centres, frames, semi_axes, points, wavenumber, maps):
+    """Fill in the `ZoneMaps` of zones of the pair tx, rx (zone, 3) round ``points (zone, 3)`` [m].
+
+    The ellipsoids are ``centres (zone, 3)``, ``frames (zone, 3, 3)``, ``semi_axes (zone, 3)`` [m],
+    the wavenumbers (zone,) [rad/m].
+    """
+    way, step = np.empty(3), np.empty(3)
+    for zone in range(len(points)):
+        pole, along, caps = maps.pole[zone], maps.along[zone], maps.caps[zone]
+        back = maps.back[zone]
+        maps.centre[zone] = centres[zone]
+        maps.exists[zone] = _axes_of_zone(
+            tx[zone],
+            rx[zone],
+            centres[zone],
+            frames[zone],
+            semi_axes[zone],
+            points[zone],
+            wavenumber[zone],
+            maps.stretch[zone],
+            back,
+            pole,
+            along,
+        )
+        if not maps.exists[zone]:
+            along[:] = 0.0
+            maps.rim[zone] = 0.0
+            continue
+        subtract(tx[zone], centres[zone], way)
+        apply(back, way, caps[0])
+        subtract(rx[zone], centres[zone], way)
+        apply(back, way, caps[1])
+        for m in range(MERIDIANS):
+            _, maps.rim[zone, m] = _meridian(m * 2 * math.pi / MERIDIANS, pole, along, caps, step)
+
+
+def lay_zones_reference(tx, rx, centre, frame, axes, point, wavenumber):
+    """Tangents (2, 3) of one zone on the ellipsoid [m], whose Gram matrix is 2 / k H^-1."""
+    normal = frame @ ((point - centre) @ frame / axes**2)
+    size = np.linalg.norm(normal)
+    normal /= size
+    e = np.array([-normal[1], normal[0], 0.0]) / np.hypot(normal[0], normal[1])
+    tangents = np.stack([e, np.cross(normal, e)])
+    hessian = np.zeros((2, 2))
+    for antenna in (tx, rx):
+        distance = np.linalg.norm(antenna - point)
+        way = (antenna - point) / distance
+        ahead = tangents @ way
+        curved = tangents @ frame / axes
+        hessian += (np.eye(2) - np.outer(ahead, ahead)) / distance
+        hessian += way @ normal / size * curved @ curved.T
+    values, vectors = np.linalg.eigh(hessian)
+    return (vectors / np.sqrt(wavenumber / 2 * values) @ vectors.T) @ tangents
+
+
+@compiled()
+def zone_points(maps, zone, x, y, out):
+    """Fill in the points (n, 3) on the ellipsoids at places x, y of zones (n,) in the plane of rho."""
+    u = np.empty(3)
+    for n in range(len(zone)):
+        z = zone[n]
+        pole, along = maps.pole[z], maps.along[z]
+        for i in range(3):
+            u[i] = x[n] * along[0, i] + y[n] * along[1, i]
+        turn = math.sqrt(dot(u, u))
+        scale = math.sin(turn) / turn if turn > 0 else 1.0
+        for i in range(3):
+            u[i] = math.cos(turn) * pole[i] + scale * u[i]
+        apply(maps.stretch[z], u, out[n])
+        for i in range(3):
+            out[n, i] += maps.centre[z, i]
+
+
+def zone_points_reference(maps, zone, x, y):
+    """Points (n, 3) of `zone_points` along great circles."""
+    tangent = np.einsum("nk,nki->ni", np.stack([x, y], axis=1), maps.along[zone])
+    turn = np.linalg.norm(tangent, axis=1)[:, None]
+    u = np.cos(turn) * maps.pole[zone] + np.sinc(turn / np.pi) * tangent
+    return maps.centre[zone] + np.einsum("nij,nj->ni", maps.stretch[zone], u)
+
+
+@inlined()
+def _line(first, second, x, y, is_open):
+    """Return a, b, c of a x + b y + c, which is 0 on both places and positive on the open side."""
+    a, b = first[1] - second[1], second[0] - first[0]
+    c = -a * first[0] - b * first[1]
+    sign = 1.0 if (a * x + b * y + c > 0) == is_open else -1.0
+    return sign * a, sign * b, sign * c
+
+
+@inlined()
+def open_share(a, b, c, d):
+    """Fraction of a cell where a function is positive, from its values a, b and c, d at two sides.
+
+    The cell is cut into triangles along one diagonal and along the other: no value at a corner can
+    pass 0 and the fraction jump.
+    """
+    if min(min(a, b), min(c, d)) >= 0:
+        return 1.0
+    if max(max(a, b), max(c, d)) <= 0:
+        return 0.0
+    first = positive_share(a, b, c) + positive_share(d, b, c)
+    return (first + positive_share(a, b, d) + positive_share(a, c, d)) / 4
+
+
+@inlined()
+def _open_cell(line, j, here, after, cosine, sine):
+    """Fraction of the cell from j to j + 1 on the positive side of a line; rho a cell on both sides."""
+    a, b, c = line
+    first, last = c + a * here * j, c + a * here * (j + 1)
+    across = (a * cosine + b * sine) * after
+    other_first, other_last = c + across * j, c + across * (j + 1)
+    if j == 0:  # the innermost cell has three corners
+        return positive_share(first, last, other_last)
+    return open_share(first, last, other_first, other_last)
+
+
+@compiled()
+def open_fractions(maps, edges, out):
+    """Fill in the fraction of each cell that is open, ``out (zone, antenna, meridian, cell)``.
+
+    The cells between a meridian and the next are counted with that meridian.
+    """
+    angle = 2 * math.pi / MERIDIANS
+    cosine, sine = math.cos(angle), math.sin(angle)
+    zones, antennas, _, bands = edges.radial.shape[:4]
+    wide = CELLS // bands
+    found = np.empty((4, 2))
+    for zone in range(zones):
+        for a in range(antennas):
+            for m in range(MERIDIANS):
+                after = (m + 1) % MERIDIANS
+                own, its = edges.blocked[zone, a, m], edges.blocked[zone, a, after]
+                # In axes that begin at this meridian.
+                here, there = maps.rim[zone, m] / CELLS, maps.rim[zone, after] / CELLS
+                east_x, east_y = math.cos(m * angle), math.sin(m * angle)
+                for band in range(bands):
+                    cells = out[zone, a, m, band * wide : (band + 1) * wide]
+                    b00, b01, b10, b11 = own[band], own[band + 1], its[band], its[band + 1]
+                    if b00 == b01 and b00 == b10 and b00 == b11:
+                        cells[:] = 0.0 if b00 else 1.0
+                        continue
+                    # Where edges cross its sides: radial ones first, then rings.
+                    n = 0
+                    for side in range(4):
+                        if side == 0 and b00 != b01:
+                            place = edges.radial[zone, a, m, band]
+                        elif side == 1 and b10 != b11:
+                            place = edges.radial[zone, a, after, band]
+                        elif side == 2 and b00 != b10:
+                            place = edges.ring[zone, a, m, band]
+                        elif side == 3 and b01 != b11:
+                            place = edges.ring[zone, a, m, band + 1]
+                        else:
+                            continue
+                        found[n, 0] = east_x * place[0] + east_y * place[1]
+                        found[n, 1] = east_x * place[1] - east_y * place[0]
+                        n += 1
+                    inner = here * band * wide
+                    outer = there * (band + 1) * wide
+                    # Four crossings are two edges, each round a corner, opposite to one another.
+                    second = found[1] if n == 2 else found[2]
+                    line = _line(found[0], second, inner, 0.0, not b00)
+                    for j in range(wide):
+                        cells[j] = _open_cell(line, band * wide + j, here, there, cosine, sine)
+                    if n == 4:
+                        x, y = outer * cosine, outer * sine
+                        line = _line(found[1], found[3], x, y, not b11)
+                        for j in range(wide):
+                            more = _open_cell(line, band * wide + j, here, there, cosine, sine)
+                            both = cells[j] + more
+                            cells[j] = max(both - 1, 0.0) if b00 else min(both, 1.0)
+
+
+def open_fractions_reference(rim, line, samples=64):
+    """Fractions (meridian, cell) of one zone on the positive side of a x + b y + c, by counting."""
+    a, b, c = line
+    part = (np.arange(samples) + 0.5) / samples
+    t, j = part[:, None], np.arange(CELLS)[:, None, None] + part
+    out = np.empty((MERIDIANS, CELLS))
+    for m in range(MERIDIANS):
+        ends = [rim[k % MERIDIANS] * np.exp(2j * np.pi * k / MERIDIANS) / CELLS for k in (m, m + 1)]
+        # Chords from one meridian to the next.
+        place = j * ((1 - t) * ends[0] + t * ends[1])
+        inside = a * place.real + b * place.imag + c > 0
+        weight = np.broadcast_to(j, inside.shape)
+        out[m] = (inside * weight).sum(axis=(1, 2)) / weight.sum(axis=(1, 2))
+    return out
+
+
+@inlined(fastmath={"reassoc", "contract", "nsz"})
+def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):
+    """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
+    free_re, free_im, lost_re, lost_im, open_ = 0.0, 0.0, 0.0, 0.0, 0.0
+    for j in range(len(weight)):
+        strength = weight[j] * (facing_t[j] + facing_r[j])
+        re = strength * (re_t[j] * re_r[j] - im_t[j] * im_r[j])
+        im = strength * (re_t[j] * im_r[j] + im_t[j] * re_r[j])
+        # Tx and Rx are side by side and see the same edge: the smaller fraction, not the product.
+        share = min(share_t[j], share_r[j])
+        free_re += re
+        free_im += im
+        lost_re += (1 - share) * re
+        lost_im += (1 - share) * im
+        open_ += share
+    sums[0] += free_re
+    sums[1] += free_im
+    sums[2] += lost_re
+    sums[3] += lost_im
+    sums[4] += open_
+
+
+@inlined()
+def _cell_weights(pace, rim, area, cosine, sine, weight):
+    """Fill in the middles of a meridian's cells, and their areas under the window."""
+    turn = rim * pace / CELLS
+    for j in range(CELLS):
+        cosine[j], sine[j] = math.cos((j + 0.5) * turn), math.sin((j + 0.5) * turn)
+        weight[j] = sine[j] * turn * area / (pace * pace)
+        fraction = (j + 0.5) / CELLS
+        if fraction > _TAPER:
+            weight[j] *= math.cos(0.5 * math.pi * (fraction - _TAPER) / (1 - _TAPER)) ** 2
+
+
+@inlined()
+def _leg(antenna, maps, zone, step, cosine, sine, normals, length, facing):
+    """Fill in the lengths from an antenna to the middles of a meridian's cells, and (n.s)."""
+    up, side = np.empty(3), np.empty(3)
+    apply(maps.stretch[zone], maps.pole[zone], up)
+    apply(maps.stretch[zone], step, side)
+    apply_transposed(maps.back[zone], maps.pole[zone], normals[0])
+    apply_transposed(maps.back[zone], step, normals[1])
+    centre = maps.centre[zone]
+    x0, y0, z0 = antenna[0] - centre[0], antenna[1] - centre[1], antenna[2] - centre[2]
+    # On the ellipsoid itself normal . point is 1.
+    level = normals[0, 0] * x0 + normals[0, 1] * y0 + normals[0, 2] * z0
+    aside = normals[1, 0] * x0 + normals[1, 1] * y0 + normals[1, 2] * z0
+    for j in range(CELLS):
+        x = x0 - cosine[j] * up[0] - sine[j] * side[0]
+        y = y0 - cosine[j] * up[1] - sine[j] * side[1]
+        z = z0 - cosine[j] * up[2] - sine[j] * side[2]
+        length[j] = math.sqrt(x * x + y * y + z * z)
+        facing[j] = (cosine[j] * level + sine[j] * aside - 1) / length[j]
+
+
+@inlined()
+def _spherical_wave(turns_per_metre, near, length, facing, real, imaginary):
+    """Fill in exp(-jk (length - near)) / length where the surface faces the antenna."""
+    for j in range(CELLS):
+        c, s = phasor(turns_per_metre * (length[j] - near))
+        scale = 1 / length[j] if facing[j] > 0 else 0.0
+        real[j], imaginary[j] = scale * c, -scale * s
+
+
+@compiled()
+def zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, out):
+    """Fill in V of the zones from ``begin`` to ``end``, ``out (zone, frequency, pair)``.
+
+    ``points (zone, 3)``, ``antennas (zone, antenna, 3)`` [m], ``pairs (pair, 2)``, ``wavenumber
+    (zone, frequency)`` [rad/m], ``fractions`` of `open_fractions`.
+    """
+    frequencies, n_pairs, n_antennas = out.shape[1], out.shape[2], antennas.shape[1]
+    step, normals, weight = np.empty(3), np.empty((2, 3)), np.empty(CELLS)
+    cosine, sine, length = np.empty(CELLS), np.empty(CELLS), np.empty(CELLS)
+    facing, near = np.empty((n_antennas, CELLS)), np.empty(n_antennas)
+    real = np.empty((frequencies, n_antennas, CELLS))
+    imaginary = np.empty((frequencies, n_antennas, CELLS))
+    sums = np.empty((frequencies, n_pairs, 5))
+    for zone in range(begin, end):
+        pole, along = maps.pole[zone], maps.along[zone]
+        # Area of a cell, without what changes along a meridian.
+        y0, y1 = along[0], along[1]
+        area = pole[0] * (y0[1] * y1[2] - y0[2] * y1[1])
+        area += pole[1] * (y0[2] * y1[0] - y0[0] * y1[2])
+        area = abs(area + pole[2] * (y0[0] * y1[1] - y0[1] * y1[0]))
+        for a in range(n_antennas):
+            subtract(antennas[zone, a], points[zone], step)
+            near[a] = math.sqrt(dot(step, step))
+        sums[:] = 0.0
+        for m in range(MERIDIANS):
+            # The middles of the cells between this meridian and the next, and the waves there.
+            angle = (m + 0.5) * 2 * math.pi / MERIDIANS
+            pace, rim = _meridian(angle, pole, along, maps.caps[zone], step)
+            _cell_weights(pace, rim, area, cosine, sine, weight)
+            for a in range(n_antennas):
+                own = antennas[zone, a]
+                _leg(own, maps, zone, step, cosine, sine, normals, length, facing[a])
+                for f in range(frequencies):
+                    turns = wavenumber[zone, f] / (2 * math.pi)
+                    re, im = real[f, a], imaginary[f, a]
+                    _spherical_wave(turns, near[a], length, facing[a], re, im)
+            for f in range(frequencies):
+                for pair in range(n_pairs):
+                    t, r = pairs[pair, 0], pairs[pair, 1]
+                    _add(
+                        weight,
+                        facing[t],
+                        facing[r],
+                        real[f, t],
+                        imaginary[f, t],
+                        real[f, r],
+                        imaginary[f, r],
+                        fractions[zone, t, m],
+                        fractions[zone, r, m],
+                        sums[f, pair],
+                    )
+        # What is lost of the free sum; exactly 1 in full view, and 0 where nothing is open.
+        for f in range(frequencies):
+            for pair in range(n_pairs):
+                one = sums[f, pair]
+                out[zone, f, pair] = 1.0
+                if one[4] == 0:
+                    out[zone, f, pair] = 0.0
+                elif one[2] != 0 or one[3] != 0:
+                    left = 1 - complex(one[2], one[3]) / complex(one[0], one[1])
+                    out[zone, f, pair] = left / max(1.0, abs(left) / _MOST)
+
+
+def zone_sums_reference(maps, zone, antennas, pairs, wavenumber, fractions):
+    """V (pair,) of one zone at one wavenumber, for ``fractions (antenna, meridian, cell)``."""
+    angle = (np.arange(MERIDIANS)[:, None] + 0.5) * 2 * np.pi / MERIDIANS
+    step = np.cos(angle) * maps.along[zone, 0] + np.sin(angle) * maps.along[zone, 1]
+    pace = np.linalg.norm(step, axis=1, keepdims=True)
+    ahead, aside = maps.caps[zone] @ maps.pole[zone], step / pace @ maps.caps[zone].T
+    ends = np.arctan2(aside, ahead) + np.arccos(np.minimum(1, 1 / np.hypot(ahead, aside)))
+    rim = np.minimum(RIM, ends.min(axis=1, keepdims=True) / pace)
+    part = (np.arange(CELLS) + 0.5) / CELLS
+    turn = (part * rim * pace)[..., None]
+    u = np.cos(turn) * maps.pole[zone] + np.sin(turn) * (step / pace)[:, None]
+    window = np.cos(np.pi / 2 * np.maximum(part - _TAPER, 0) / (1 - _TAPER)) ** 2
+    legs = antennas[:, None, None] - maps.centre[zone] - u @ maps.stretch[zone].T
+    length = np.linalg.norm(legs, axis=-1)
+    facing = (legs * (u @ maps.back[zone])).sum(axis=-1) / length
+    wave = np.where(facing > 0, np.exp(-1j * wavenumber * length) / length, 0)
+    t, r = pairs.T
+    field = np.sin(turn[..., 0]) * rim / pace * window * (facing[t] + facing[r]) * wave[t] * wave[r]
+    left = (np.minimum(fractions[t], fractions[r]) * field).sum(axis=(1, 2))
+    return left / field.sum(axis=(1, 2))
+
+
+@compiled()
+def blend_fractions(nodes, slopes, fine, where, spread, inside, out):
+    """Interpolate fractions by cubics in time, then by the polynomials over the array.
+
+    ``nodes``, ``slopes (node, frequency, pair, part)``, of which those parts that are not ``fine
+    (part,)`` have the first and the last alone; ``where (chirp,)``, in units of nodes; ``spread
+    (chirp, rx, pair)``; filled are the rows ``inside (chirp,)`` of ``out (frequency, row, rx,
+    part)``.
+    """
+    frequencies, pairs, parts = nodes.shape[1:]
+    last = nodes.shape[0] - 1
+    value = np.empty(pairs, dtype=np.complex128)
+    for f in range(frequencies):
+        for part in range(parts):
+            # Where nothing changes the value is taken as it is: the polynomials add up to 1 only nearly.
+            still = True
+            for node in range(last + 1):
+                if node == 0 or node == last or fine[part]:
+                    for pair in range(pairs):
+                        value_here, slope = nodes[node, f, pair, part], slopes[node, f, pair, part]
+                        still &= value_here == nodes[0, f, 0, part] and slope == 0
+            for i in range(len(inside)):
+                if still:
+                    out[f, inside[i], :, part] = nodes[0, f, 0, part]
+                    continue
+                width = 1 if fine[part] else last
+                first = min(int(where[i]), last - 1) if fine[part] else 0
+                h0, h1, g0, g1 = hermite_weights((where[i] - first) / width, width)
+                begin, end = nodes[first, f], nodes[first + width, f]
+                rise, fall = slopes[first, f], slopes[first + width, f]
+                for pair in range(pairs):
+                    value[pair] = h0 * begin[pair, part] + h1 * end[pair, part]
+                    value[pair] += g0 * rise[pair, part] + g1 * fall[pair, part]
+                for receiver in range(out.shape[2]):
+                    total = 0j
+                    for pair in range(pairs):
+                        if spread[i, receiver, pair] != 0:
+                            total += spread[i, receiver, pair] * value[pair]
+                    out[f, inside[i], receiver, part] = total
+
+
+def blend_fractions_reference(nodes, slopes, fine, where, spread):
+    """Fractions (frequency, chirp, rx, part) of `blend_fractions`, by SciPy's cubics."""
+    last = len(nodes) - 1
+    out = np.empty((nodes.shape[1], *spread.shape[:2], nodes.shape[3]), dtype=np.complex128)
+    for part in range(nodes.shape[3]):
+        used = np.arange(last + 1) if fine[part] else np.array([0, last])
+        cubic = CubicHermiteSpline(used, nodes[used, ..., part], slopes[used, ..., part])
+        out[..., part] = np.einsum("crp,cfp->fcr", spread, cubic(where))
+    return out

@@ -1,0 +1,130 @@
+"""Rays along lines of sight past the parts of a body that they come near.
+
+Each ray is in the axes where that part is the unit sphere. A part is ruled out only where a line
+passes outside a ball or an ellipsoid that is a tenth larger than the part. Whether a ray meets the
+part itself is for Mitsuba to say.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from rtradar.kernels.jit import compiled, inlined
+
+NEAR = 1.1
+"""Size of the bounding volumes over that of the parts: lines outside of them have no ray traced."""
+
+
+@inlined()
+def _bundle(places, group, counts, middle, radius):
+    """Add up the mean (group, 3) of one end of the lines, and the largest square from it."""
+    for line in range(len(group)):
+        for i in range(3):
+            middle[group[line], i] += places[line, i] / counts[group[line]]
+    for line in range(len(group)):
+        square = 0.0
+        for i in range(3):
+            square += (places[line, i] - middle[group[line], i]) ** 2
+        radius[group[line]] = max(radius[group[line]], square)
+
+
+@inlined()
+def _near_parts(origins, targets, group, own, pose, centres, longest):
+    """Return which parts' bounding balls come near the bundle of lines of a group, (group, part)."""
+    groups, parts = len(own), centres.shape[1]
+    middles, radii = np.zeros((groups, 2, 3)), np.zeros((groups, 2))
+    counts = np.zeros(groups)
+    for line in range(len(group)):
+        counts[group[line]] += 1
+    _bundle(origins, group, counts, middles[:, 0], radii[:, 0])
+    _bundle(targets, group, counts, middles[:, 1], radii[:, 1])
+    near = np.zeros((groups, parts), dtype=np.bool_)
+    for g in range(groups):
+        a, b = middles[g, 0], middles[g, 1]
+        way0, way1, way2 = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        first, last = math.sqrt(radii[g, 0]), math.sqrt(radii[g, 1])
+        span = way0 * way0 + way1 * way1 + way2 * way2
+        length = math.sqrt(span)
+        for part in range(parts):
+            if part != own[g] and counts[g] > 0:
+                c = centres[pose[g], part]
+                gap0, gap1, gap2 = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+                fraction = (gap0 * way0 + gap1 * way1 + gap2 * way2) / max(span, 1e-300)
+                fraction = min(1.0, max(0.0, fraction))
+                square = (gap0 - fraction * way0) ** 2 + (gap1 - fraction * way1) ** 2
+                square += (gap2 - fraction * way2) ** 2
+                # The bundle narrows towards one end: its width is taken before this part.
+                before = max(0.0, fraction - NEAR * longest[part] / max(length, 1e-300))
+                wide = max(first + before * (last - first), last) if first > last else last
+                near[g, part] = math.sqrt(square) < NEAR * longest[part] + wide
+    return near
+
+
+@inlined()
+def _stretched(frame, axes, x, y, z):
+    """Return a vector in the axes of a part, where it is the unit sphere."""
+    return (
+        (frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z) / axes[0],
+        (frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z) / axes[1],
+        (frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z) / axes[2],
+    )
+
+
+@compiled()
+def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
+    """Return one ray for each line of sight and each part that this line comes near.
+
+    Lines (line, 3) go from ``origins`` to ``targets`` [m]. Those of one ``group (line,)`` end on
+    the part ``own (group,)``, -1 for none, which cannot occlude them, of the body in one of its
+    poses, ``pose (group,)``: ``centres (pose, part, 3)``, ``frames (pose, part, 3, 3)``, and
+    ``semi_axes (part, 3)``.
+
+    Returned are rays (7, ray) float32 and the index of their line (ray,): the start, at most two
+    radii before the point nearest to the centre of the unit sphere; the unit direction; the length.
+    """
+    parts = len(semi_axes)
+    longest = np.zeros(parts)
+    for part in range(parts):
+        for i in range(3):
+            longest[part] = max(longest[part], semi_axes[part, i])
+    # First pass over the bounding balls alone, which says how much room the rays take.
+    near = _near_parts(origins, targets, group, own, pose, centres, longest)
+    most = 0
+    for line in range(len(origins)):
+        for part in range(parts):
+            most += near[group[line], part]
+    rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
+    for line in range(len(origins)):
+        o, t, g = origins[line], targets[line], group[line]
+        for part in range(parts):
+            if not near[g, part]:
+                continue
+            # The line in axes where the part is the unit sphere.
+            c, f, axes = centres[pose[g], part], frames[pose[g], part], semi_axes[part]
+            x, y, z = _stretched(f, axes, o[0] - c[0], o[1] - c[1], o[2] - c[2])
+            u, v, w = _stretched(f, axes, t[0] - o[0], t[1] - o[1], t[2] - o[2])
+            span = u * u + v * v + w * w
+            nearest = min(1.0, max(0.0, -(x * u + y * v + z * w) / span))
+            p, q, r = x + nearest * u, y + nearest * v, z + nearest * w
+            if p * p + q * q + r * r > NEAR * NEAR:
+                continue
+            # float32 is too coarse for a far antenna: the ray starts two radii before that point.
+            distance = math.sqrt(span)
+            ahead = max(nearest - 2 / distance, 0.0)
+            rays[0, count], rays[1, count] = x + ahead * u, y + ahead * v
+            rays[2, count], rays[3, count] = z + ahead * w, u / distance
+            rays[4, count], rays[5, count] = v / distance, w / distance
+            rays[6, count], whose[count] = (1 - ahead) * distance, line
+            count += 1
+    return rays[:, :count].copy(), whose[:count].copy()
+
+
+def near_lines_reference(origins, targets, own, centres, frames, semi_axes):
+    """Pairs (line, part) bool of `near_rays` for one pose: the line enters the volume `NEAR`."""
+    starts = np.einsum("pji,lpj->lpi", frames, origins[:, None] - centres) / semi_axes
+    lines = np.einsum("pji,lj->lpi", frames, targets - origins) / semi_axes
+    nearest = np.clip(-np.sum(starts * lines, axis=2) / np.sum(lines * lines, axis=2), 0, 1)
+    distance = np.linalg.norm(starts + nearest[..., None] * lines, axis=2)
+    return (distance <= NEAR) & (np.arange(len(semi_axes)) != own[:, None])
