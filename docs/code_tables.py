@@ -6,7 +6,7 @@ import dataclasses
 import inspect
 import re
 import tomllib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,19 @@ from docutils.statemachine import StringList
 from rtradar.antenna import Antenna
 from rtradar.campaign.spec import DRAWN
 from rtradar.radar import Radar
-from rtradar.scene import MATERIALS, Furniture, material
+from rtradar.scene import (
+    MATERIALS,
+    Furniture,
+    Scene,
+    Surface,
+    Wall,
+    material,
+    own_material,
+    room_walls,
+)
+from rtradar.scene.materials import OWN_LIMITS
+from rtradar.scene.objects import FURNITURE_LIMITS, ROOM_LIMITS, SURFACE_LIMITS
+from rtradar.scene.scene import KEYS, PERSON_LIMITS
 
 SCENES = Path(__file__).parents[1] / "scenes"
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -34,6 +46,19 @@ PAPER = {
     ),
 }
 """Limits of a radar: name, value in the paper's Table 2, and format."""
+
+
+SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[float, float]]]] = {
+    "top": (Scene, "", {}),
+    "[radar]": (Scene, "radar_", {}),
+    "[person]": (Scene, "person_", PERSON_LIMITS),
+    "[room]": (room_walls, "", ROOM_LIMITS),
+    "a side of a room": (Surface, "", SURFACE_LIMITS),
+    "[[walls]]": (Wall, "", SURFACE_LIMITS),
+    "[[furniture]]": (Furniture, "", FURNITURE_LIMITS),
+    "[materials.NAME]": (own_material, "", OWN_LIMITS),
+}
+"""What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
 
 
 def pipe_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -74,11 +99,34 @@ def toml(value: object) -> str:
     """A default as a TOML file has it."""
     if isinstance(value, str):
         return f'`"{value}"`'
+    if isinstance(value, bool):
+        return f"`{str(value).lower()}`"
     if isinstance(value, tuple):
         return f"`{list(value)}`"
     number = float(str(value))
-    power = 3 * int(np.floor(np.log10(number) / 3)) if number > 0 else 0
+    power = 3 * int(np.floor(np.log10(number) / 3 + 1e-9)) if number > 0 else 0
     return f"`{number:g}`" if "e" not in f"{number:g}" else f"`{number / 10.0**power:g}e{power}`"
+
+
+def scene_keys() -> str:
+    """Keys of all tables of a scene file, with their ranges and defaults."""
+    rows = []
+    for table, (thing, prefix, limits) in SCENE_TABLES.items():
+        parameters = inspect.signature(thing).parameters
+        texts = {
+            name: meaning
+            for names, _, meaning in described(inspect.getdoc(thing) or "")
+            for name in names
+        }
+        needed, others = KEYS[table]
+        for key in (*needed, *others):
+            name = prefix + key if prefix + key in parameters else key
+            default = parameters[name].default
+            usual = "" if default is None else "must be given" if key in needed else toml(default)
+            least, most = (toml(limit).strip("`") for limit in limits.get(key, (0, 0)))
+            allowed = f"{least} to {most}" if key in limits else ""
+            rows.append([f"`{table}`", f"`{key}`", texts[name], allowed, usual])
+    return pipe_table(["table", "key", "meaning", "allowed", "default"], rows)
 
 
 def radar_limits() -> str:
@@ -161,6 +209,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "radar-keys": lambda: keys(Radar),
     "antenna-keys": lambda: keys(Antenna),
     "radar-limits": radar_limits,
+    "scene-keys": scene_keys,
     "materials": materials,
     "meshes": meshes,
     "scenes": scenes,

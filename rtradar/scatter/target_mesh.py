@@ -1,4 +1,8 @@
-"""The one check of meshes whose scattering length is asked for, whatever the model."""
+"""The one check of meshes whose scattering length is asked for, whatever the model.
+
+A mesh of one's own is a `trimesh.Trimesh` in metres, given as the target of `scattering_length`; in
+a room it is furniture (`rtradar.scene.objects`).
+"""
 
 from __future__ import annotations
 

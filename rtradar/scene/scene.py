@@ -69,8 +69,8 @@ class Scene:
     furniture : tuple of Furniture
         Meshes in the room.
     radar_position_m : tuple of float, optional
-        Position of the radar in this scene, world [m]; its axes stay parallel to the world's. With
-        None the radar keeps its own position.
+        Position of the radar in this scene, world [m]; its axes stay parallel to the world's. The
+        radar keeps its own position where this is left out.
     person_position_m : tuple of float
         Mean position of the person, x and y [m].
     heading_deg : float
