@@ -151,14 +151,11 @@ class Motion:
         """Interpolate the pose at any time, with exactly rigid bones.
 
         Rotations go through a C2 cubic spline of the sign-continuous quaternion components,
-        normalised; the root goes through PCHIP. ``validation/measurements/interpolation.py``
-        measures the choice. With every second frame left out, cubic, makima and ``RotationSpline``
-        meet the left-out frames of 120 Hz recordings alike (kicks: 0.41 mm rms, PCHIP 0.46, slerp
-        0.64), where noise decides; at 30 Hz the cubic is the nearest (2.7 mm, makima 3.1, PCHIP
-        3.7, slerp 5.5). On smooth motion it leaves false Doppler lines of a swinging limb at -71 dB
-        of a 77 GHz echo, where makima and PCHIP leave -17 dB and slerp, whose angular velocity
-        jumps at every frame, 0 dB. A spike of one frame rings on with 13 % of its height and falls
-        by 3.7 from frame to frame.
+        normalised; the root goes through PCHIP. Of the interpolations that
+        ``validation/measurements/interpolation.py`` compares, the cubic meets left-out frames best,
+        and leaves false Doppler lines of a swinging limb at -71 dB of a 77 GHz echo, where makima
+        and PCHIP leave -17 dB and slerp, whose angular velocity jumps at every frame, 0 dB. A spike
+        of one frame rings on with 13 % of its height, and falls by 3.7 from frame to frame.
 
         Parameters
         ----------

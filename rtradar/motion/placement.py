@@ -19,19 +19,11 @@ MARGIN_FRAMES = 16
 What lies further away moves a cubic spline by less than 3.7^-16, 1e-9: the ends are as good as the
 middle."""
 
-WALK_DISTANCE_M = 1.1
-"""Least distance of a walk from its beginning [m]; a kick steps less.
-
-Short intervals of straight walks stay below it, and then face by their hips, which look the same
-way."""
-
-WALK_STRAIGHTNESS = 0.5
-"""Least ratio of the straight line to the length of the path of a walk."""
-
-WALK_ALONG_HEADING = 0.5
-"""Least median cosine between the path of a walk and the hips' heading, or against it.
-
-A fighter who steps sideways does not walk."""
+WALK_DISTANCE_M, WALK_STRAIGHTNESS, WALK_ALONG_HEADING = 1.1, 0.5, 0.5
+"""Least distance of a walk from its beginning [m], where a kick steps less; least ratio of the
+straight line to the path; and least median cosine between path and the hips' heading, for a fighter
+who steps sideways does not walk. Short intervals of straight walks fall below the distance, and
+then face by their hips, which look the same way."""
 
 
 def place(

@@ -57,43 +57,25 @@ NODES: tuple[str, ...] = ("root", *NODE_PARENT)
 NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PARENT.values()))
 """Index of the parent of each node, -1 for the root."""
 
-CHAIN_24: Mapping[str, str] = {
-    "pelvis": "root",
-    "l_hip": "lhipjoint",
-    "r_hip": "rhipjoint",
-    "spine1": "lowerback",
-    "l_knee": "lfemur",
-    "r_knee": "rfemur",
-    "spine2": "upperback",
-    "l_ankle": "ltibia",
-    "r_ankle": "rtibia",
-    "spine3": "thorax",
-    "l_foot": "ltoes",
-    "r_foot": "rtoes",
-    "neck": "thorax",
-    "l_collar": "thorax",
-    "r_collar": "thorax",
-    "head": "lowerneck",
-    "l_shoulder": "lclavicle",
-    "r_shoulder": "rclavicle",
-    "l_elbow": "lhumerus",
-    "r_elbow": "rhumerus",
-    "l_wrist": "lwrist",
-    "r_wrist": "rwrist",
-    "l_hand": "lfingers",
-    "r_hand": "rfingers",
-}
+
+def _pairs(text: str) -> dict[str, str]:
+    """Names and values of a text such as ``hip=upleg toe=toebase``."""
+    return dict(entry.split("=") for entry in text.split())
+
+
+CHAIN_24: Mapping[str, str] = _pairs(
+    "pelvis=root l_hip=lhipjoint r_hip=rhipjoint spine1=lowerback l_knee=lfemur r_knee=rfemur "
+    "spine2=upperback l_ankle=ltibia r_ankle=rtibia spine3=thorax l_foot=ltoes r_foot=rtoes "
+    "neck=thorax l_collar=thorax r_collar=thorax head=lowerneck l_shoulder=lclavicle "
+    "r_shoulder=rclavicle l_elbow=lhumerus r_elbow=rhumerus l_wrist=lwrist r_wrist=rwrist "
+    "l_hand=lfingers r_hand=rfingers"
+)
 """The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) of each."""
 
-_NODE_OF_24 = {
-    "pelvis": "root",
-    "spine1": "lowerback",
-    "spine2": "upperback",
-    "spine3": "thorax",
-    "head": "neck",
-    "l_foot": "l_toe",
-    "r_foot": "r_toe",
-}
+_NODE_OF_24 = _pairs(
+    "pelvis=root spine1=lowerback spine2=upperback spine3=thorax head=neck l_foot=l_toe "
+    "r_foot=r_toe"
+)
 
 ASF_JOINTS: Mapping[str, str] = {
     **{
@@ -171,20 +153,10 @@ def plain(name: str) -> str:
 MINIMUM_PART_M = 0.01
 """No body part is shorter than this; joints nearer to each other count as one."""
 
-HEAD_OF_THIGH = 0.130 / 0.245
-"""Ratio of the head's height to the thigh's length (Drillis and Contini 1966).
-
-Skeletons that end at the base of the head need it."""
-
-HAND_OF_FOREARM = 0.108 / 0.146
-"""Ratio of the lengths of hand and forearm (Drillis and Contini 1966).
-
-Skeletons that end at the wrist need it."""
-
-TOES_OF_FOOT = 0.5
-"""Ratio of the distances from ball to toe tip and from ankle to ball of the foot (HDM05).
-
-Skeletons that end at the ball of the foot need it."""
+HEAD_OF_THIGH, HAND_OF_FOREARM, TOES_OF_FOOT = 0.130 / 0.245, 0.108 / 0.146, 0.5
+"""Ratios of lengths for skeletons that end at the base of the head, the wrist, or the ball of the
+foot: head and thigh, hand and forearm (Drillis and Contini 1966), and ball to toe tip and ankle to
+ball (HDM05)."""
 
 
 @dataclass(frozen=True)
@@ -216,16 +188,12 @@ def to_nodes(motion: Motion) -> Motion:
     bones |= _spine(motion, joints["root"], joints["thorax"])
     if convention.open_ended:
         for side in ("l", "r"):
-            bones[f"{side}_toe"] = _foot(
-                motion, joints[f"{side}_ankle"], bones[f"{side}_toe"], joints[f"{side}_toe"]
-            )
-            forearm = bones[f"{side}_wrist"].length
-            bones[f"{side}_hand"] = _extended(
-                motion, bones[f"{side}_hand"], joints, f"{side}_wrist", forearm * HAND_OF_FOREARM
-            )
-        bones["head"] = _extended(
-            motion, bones["head"], joints, "neck", bones["l_knee"].length * HEAD_OF_THIGH
-        )
+            ankle, wrist, toe = (f"{side}_{node}" for node in ("ankle", "wrist", "toe"))
+            bones[toe] = _foot(motion, joints[ankle], bones[toe], joints[toe])
+            length = bones[wrist].length * HAND_OF_FOREARM
+            bones[f"{side}_hand"] = _extended(motion, bones[f"{side}_hand"], joints[wrist], length)
+        length = bones["l_knee"].length * HEAD_OF_THIGH
+        bones["head"] = _extended(motion, bones["head"], joints["neck"], length)
     for node, parent in NODE_PARENT.items():
         if bones[node].length < MINIMUM_PART_M:
             ends = " to ".join(
@@ -370,9 +338,7 @@ def _foot(motion: Motion, ankle: int, foot: _Bone, toe: int) -> _Bone:
     return _Bone(foot.offset * (1 + TOES_OF_FOOT), foot.rotations) if ends_at_ball else foot
 
 
-def _extended(
-    motion: Motion, end: _Bone, joints: Mapping[str, int], base: str, length: float
-) -> _Bone:
+def _extended(motion: Motion, end: _Bone, base: int, length: float) -> _Bone:
     """Extend an end part without length straight on from the bone before it; return others as is.
 
     Straight on is meant in the axes of the joint at its base: in the rest pose of a BVH these are
@@ -380,5 +346,5 @@ def _extended(
     """
     if end.length >= MINIMUM_PART_M:
         return end
-    before = motion.offsets[joints[base]]
+    before = motion.offsets[base]
     return _Bone(before * (length / max(float(np.linalg.norm(before)), 1e-12)), end.rotations)

@@ -47,10 +47,7 @@ class _Bone:
 
 @dataclass(frozen=True)
 class Skeleton:
-    """Content of an ASF file, with its length unit [m]; parents come before their children.
-
-    Angles, those of the AMC file too unless it says otherwise, are ``degrees`` or radians.
-    """
+    """Content of an ASF file, with parents before their children; angles are degrees or radians."""
 
     path: Path
     bones: tuple[_Bone, ...]

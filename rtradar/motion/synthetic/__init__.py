@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
@@ -14,6 +15,8 @@ from rtradar.motion.motion import Motion
 from rtradar.motion.skeleton import NODE_PARENTS, NODES
 from rtradar.motion.synthetic.exercises import jumping_jack, kick, punch
 from rtradar.motion.synthetic.figure import (
+    Array,
+    Pose,
     PosesAt,
     Subject,
     draw_subject,
@@ -25,10 +28,15 @@ from rtradar.motion.synthetic.gait import walk
 from rtradar.system.row_files import FileBackedRows, in_blocks
 from rtradar.system.seeds import check_seed, stream
 
+
+def _repeating(poses: Callable[[Subject, Array], Pose]) -> Callable[[float, Subject], PosesAt]:
+    return lambda duration_s, subject: partial(poses, subject)
+
+
 ACTIVITIES: Mapping[str, Callable[[float, Subject], PosesAt]] = {
     "walk": walk,
-    "kick": kick,
-    "punch": punch,
+    "kick": _repeating(kick),
+    "punch": _repeating(punch),
     "jumping_jack": jumping_jack,
 }
 """Activities of the actors, by name."""

@@ -60,14 +60,11 @@ def _degrees(clock: Array, times: list[float], values: list[float]) -> Array:
     return np.radians(keyed(clock, times, values))
 
 
-def kick(duration_s: float, subject: Subject) -> PosesAt:
-    """Front kicks of one leg, facing +x, for as long as there are times."""
-    del duration_s
-    return partial(_kick, subject)
+def kick(subject: Subject, t: Array) -> Pose:
+    """Front kicks of one leg, facing +x.
 
-
-def _kick(subject: Subject, t: Array) -> Pose:
-    """Kick with a leg led by joint angles in the air and by its footprint on the floor."""
+    The leg is led by joint angles in the air and by its footprint on the floor.
+    """
     height, kicker, other = subject.height_m, subject.side, subject.other
     clock = repeated(t, subject, KICK_PERIOD_S, 0.25)
     # A low kick needs nearly as high a knee, or the foot would scrape the floor.
@@ -133,13 +130,8 @@ def _kick(subject: Subject, t: Array) -> Pose:
     )
 
 
-def punch(duration_s: float, subject: Subject) -> PosesAt:
-    """Straight punches of the rear hand, facing +x, for as long as there are times."""
-    del duration_s
-    return partial(_punch, subject)
-
-
-def _punch(subject: Subject, t: Array) -> Pose:
+def punch(subject: Subject, t: Array) -> Pose:
+    """Straight punches of the rear hand, facing +x."""
     height, hand, other = subject.height_m, subject.side, subject.other
     clock = repeated(t, subject, PUNCH_PERIOD_S, 0.25)
     # The hips lead, the hand follows and arrives last; then it comes back more slowly.

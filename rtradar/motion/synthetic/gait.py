@@ -30,19 +30,12 @@ from rtradar.motion.synthetic.figure import (
     xyz,
 )
 
-HALF_TRACK_M = 1.5
-"""Long walks turn round at this distance from the middle."""
+HALF_TRACK_M, STRAIGHT_M = 1.5, 4.2
+"""Distance from the middle at which long walks turn round, and the length of straight walks [m]."""
 
-STRAIGHT_M = 4.2
-"""Walks up to this length just go straight."""
-
-STANCE = 0.57
-"""Fraction of the cycle for which a foot is on the floor: both are for 7 % of it, twice.
-
-Winter has 60 %."""
-
-MIDSTANCE = 0.22
-"""Part of the cycle from landing until the body is over the foot."""
+STANCE, MIDSTANCE = 0.57, 0.22
+"""Fractions of the cycle for which a foot is on the floor (Winter has 60 %; both are for 7 % of it,
+twice), and from landing until the body is over the foot."""
 
 _TURN_STEPS = 4
 
