@@ -50,7 +50,8 @@ def test_a_far_sphere_has_the_optical_field_phase_and_all(fidelity: str) -> None
 
 @pytest.mark.parametrize("fidelity", FIDELITIES)
 def test_phase_belongs_to_the_path_over_the_origin(fidelity: str) -> None:
-    # 0.3 m farther away: the path is 0.6 m longer, and with exp(+j omega t) a longer path turns back.
+    # 0.3 m farther away: the path is 0.6 m longer, and with exp(+j omega t) a longer path turns
+    # back.
     tx = np.array([1e6, 0.0, 0.0])
     spheres = (ellipsoid(0.1, 0.1, 0.1), ellipsoid(0.1, 0.1, 0.1, centre=(-0.3, 0, 0)))
     here, there = (rt.scattering_length(sphere, tx, tx, 1e9, fidelity) for sphere in spheres)

@@ -32,7 +32,7 @@ def unit(vector: Array) -> Array:
 
 
 def incidence(angle: float) -> tuple[Array, Array, Array, Array]:
-    """Direction, normal, and the unit fields across and in the plane of incidence, all turned somewhere."""
+    """Direction, normal, and unit fields across and in the plane of incidence, rotated at random."""
     turn = Rotation.from_euler("xyz", [0.4, 1.1, -0.7])
     way, normal = np.array([np.sin(angle), 0.0, -np.cos(angle)]), np.array([0.0, 0.0, 1.0])
     across = np.array([0.0, 1.0, 0.0])
@@ -47,7 +47,8 @@ def test_skin_has_fresnels_coefficients(angle: float) -> None:
     tm = (ETA[0] * cosine - root) / (ETA[0] * cosine + root)
     leaving = way + 2 * cosine * normal
     for field, expected in ((across, te * across), (within, tm * np.cross(across, leaving))):
-        # Rounding: near the normal the plane of incidence is only as sure as sine^2 does not matter.
+        # Rounding: near the normal the plane of incidence is only as sure as sine^2 does not
+        # matter.
         np.testing.assert_allclose(
             body_reflection(field[None], way, normal, ETA)[0], expected, atol=1e-9
         )
@@ -90,7 +91,8 @@ def test_straight_on_skin_gives_back_its_coefficient(frequency: float, polarizat
 
 
 def test_at_10_ghz_skin_is_as_published() -> None:
-    # Gabriel et al., Phys. Med. Biol. 41 (1996) 2271, dry skin: permittivity 31.29, conductivity 8.01 S/m.
+    # Gabriel et al., Phys. Med. Biol. 41 (1996) 2271, dry skin: permittivity 31.29, conductivity
+    # 8.01 S/m.
     published = np.sqrt(31.29 - 8.01j / (2 * np.pi * 10e9 * 8.854e-12))
     way = np.array([-4.0, 1.0, 0.3])
     found = material_factor(way, way, SKIN.eta(np.array([10e9])), "v")

@@ -1,4 +1,4 @@
-"""Facets: the integral over one, closed forms of many, the laws of scattering, shadows, and what is refused."""
+"""Facets: the integral over one, closed forms of many, laws of scattering, shadows, bad input."""
 
 import numpy as np
 import pytest
@@ -52,11 +52,12 @@ def directions(rng: np.random.Generator, n: int) -> Array:
     return random / np.linalg.norm(random, axis=1, keepdims=True)
 
 
-# -- one facet --------------------------------------------------------------------------------------------------------
+# -- one facet -------------------------------------------------------------------------------------
 
 
 def mean_over_triangle(phases: Array, cells: int = 400) -> complex:
-    """Mean of exp(j phase), phase linear between its three corner values, by the midpoints of small triangles."""
+    """Mean of exp(j phase), phase linear between its three corner values, by the midpoints of small
+    triangles."""
     i, j = np.meshgrid(np.arange(cells), np.arange(cells), indexing="ij")
     up, down = i + j < cells, i + j < cells - 1
     u = np.concatenate([(i[up] + 1 / 3) / cells, (i[down] + 2 / 3) / cells])
@@ -90,7 +91,8 @@ def test_linear_phase_is_integrated_exactly(seed: int, size: float) -> None:
     )[0, 0, 0]
     facing = abs(facets.normals[0, 0] @ antenna) / np.linalg.norm(antenna)
     expected = 1j * k / np.sqrt(np.pi) * facing * facets.areas[0, 0] * mean_over_triangle(-k * path)
-    # The midpoint sum is within (50 / 400)^2 / 24 of the exact mean; paths of 1e9 m have 1e-7 m of rounding.
+    # The midpoint sum is within (50 / 400)^2 / 24 of the exact mean; paths of 1e9 m have 1e-7 m of
+    # rounding.
     scale = k / np.sqrt(np.pi) * facing * facets.areas[0, 0]
     assert abs(got - expected) < 1e-3 * scale
 
@@ -98,7 +100,8 @@ def test_linear_phase_is_integrated_exactly(seed: int, size: float) -> None:
 @settings(max_examples=20)
 @given(seeds)
 def test_flat_and_steep_facets_of_one_mesh_add_up(seed: int) -> None:
-    # Where any facet is steep all are summed by differences: flat ones, too, must be what their series makes them.
+    # Where any facet is steep all are summed by differences, and flat ones must still agree with
+    # their series.
     rng = np.random.default_rng(seed)
     sizes = 10 ** rng.uniform(-4, 0, 12)
     corners = rng.normal(size=(12, 3, 3)) * sizes[:, None, None]
@@ -153,7 +156,7 @@ def test_clearance_is_the_least_along_the_way(seed: int) -> None:
     assert clearance(antenna, point, centre, frame, axes) == pytest.approx(least, abs=4e-3)
 
 
-# -- closed forms -----------------------------------------------------------------------------------------------------
+# -- closed forms ----------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("ka", [5.0, 10.0, 29.34, 80.0])
@@ -211,7 +214,7 @@ def test_a_mesh_of_a_sphere_is_a_sphere() -> None:
     np.testing.assert_allclose(field(mesh, tx, rx, 12e9), fine, rtol=0.02)
 
 
-# -- laws -------------------------------------------------------------------------------------------------------------
+# -- laws ------------------------------------------------------------------------------------------
 
 
 @settings(max_examples=15)
@@ -263,8 +266,8 @@ def test_parts_beside_each_other_add_up() -> None:
 
 
 def test_polarization_of_a_mirror_by_hand() -> None:
-    # Tx along x, Rx along y: the mirror stands at 45 degrees. v lies along its surface and turns round, as everywhere;
-    # h is carried over from y to x, and kept.
+    # Tx along x, Rx along y: the mirror is at 45 degrees. v lies along its surface and is reversed,
+    # as everywhere; h is carried over from y to x, and kept.
     tx, rx = np.array([1.0, 0, 0]), np.array([0, 2.0, 0])
     assert copolar(tx, rx, "v") == pytest.approx(1)
     assert copolar(tx, rx, "h") == pytest.approx(1)
@@ -274,7 +277,7 @@ def test_polarization_of_a_mirror_by_hand() -> None:
         assert copolar(np.array([0, 0, 1.0]), np.array([0, 0, 1.0]), polarization) == 1
 
 
-# -- shadows ----------------------------------------------------------------------------------------------------------
+# -- shadows ---------------------------------------------------------------------------------------
 
 
 def test_a_plate_in_the_shadow_of_another_shows_its_free_half() -> None:
@@ -289,7 +292,8 @@ def test_a_plate_in_the_shadow_of_another_shows_its_free_half() -> None:
     whole, alone, free = (
         field(target, tx, tx, 3e9) for target in (both(front, behind), front, half)
     )
-    # The edge is found within a quarter of a wavelength, 25 mm of 500, and by half of that in the mean.
+    # The edge is found within a quarter of a wavelength, 25 mm of 500, and by half of that in the
+    # mean.
     assert abs(whole - alone - free)[0] < 0.025 * abs(free)[0]
 
 
@@ -323,7 +327,8 @@ def test_a_shadow_moves_over_a_body_without_jumps(backend: object) -> None:
             sphere, tx, tx, 6e9, facets=1280
         )
         values.append(shadowed[0] / alone)
-    # Over 10 mm a fifth of the field comes free; a facet that popped would be a step of 0.02 among those of 0.012.
+    # Over 10 mm a fifth of the field comes free; a facet that popped would be a step of 0.02 among
+    # those of 0.012.
     assert abs(values[-1] - values[0]) > 0.15
     if kind != "scalar":
         assert np.abs(np.diff(values, 2)).max() < 0.002
@@ -373,7 +378,7 @@ def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) ->
                         assert found < 0 or gaps[found] < 1e-3
                     else:
                         near += 1
-    # Both ways were taken: in closed form, and by rays along outlines, of which the nearest are left to them.
+    # Both ways were used: the closed form, and rays along outlines, to which the nearest are left.
     assert 5 * near < outlines < asked / 5
 
 
@@ -387,7 +392,7 @@ def test_what_faces_away_returns_nothing_and_no_nan() -> None:
     assert field(square(0.5), np.array([4.0, 0, 0]), np.array([-4.0, 0, 0]), 3e9)[0] == 0
 
 
-# -- bad input --------------------------------------------------------------------------------------------------------
+# -- bad input -------------------------------------------------------------------------------------
 
 
 def test_too_large_a_part_is_refused_unless_its_facets_are_asked_for() -> None:

@@ -1,4 +1,4 @@
-"""Sums of phasors over triangles: the series that they are made of, and the sums, against NumPy and a quadrature."""
+"""Sums of phasors over triangles, and their series, against NumPy and a quadrature."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_series_of_sine_and_cosine_are_as_exact_as_they_say() -> None:
 
 
 def quadrature(mean: float, u: float, v: float, k: float) -> complex:
-    """Mean of exp(-jk deviation) over a triangle with u, v and -u - v at its corners, times exp(-jk mean)."""
+    """Mean of exp(-jk deviation), u, v and -u - v at a triangle's corners, times exp(-jk mean)."""
     nodes, weights = np.polynomial.legendre.leggauss(40)
     x, y = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, indexing="ij")
     second, third = x, y * (1 - x)
@@ -42,7 +42,8 @@ def test_sums_are_those_of_the_integrals(add_up: object, bounds: tuple[float, fl
     mean, u, v, strength = facets(*bounds)
     for i in range(len(mean)):
         found = add_up(mean[i : i + 1], u[i : i + 1], v[i : i + 1], strength[i : i + 1], 250.0)  # type: ignore[operator]
-        # The series leaves out 2 (p^6 + 10 p^3 q^2 + q^4) / 14!, where q^2 is at most 4 p^3 / 27: 2.4e-7 of a facet for p = 4.
+        # The series leaves out 2 (p^6 + 10 p^3 q^2 + q^4) / 14!, where q^2 is at most 4 p^3 / 27:
+        # 2.4e-7 of a facet for p = 4.
         assert found == pytest.approx(
             strength[i] * quadrature(mean[i], u[i], v[i], 250.0), abs=3e-7
         )

@@ -42,7 +42,7 @@ SPHERE = np.full((2, 3), 0.2)
 
 
 def two_spheres(aside: float) -> Poses:
-    """A sphere at the origin, and another of the same size 1 m before it, this far beside the line to the radar."""
+    """A sphere at the origin, and another 1 m before it, this far beside the line to the radar."""
     ahead = np.asarray(RADAR.position_m) / np.linalg.norm(RADAR.position_m)
     across = np.array([-ahead[1], ahead[0], 0]) / np.hypot(ahead[0], ahead[1])
     centres = np.array([[np.zeros(3), ahead + aside * across]])
@@ -65,7 +65,8 @@ def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() ->
 def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
     told = look(RADAR, two_spheres(1.0))
     assert told.in_view.all()
-    # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by both ways.
+    # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by
+    # both ways.
     distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
     assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
     assert told.true[0, 0] == pytest.approx(
@@ -86,12 +87,12 @@ def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
         np.testing.assert_allclose(after, before * expected, rtol=0.05, err_msg=name)
 
 
-def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_the_specular_point_errs_by_half() -> (
-    None
-):
-    # Seen from 4.2 m, the edge of a sphere of 0.2 m that is 1 m nearer touches the line to the middle of the far one.
+def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_specular_errs_by_half() -> None:
+    # Seen from 4.2 m, the edge of a sphere of 0.2 m that is 1 m nearer touches the line to the
+    # middle of the far one.
     distance = np.linalg.norm(np.asarray(RADAR.position_m))
-    # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a right triangle.
+    # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a
+    # right triangle.
     near = distance - 1.0
     told = look(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
     free = np.pi * 0.2**2 / ((distance - 0.2) ** 2 * distance**2)
@@ -268,7 +269,8 @@ def test_what_is_kept_does_not_grow_with_the_capture() -> None:
             first_pass = first_pass or model.account()
     finally:
         tracemalloc.stop()
-    # 69 s more, and all of it again: nothing but Python's own tables. To keep what was forecast took 1.2 MB.
+    # 69 s more, and all of it again: nothing but Python's own tables. To keep what was forecast
+    # took 1.2 MB.
     assert max(held[1:]) - held[0] < 60e3
     # Nothing counts twice.
     assert model.account() == first_pass

@@ -1,4 +1,4 @@
-"""The echo model `rays`: tubes, their footprints, corner reflectors, and the laws that any number of bounces keeps."""
+"""The echo model `rays`: tubes, footprints, corner reflectors, and the laws of many bounces."""
 
 import numpy as np
 import pytest
@@ -121,7 +121,8 @@ def test_a_sphere_is_that_of_physical_optics(backend: Backend) -> None:
 def test_under_sampled_tubes_degrade_gracefully() -> None:
     reference = abs(complex(rt.rcs.sphere(0.25, 14e9, "po")))
     field = backscatter(sphere(0.25), [FAR, 0, 0], 14e9, bounces=1, rays_per_wavelength=1.0)
-    # Facets of one wavelength, ten to the glint; plain sums of one ray a facet would be 12 dB too high.
+    # Facets of one wavelength, ten to the glint; plain sums of one ray a facet would be 12 dB too
+    # high.
     assert 20 * np.log10(abs(field) / reference) == pytest.approx(0, abs=1.0)
 
 
@@ -182,7 +183,8 @@ def test_a_corner_reflector_sends_back_from_off_its_axis_too() -> None:
 def test_two_spheres_send_each_other_what_one_of_them_alone_does_not() -> None:
     pair = sphere(0.1, (0, -0.15, 0), (0, 0.15, 0))
     one, two = (backscatter(pair, [4.0, 0.1, 0.05], 24e9, bounces=n) for n in (1, 2))
-    # Stationary phase over both spheres gives 0.0676 m (validation/closed_forms/rays.py works it out); 1 dB for edges of shadow.
+    # Stationary phase over both spheres gives 0.0676 m (validation/closed_forms/rays.py works it
+    # out); 1 dB for edges of shadow.
     assert 20 * np.log10(abs(two - one) / 0.0676) == pytest.approx(0, abs=1.0)
 
 
@@ -284,7 +286,8 @@ def test_echoes_are_the_scattering_lengths_of_the_pose() -> None:
         expected *= np.exp(-1j * k * (np.linalg.norm(tx) + np.linalg.norm(rx))) / (
             np.linalg.norm(tx) * np.linalg.norm(rx)
         )
-        # The polynomial through the nodes of the sweep; 7 and 13 leave 2 and 5 % of one bounce and of two.
+        # The polynomial through the nodes of the sweep; 7 and 13 leave 2 and 5 % of one bounce and
+        # of two.
         np.testing.assert_allclose(heard, expected, atol=0.05 * np.abs(expected).max())
 
 
@@ -298,7 +301,8 @@ def test_one_bounce_is_what_specular_sees() -> None:
     )
     middle = BarycentricInterpolator(rays.frequency, rays.amplitude)(14e9)
     seen = np.abs(specular.amplitude[0]).max(axis=(0, 1)) > 0.02 * np.abs(specular.amplitude).max()
-    # A part in full view is within some per cent of geometric optics; one at an occluder's edge may be half off.
+    # A part in full view is within some per cent of geometric optics; one at an occluder's edge may
+    # be half off.
     error = (
         np.abs(middle - specular.amplitude[0])[..., seen]
         / np.abs(specular.amplitude[0][..., seen]).max()
