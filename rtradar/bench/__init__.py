@@ -1,30 +1,53 @@
-"""``rtradar bench``: what every stage takes and the whole, beside other models, the paper's method and floors measured here."""
+"""``rtradar bench``: time of every stage, beside other models, the paper's method and bounds."""
 
 from __future__ import annotations
 
+import dataclasses
+import json
 import os
 import platform
 import sys
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
+from statistics import median
 from typing import Any
 
-from rtradar.bench.figure import draw
-from rtradar.bench.growth import with_channels, with_duration, with_echoes
+import numpy as np
+
+from rtradar.bench.floors import Rates, Work, best_s, floors, measure_rates
 from rtradar.bench.kernels import measure_kernels
-from rtradar.bench.paper import Baseline, measure_baseline
-from rtradar.bench.plan import CHEAPEST, Plan, model_cases, plan_of
-from rtradar.bench.rates import measure_rates
-from rtradar.bench.rows import chirp_rows, model_row
-from rtradar.bench.runs import MOTION, RunError, Runner, can_pin
-from rtradar.bench.tables import tables
+from rtradar.bench.plan import CHEAPEST, Case, Plan, model_cases, plan_of
+from rtradar.bench.report import draw, tables
+from rtradar.bench.runs import (
+    IF_STAGE,
+    MOTION,
+    Baseline,
+    Run,
+    RunError,
+    Runner,
+    Spread,
+    by_stage,
+    can_pin,
+    measure_baseline,
+    paired_ratio,
+)
+from rtradar.echoes import Echoes
 from rtradar.radar import Radar
+from rtradar.signal import synthesize
 from rtradar.system.files import atomic_file, check_place, temporary_folder, write_json
 
 __all__ = ["Plan", "bench", "plan_of"]
 
+Row = dict[str, Any]
+
 _VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba")
+
+ECHOES = (10, 21, 31, 42, 84, 168, 336)
+"""Echoes of one chirp and receiver; a body has 21."""
+
+_CYCLES = 33  # 25 ms of the paper's radar, which a run synthesises at once
+_ECHOES_S = 0.1  # of repeats
 
 
 def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = None) -> int:
@@ -33,10 +56,11 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
     Parameters
     ----------
     plan : Plan
+        What is measured.
     json_path : path, optional
-        All that was measured is written there.
+        File for all that was measured.
     figure : path, optional
-        A picture of it is drawn there, as PNG.
+        File for a picture of it, as PNG.
 
     Returns
     -------
@@ -78,24 +102,20 @@ def measure(plan: Plan) -> dict[str, Any]:
     RunError
         Where a run fails.
     """
+    versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
+    growth: dict[str, Any] = {"fidelity": plan.growing_fidelity}
+    growth |= {name: [] for name in ("chirps", "duration", "channels", "echoes")}
     found: dict[str, Any] = {
         "settings": asdict(plan) | {"motion": MOTION},
         "machine": {
             "system": platform.platform(),
             "cores": os.cpu_count(),
-            "versions": {"python": platform.python_version()}
-            | {name: version(name) for name in _VERSIONS},
+            "versions": versions,
         },
         "rates": {},
         "models": [],
         "paper": {"trouble": "", "radars": {}},
-        "growth": {
-            "fidelity": plan.growing_fidelity,
-            "chirps": [],
-            "duration": [],
-            "channels": [],
-            "echoes": [],
-        },
+        "growth": growth,
         "kernels": measure_kernels() if "kernels" in plan.parts else [],
     }
     with temporary_folder("rtradar-bench-") as folder:
@@ -103,16 +123,20 @@ def measure(plan: Plan) -> dict[str, Any]:
         if "models" in plan.parts:
             _measure_models(plan, runner, found)
         if "growth" in plan.parts:
-            found["growth"]["duration"] = with_duration(plan, runner)
-            found["growth"]["channels"] = with_channels(plan, runner, folder)
-            found["growth"]["echoes"] = with_echoes(Radar.load(plan.radars[0]))
+            growth["duration"] = with_duration(plan, runner)
+            growth["channels"] = with_channels(plan, runner, folder)
+            growth["echoes"] = with_echoes(Radar.load(plan.radars[0]))
     return found
 
 
+# -- models ----------------------------------------------------------------------------------------
+
+
 def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
-    rates = {radar: measure_rates(Radar.load(radar)) for radar in plan.radars}
-    baselines: dict[str, Baseline | None] = {
-        radar: measure_baseline(radar, plan.repeats, quick=plan.quick) for radar in plan.radars
+    radars = {name: Radar.load(name) for name in plan.radars}
+    rates = {name: measure_rates(radar) for name, radar in radars.items()}
+    baselines = {
+        name: measure_baseline(name, plan.repeats, quick=plan.quick) for name in plan.radars
     }
     runs = runner.measure(model_cases(plan, one_core=can_pin()), plan.repeats, "models")
     cheapest = {
@@ -120,27 +144,183 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         for case, own in runs.items()
         if case.fidelity == CHEAPEST and not case.one_core
     }
-    found["models"] = [
-        model_row(
-            case,
-            own,
-            first=runner.first[case.fidelity]
-            if case.radar == plan.radars[0] and not case.one_core
-            else None,
-            cheapest=None if case.one_core else cheapest.get(case.radar),
-            rates=rates[case.radar],
-            baseline=baselines[case.radar],
+    for case, own in runs.items():
+        row = _model_row(case, own, rates[case.radar])
+        first = case.radar == plan.radars[0] and not case.one_core
+        row["first_use"] = _first_use(runner.first[case.fidelity], own) if first else None
+        reference = None if case.one_core else cheapest.get(case.radar)
+        row[f"over_{CHEAPEST}"] = reference and paired_ratio(
+            [run.to_cloud_s for run in own], [run.to_cloud_s for run in reference]
         )
+        baseline = baselines[case.radar]
+        row["paper_over"] = baseline and _paper_over(baseline, radars[case.radar], row)
+        found["models"].append(row)
+    found["rates"] = {radars[name].name: asdict(own) for name, own in rates.items()}
+    known = {radars[name].name: asdict(own) for name, own in baselines.items() if own is not None}
+    missing = "there is no paper_numpy.py among the validation scripts; use a checkout, or install "
+    found["paper"] = {"trouble": "" if known else missing + "rtradar again", "radars": known}
+    found["growth"]["chirps"] = _chirp_rows(found["models"])
+
+
+def _model_row(case: Case, runs: list[Run], rates: Rates) -> Row:
+    """What was measured of one model with one radar, without comparisons."""
+    radar, summary = Radar.load(case.radar), runs[0].summary
+    work = Work.of(
+        radar,
+        chirps=summary["chirps"],
+        windows=summary["windows"],
+        echoes=len(summary["part_power_m2"]),
+        detections=summary["detections"],
+    )
+    least = {
+        name: {"floor": own.seconds, "rule": own.rule} for name, own in floors(work, rates).items()
+    }
+    none = {"floor": None, "rule": ""}
+    return {
+        "radar": radar.name,
+        "fidelity": case.fidelity,
+        "cores": "one" if case.one_core else "all",
+        "capture_s": summary["capture_s"],
+        "work": asdict(work),
+        "process_s": asdict(Spread.of([run.process_s for run in runs])),
+        "warmup_s": asdict(Spread.of([run.summary["warmup_s"] for run in runs])),
+        **_costs(runs),
+        "stages": {
+            name: asdict(seconds) | least.get(name, none)
+            for name, seconds in by_stage([run.stages for run in runs]).items()
+        },
+    }
+
+
+def _costs(runs: list[Run]) -> Row:
+    return {
+        "to_cloud_s": asdict(Spread.of([run.to_cloud_s for run in runs])),
+        "whole_s": asdict(Spread.of([run.whole_s for run in runs])),
+        "peak_memory_mb": max(run.peak_memory_mb for run in runs),
+    }
+
+
+def _first_use(first: Run, runs: list[Run]) -> dict[str, float]:
+    """What the first process of a model takes, with nothing compiled and no cache filled [s].
+
+    ``adds_s`` is how much longer it takes from its start to the cloud than the later median.
+    """
+    later = median(run.from_start_to_cloud_s for run in runs)
+    return {
+        "adds_s": first.from_start_to_cloud_s - later,
+        "process_s": first.process_s,
+        "warmup_s": first.summary["warmup_s"],
+    }
+
+
+def _paper_over(baseline: Baseline, radar: Radar, row: Row) -> dict[str, float]:
+    """How many times longer the paper's method takes for the same chirps: medians.
+
+    ``to_cloud`` is all of it, which ends at detections, over ours, which goes on to the cloud;
+    ``if`` echoes and IF alone.
+    """
+    frames = row["work"]["chirps"] / radar.chirps_per_frame
+    ours_if = sum(row["stages"][name]["median"] for name in ("scatter", "signal"))
+    return {
+        "to_cloud": frames * baseline.total.median / row["to_cloud_s"]["median"],
+        "if": frames * baseline.stages[IF_STAGE].median / ours_if,
+    }
+
+
+def _chirp_rows(models: list[Row]) -> list[Row]:
+    """Radars with more chirps than the first: each model's cost over its own with the first."""
+    rows = [row for row in models if row["cores"] == "all"]
+    base = {row["fidelity"]: row for row in rows if row["radar"] == models[0]["radar"]}
+    found = []
+    for row in rows:
+        of = base[row["fidelity"]]
+        if row["radar"] != of["radar"]:
+            found.append(
+                {
+                    "radar": row["radar"],
+                    "of_radar": of["radar"],
+                    "fidelity": row["fidelity"],
+                    "chirps": row["work"]["chirps"] / of["work"]["chirps"],
+                    "to_cloud": row["to_cloud_s"]["median"] / of["to_cloud_s"]["median"],
+                    "peak_memory": row["peak_memory_mb"] / of["peak_memory_mb"],
+                }
+            )
+    return found
+
+
+# -- growth ----------------------------------------------------------------------------------------
+
+
+def with_duration(plan: Plan, runner: Runner) -> list[Row]:
+    """Runs of growing length, a row each: ``duration_s``, ``capture_s``, seconds and memory."""
+    fixed = plan.radars[0], plan.growing_fidelity
+    cases = [Case(*fixed, duration) for duration in plan.growing_durations_s]
+    runs = runner.measure(cases, plan.repeats, "length")
+    return [
+        {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_costs(own)}
         for case, own in runs.items()
     ]
-    found["rates"] = {Radar.load(radar).name: asdict(own) for radar, own in rates.items()}
-    known = {
-        Radar.load(radar).name: asdict(own) for radar, own in baselines.items() if own is not None
+
+
+def with_channels(plan: Plan, runner: Runner, folder: Path) -> list[Row]:
+    """Runs by arrays of more and more receivers, a row each: ``channels``, seconds and memory."""
+    found = {}
+    for number, radar in enumerate(arrays(Radar.load(plan.radars[0]))):
+        file = folder / f"array{number}.toml"
+        file.write_text(as_toml(radar), encoding="utf-8")
+        found[Case(str(file), plan.growing_fidelity, plan.duration_s)] = radar.n_channels
+    runs = runner.measure(list(found), plan.repeats, "channels")
+    return [{"channels": found[case], **_costs(own)} for case, own in runs.items()]
+
+
+def arrays(radar: Radar) -> list[Radar]:
+    """The radar with a quarter and half of its receivers, itself, and every Tx with every Rx."""
+    some = [
+        dataclasses.replace(radar, rx_y=radar.rx_y // part, rx_z=radar.rx_z // part)
+        for part in (4, 2)
+        if radar.rx_y % part == radar.rx_z % part == 0
+    ]
+    whole = dataclasses.replace(radar, channels="all")
+    return [*some, radar, *([whole] if whole.n_channels > radar.n_channels else [])]
+
+
+def as_toml(radar: Radar) -> str:
+    """The fields of a radar as a TOML file that `Radar.load` reads."""
+    fields = asdict(radar)
+    nested = {
+        name: fields.pop(name) for name, own in asdict(radar).items() if isinstance(own, dict)
     }
-    trouble = (
-        ""
-        if known
-        else "there is no paper_numpy.py among the validation scripts; use a checkout, or install rtradar again"
+    return _lines(fields) + "".join(f"[{name}]\n{_lines(own)}" for name, own in nested.items())
+
+
+def _lines(fields: dict[str, Any]) -> str:
+    # A JSON string, number or list of numbers is one of TOML.
+    known = {name: value for name, value in fields.items() if value is not None}
+    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in known.items())
+
+
+def with_echoes(radar: Radar) -> list[Row]:
+    """IF of a block of chirps from more and more echoes: ``echoes``, ``samples``, ``signal_s``."""
+    return [_if_row(radar, _echoes(radar, count)) for count in ECHOES]
+
+
+def _if_row(radar: Radar, echoes: Echoes) -> Row:
+    times = radar.chirp_times(len(echoes.tx))
+    seconds = best_s(lambda: synthesize(echoes, radar, times, dtype=np.complex64), _ECHOES_S)
+    samples = len(times) * radar.n_rx * radar.samples_per_chirp
+    return {"echoes": len(echoes.part), "samples": samples, "signal_s": seconds}
+
+
+def _echoes(radar: Radar, count: int) -> Echoes:
+    """Echoes that do not move, anywhere in the band."""
+    rng = np.random.default_rng(0)
+    chirps = _CYCLES * radar.n_tx
+    shape = (chirps, radar.n_rx, count)
+    return Echoes(
+        length=np.broadcast_to(rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m, shape),
+        amplitude=np.broadcast_to(rng.standard_normal(shape[1:]) + 0j, (1, *shape)),
+        frequency=np.array([radar.centre_frequency_hz]),
+        tx=radar.tx_of_chirp(np.arange(chirps)),
+        part=np.arange(count),
+        bounces=np.ones(count, dtype=np.int64),
     )
-    found["paper"] = {"trouble": trouble, "radars": known}
-    found["growth"]["chirps"] = chirp_rows(found["models"])

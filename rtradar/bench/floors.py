@@ -1,40 +1,55 @@
-"""The least that each stage of a run could take, from the work it must do and what this machine was just measured to do.
+"""Lower bounds of the time of each stage, from its work and what this machine was measured to do.
 
-A floor counts what a stage cannot avoid: bytes that it must read and write once, at the rate of a copy by all cores; FFTs, by
-all cores in blocks that stay in the cache; random words; multiply-adds, at the rate of a matrix product. The largest of
-these is the floor, as if all else went on beside it. Stages whose work cannot be told from the size of a run have none.
+A bound counts what a stage cannot avoid: bytes that it must read and write once, at the rate of a
+copy by all cores; FFTs, by all cores in blocks that stay in the cache; random words; multiply-adds,
+at the rate of a matrix product. The largest of these is the bound, as if all else were done
+meanwhile. Stages whose work does not follow from the size of a run have none.
 """
 
 from __future__ import annotations
 
+import os
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
-from rtradar.bench.times import ELSEWHERE
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from rtradar.bench.runs import ELSEWHERE
+from rtradar.kernels.prime_factor_dft import prime_factor_dft
 from rtradar.process import SPECTROGRAM_CYCLES, angle_grid, measures_angle
 from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
 _ECHO = 24  # bytes of a float64 length and a complex128 amplitude
-_MULTIPLY_ADDS = (
-    2  # of a complex amplitude times a complex power, which is another's conjugate, added up
-)
+_MULTIPLY_ADDS = 2  # of a complex amplitude times a complex power that another one shares
+
+_REPEATS, _LEAST_S = 5, 0.3
+_COPIED_BYTES = 1 << 28  # of each of two arrays, more than caches hold
+_CACHED_BYTES = 1 << 20  # for each core
+_WORDS = 1 << 16  # at once, for each core
+_MATRIX = 1536
 
 
 @dataclass(frozen=True)
 class Rates:
-    """What this machine does a second, all cores together.
+    """What this machine does in a second, all cores together.
 
     Parameters
     ----------
     copied_bytes : float
-        Read and written, in a copy much larger than the caches.
+        Bytes read and written, in a copy much larger than the caches.
     random_words : float
-        64-bit random words drawn.
+        Random words of 64 bits drawn.
     multiply_adds : float
-        float32, in a matrix product.
+        Multiply-adds in float32, in a matrix product.
     range_ffts, doppler_ffts, spectrogram_ffts, angle_ffts : float
-        complex64 transforms of the radar's lengths: samples a chirp, cycles a frame, cycles of a spectrogram's window, and
-        directions of a line; over the cycles of a frame by the library, or as fast as the multiply-adds of our own would go.
+        Transforms (complex64) of the radar's lengths: samples per chirp, cycles per frame, cycles
+        of a spectrogram's window, and directions of a line; over the cycles of a frame by the
+        library, or as fast as the multiply-adds of our own would be.
     """
 
     copied_bytes: float
@@ -44,6 +59,75 @@ class Rates:
     doppler_ffts: float
     spectrogram_ffts: float
     angle_ffts: float
+
+
+def measure_rates(radar: Radar) -> Rates:
+    """Measure all, the best of some, with the lengths of this radar's transforms; takes seconds."""
+    multiply_adds, dft = _multiply_adds(), prime_factor_dft(radar.cycles_per_frame)
+    return Rates(
+        copied_bytes=_copied_bytes(),
+        random_words=_random_words(),
+        multiply_adds=multiply_adds,
+        range_ffts=_ffts(radar.samples_per_chirp),
+        doppler_ffts=max(
+            _ffts(radar.cycles_per_frame),
+            multiply_adds / dft.multiply_adds if dft is not None else 0,
+        ),
+        spectrogram_ffts=_ffts(SPECTROGRAM_CYCLES),
+        angle_ffts=_ffts(max(1, direction_count(radar))),
+    )
+
+
+def best_s(work: Callable[[], object], least_s: float = _LEAST_S) -> float:
+    """Best of some repeats after one to warm up, over at least some seconds of work [s]."""
+    work()
+    seconds: list[float] = []
+    while len(seconds) < _REPEATS or sum(seconds) < least_s:
+        began = time.perf_counter()
+        work()
+        seconds.append(time.perf_counter() - began)
+    return min(seconds)
+
+
+def _cores() -> int:
+    return os.cpu_count() or 1
+
+
+def _copied_bytes() -> float:
+    arrays = [np.array_split(np.ones(_COPIED_BYTES // 8), _cores()) for _ in range(2)]
+    with ThreadPoolExecutor(_cores()) as pool:
+        return 2 * _COPIED_BYTES / best_s(lambda: list(pool.map(np.copyto, *arrays)))
+
+
+def _random_words() -> float:
+    streams = [np.random.SFC64(seed) for seed in range(_cores())]
+
+    def draw(stream: np.random.SFC64) -> None:
+        for _ in range(8):
+            stream.random_raw(_WORDS)
+
+    with ThreadPoolExecutor(_cores()) as pool:
+        return 8 * _WORDS * _cores() / best_s(lambda: list(pool.map(draw, streams)))
+
+
+def _multiply_adds() -> float:
+    a, b, out = (np.ones((_MATRIX, _MATRIX), dtype=np.float32) for _ in range(3))
+    return _MATRIX**3 / best_s(lambda: np.matmul(a, b, out=out))
+
+
+def _ffts(length: int) -> float:
+    """Transforms per second, in whichever layout they are faster."""
+    count = max(16, _CACHED_BYTES * _cores() // (8 * length))
+    noise = np.random.default_rng(0).standard_normal((2, length, count), dtype=np.float32)
+    columns = noise[0] + 1j * noise[1]
+    rows = np.ascontiguousarray(columns.T)
+
+    def seconds(block: NDArray[np.complex64], axis: int) -> float:
+        # Unitary, so that it can be repeated in place.
+        options = {"norm": "ortho", "overwrite_x": True, "workers": -1}
+        return best_s(lambda: scipy.fft.fft(block, axis=axis, **options))
+
+    return count / min(seconds(columns, 0), seconds(rows, 1))
 
 
 @dataclass(frozen=True)
@@ -57,11 +141,11 @@ class Work:
     echoes : int
         Number of echoes of one chirp at one receiver.
     windows, cycles, channels : int
-        Processing windows, TDM cycles in each, virtual channels.
+        Frames, TDM cycles in each, virtual channels.
     detections : int
-        Cells that CFAR marked, in all windows.
+        Cells that CFAR marked, in all frames.
     lines : int
-        Lines of the array that tell an angle.
+        Lines of the array that measure an angle.
     """
 
     chirps: int
@@ -76,18 +160,17 @@ class Work:
 
     @classmethod
     def of(cls, radar: Radar, *, chirps: int, windows: int, echoes: int, detections: int) -> Work:
-        """Of a run by this radar."""
-        lines = (radar.tx_y * radar.rx_y > 1) + (radar.tx_z * radar.rx_z > 1)
-        shape = (radar.n_rx, radar.samples_per_chirp)
+        """Size of a run with this radar."""
         return cls(
-            chirps,
-            *shape,
-            echoes,
-            windows,
-            radar.cycles_per_frame,
-            radar.n_channels,
-            detections,
-            lines,
+            chirps=chirps,
+            rx=radar.n_rx,
+            samples=radar.samples_per_chirp,
+            echoes=echoes,
+            windows=windows,
+            cycles=radar.cycles_per_frame,
+            channels=radar.n_channels,
+            detections=detections,
+            lines=(radar.tx_y * radar.rx_y > 1) + (radar.tx_z * radar.rx_z > 1),
         )
 
     @property
@@ -102,21 +185,14 @@ class Work:
 
     @property
     def spectrogram_columns(self) -> int:
-        """Windows of one channel's spectrogram, which starts one every twentieth of its window."""
+        """Windows of one channel's spectrogram; one starts every twentieth of its length."""
         tdm_cycles = self.chirps * self.rx // self.channels
         return max(0, (tdm_cycles - SPECTROGRAM_CYCLES) // max(1, SPECTROGRAM_CYCLES // 20) + 1)
 
 
 @dataclass(frozen=True)
 class Floor:
-    """The least that a stage could take.
-
-    Parameters
-    ----------
-    seconds : float
-    rule : str
-        What it is made of, in words.
-    """
+    """Lower bound of the time of a stage [s], and what it consists of, in words."""
 
     seconds: float
     rule: str
@@ -128,50 +204,34 @@ def direction_count(radar: Radar) -> int:
 
 
 def floors(work: Work, rates: Rates) -> dict[str, Floor]:
-    """Floor of each stage that has one.
-
-    Parameters
-    ----------
-    work : Work
-    rates : Rates
-        Rates of this machine for the transforms of the radar that was run.
-
-    Returns
-    -------
-    dict of str to Floor
-        By the names of ``stages`` in the summary of a run, and `ELSEWHERE`.
-    """
+    """Bound of each stage that has one, by the names of ``stages`` in a summary and `ELSEWHERE`."""
 
     def copied(count: float) -> float:
         return count / rates.copied_bytes
 
     samples, echoes = work.if_samples, work.chirps * work.rx * work.echoes
-    tones = max(
-        _MULTIPLY_ADDS * samples * work.echoes / rates.multiply_adds, copied(_SAMPLE * samples)
-    )
-    spectra = _SAMPLE * work.windows * work.cycles * work.channels * work.samples
-    doppler = max(work.windows * work.channels * work.samples / rates.doppler_ffts, copied(spectra))
-    return {
-        ELSEWHERE: Floor(copied(2 * _SAMPLE * samples), "spectra kept for the windows"),
-        "scatter": Floor(copied(_ECHO * echoes), "lengths and amplitudes written"),
-        "signal": Floor(tones, "two multiply-adds an echo and sample, or samples written"),
-        "noise": Floor(
-            max(samples / rates.random_words, copied(2 * _SAMPLE * samples)),
-            "a random word a sample",
+    tones = _MULTIPLY_ADDS * samples * work.echoes / rates.multiply_adds
+    passed = copied(2 * _SAMPLE * samples)  # read and written
+    transforms = work.windows * work.channels * work.samples
+    doppler = max(transforms / rates.doppler_ffts, copied(_SAMPLE * work.cycles * transforms))
+    columns = work.spectrogram_columns * work.samples / rates.spectrogram_ffts
+    angles = work.detections * work.lines / rates.angle_ffts
+    found = {
+        ELSEWHERE: (passed, "spectra kept for the windows"),
+        "scatter": (copied(_ECHO * echoes), "lengths and amplitudes written"),
+        "signal": (
+            max(tones, copied(_SAMPLE * samples)),
+            "two multiply-adds an echo and sample, or samples written",
         ),
-        "range": Floor(
-            max(samples / work.samples / rates.range_ffts, copied(2 * _SAMPLE * samples)),
+        "noise": (max(samples / rates.random_words, passed), "a random word a sample"),
+        "range": (
+            max(samples / work.samples / rates.range_ffts, passed),
             "an FFT a chirp and receiver",
         ),
-        "spectrogram": Floor(
-            work.spectrogram_columns * work.samples / rates.spectrogram_ffts,
-            "an FFT a column and range bin",
-        ),
-        "doppler": Floor(doppler, "an FFT a window, channel and range bin, or spectra read"),
-        "cfar": Floor(copied(5 * work.cells), "power read, mask written"),
-        "cloud": Floor(copied(work.cells), "masks read"),
-        "angle": Floor(
-            work.detections * work.lines / rates.angle_ffts,
-            "an FFT a detection and line, zero-padded to the directions",
-        ),
+        "spectrogram": (columns, "an FFT a column and range bin"),
+        "doppler": (doppler, "an FFT a window, channel and range bin, or spectra read"),
+        "cfar": (copied(5 * work.cells), "power read, mask written"),
+        "cloud": (copied(work.cells), "masks read"),
+        "angle": (angles, "an FFT a detection and line, zero-padded to the directions"),
     }
+    return {name: Floor(*bound) for name, bound in found.items()}

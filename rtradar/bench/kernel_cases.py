@@ -99,24 +99,6 @@ def _spectra(*shape: int) -> Any:
     return parts.view(np.complex64)[..., 0]
 
 
-@kernel_case("spectra.weigh_samples", "window function of 128 chirps, 8 receivers, 256 samples", 0)
-def _weigh_samples() -> tuple[Call, Call]:
-    from rtradar.kernels.spectra import weigh_samples, weigh_samples_reference
-
-    values, weights = _spectra(128, 8, 256), np.linspace(0, 1, 256, dtype=np.float32)
-    call = filled(weigh_samples, values, weights, out=(np.empty_like(values),))
-    return call, lambda: weigh_samples_reference(values, weights)
-
-
-@kernel_case("spectra.subtract_mean", "mean of 133 cycles, 96 channels, 256 bins", 0)
-def _subtract_mean() -> tuple[Call, Call]:
-    from rtradar.kernels.spectra import subtract_mean, subtract_mean_reference
-
-    cycles = _spectra(133, 96 * 256)
-    call = filled(subtract_mean, cycles, out=(np.empty_like(cycles),))
-    return call, lambda: subtract_mean_reference(cycles)
-
-
 @kernel_case("prime_factor_dft.add_doppler_power", "133 cycles, 8 channels, 256 bins", 3e-6)
 def _doppler_power() -> tuple[Call, Call]:
     from rtradar.kernels.prime_factor_dft import (

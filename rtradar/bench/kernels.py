@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.bench.rates import best_s
+from rtradar.bench.floors import best_s
 
 Call = Callable[[], Any]
 """Returns an array, or a tuple of arrays."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS, Radar
@@ -10,18 +11,17 @@ from rtradar.scatter import MODELS
 from rtradar.scatter.echo_models import affordable_models
 
 PARTS = ("models", "growth", "kernels")
-"""Parts that may be measured alone: models with baseline and floors, growth with the size of the
+"""Parts that may be measured alone: models with baseline and bounds, growth with the size of the
 problem, and compiled kernels beside their references."""
 
-RADARS = tuple(PRESETS.built_in)
-FIDELITIES = tuple(affordable_models(12.0))
-"""Radars and models by default: those that take less than minutes for seconds of radar."""
+RADARS, FIDELITIES = tuple(PRESETS.built_in), tuple(affordable_models(12.0))
+"""Radars and models by default: models that take less than minutes for seconds of radar."""
 
 CHEAPEST = "analytic"
-"""The model that all others are compared with."""
+"""Model with which all others are compared."""
 
 SAME_AS_PAPER = "analytic-paper"
-"""The model whose IF is that of the paper's method."""
+"""Model whose IF is that of the paper's method."""
 
 
 @dataclass(frozen=True)
@@ -31,22 +31,24 @@ class Plan:
     Parameters
     ----------
     radars : tuple of str
-        Presets or TOML files, the first for what is measured with one only: first use, one core, growth.
+        Presets or TOML files, the first for what is measured with one only: first use, one core,
+        growth.
     fidelities : tuple of str
-        Models.
+        Names of models.
     repeats : int
         Number of runs of everything except the first use.
     duration_s : float
         Length of the capture [s].
     quick : bool
-        Shorter growth, and a part of a frame of the baseline.
+        Whether growth is shorter, and the baseline a part of a frame.
     parts : tuple of str
         Names from `PARTS` that are measured.
 
     Raises
     ------
     InputError
-        Where a radar or model is unknown or named twice, a number has no meaning, or the capture holds no frame.
+        Where a radar or model is unknown or named twice, a number has no meaning, or the capture
+        holds no frame.
     """
 
     radars: tuple[str, ...] = RADARS
@@ -70,21 +72,20 @@ class Plan:
         for radar in map(Radar.load, self.radars):
             if self.duration_s < radar.frame_duration_s:
                 raise InputError(
-                    f"--duration {self.duration_s:g}: it holds no whole frame of radar '{radar.name}'; give at least "
-                    f"{radar.frame_duration_s:g} s"
+                    f"--duration {self.duration_s:g}: it holds no whole frame of radar "
+                    f"'{radar.name}'; give at least {radar.frame_duration_s:g} s"
                 )
 
     @property
     def growing_fidelity(self) -> str:
-        """The model that growth is measured by: `specular`, or the last named."""
+        """Model whose growth is measured: `specular`, or the last named."""
         return "specular" if "specular" in self.fidelities else self.fidelities[-1]
 
     @property
     def growing_durations_s(self) -> tuple[float, ...]:
-        """Lengths of recording that growth is measured over [s]."""
-        return (
-            (self.duration_s, 2 * self.duration_s) if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
-        )
+        """Lengths of recording over which growth is measured [s]."""
+        few = self.duration_s, 2 * self.duration_s
+        return few if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,7 @@ class Case:
     Parameters
     ----------
     radar, fidelity : str
-        As the command line takes them.
+        Options of the command line.
     duration_s : float
     one_core : bool
         Whether the process may use one core only.
@@ -107,12 +108,8 @@ class Case:
 
 
 def model_cases(plan: Plan, *, one_core: bool) -> list[Case]:
-    """Every model with every radar; with ``one_core`` also the model of the paper's method on one core, with the first radar."""
-    cases = [
-        Case(radar, fidelity, plan.duration_s)
-        for radar in plan.radars
-        for fidelity in plan.fidelities
-    ]
+    """Every model with every radar; with ``one_core`` also the paper's model on one core."""
+    cases = [Case(one, own, plan.duration_s) for one in plan.radars for own in plan.fidelities]
     if one_core and SAME_AS_PAPER in plan.fidelities:
         cases.append(replace(cases[0], fidelity=SAME_AS_PAPER, one_core=True))
     return cases
@@ -127,26 +124,25 @@ def plan_of(
     quick: bool,
     only: str | None,
 ) -> Plan:
-    """The plan that the options of the command line ask for; what is None is left to `Plan`, or with ``quick`` to less.
+    """The plan of the options of the command line; None leaves a value to `Plan` or to ``quick``.
 
     Raises
     ------
     InputError
-        As of `Plan`, or where there is no such part.
+        Where there is no such part, or `Plan` refuses a value.
     """
     if only is not None and only not in PARTS:
         raise InputError(f"--only {only}: there is no such part; allowed: {', '.join(PARTS)}")
-    plan = (
-        Plan(RADARS[:1], FIDELITIES[:3], repeats=1, duration_s=0.5, quick=True) if quick else Plan()
-    )
-    return replace(
-        plan,
-        radars=plan.radars if radar is None else _named(radar),
-        fidelities=plan.fidelities if fidelity is None else _named(fidelity),
-        repeats=plan.repeats if repeats is None else repeats,
-        duration_s=plan.duration_s if duration_s is None else duration_s,
-        parts=PARTS if only is None else (only,),
-    )
+    given: dict[str, Any] = {
+        "radars": None if radar is None else _named(radar),
+        "fidelities": None if fidelity is None else _named(fidelity),
+        "repeats": repeats,
+        "duration_s": duration_s,
+        "parts": None if only is None else (only,),
+    }
+    less = Plan(RADARS[:1], FIDELITIES[:3], repeats=1, duration_s=0.5, quick=True)
+    named = {name: value for name, value in given.items() if value is not None}
+    return replace(less if quick else Plan(), **named)
 
 
 def _named(text: str) -> tuple[str, ...]:

@@ -1,4 +1,7 @@
-"""Whole runs, each in a process of its own, so that peak memory and first use are what a user gets."""
+"""Whole runs and the paper's method, each in a process of its own, and what their seconds say.
+
+In a process of its own, peak memory and first use are what a user gets.
+"""
 
 from __future__ import annotations
 
@@ -8,19 +11,36 @@ import site
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from tqdm import tqdm
 
 from rtradar.bench.plan import Case
-from rtradar.bench.times import to_cloud_s, with_elsewhere
 from rtradar.system.files import temporary_folder
+from rtradar.validate import validation_folder
 
 MOTION = "synthetic:walk"
+
+OTHER_PRODUCTS = ("spectrogram", "angle")
+"""Stages of a run that the range-Doppler-time cloud does not need."""
+
+FILES = ("write", "pictures", "view", "report")
+"""Stages that write files: maps, clouds, pictures, snapshots to view and the page."""
+
+NOT_TO_CLOUD = (*OTHER_PRODUCTS, *FILES)
+
+ELSEWHERE = "elsewhere"
+"""Time of a run outside all of its stages, such as copies into frames; it counts to the cloud."""
+
+IF_STAGE = "echoes and IF"
+"""Stage of the paper's method that compares with our ``scatter`` and ``signal``."""
+
+_QUICK_CYCLES = 12
 
 
 class RunError(RuntimeError):
@@ -28,16 +48,54 @@ class RunError(RuntimeError):
 
 
 @dataclass(frozen=True)
-class Run:
-    """What one process gave.
+class Spread:
+    """Some measurements of one thing.
 
     Parameters
     ----------
-    process_s : float
-        From its start to its end [s].
-    summary : dict
-        As `rtradar.run` writes it.
+    best, median : float
+        Seconds [s].
     """
+
+    best: float
+    median: float
+
+    @classmethod
+    def of(cls, seconds: Sequence[float]) -> Spread:
+        """Best and median of at least one measurement."""
+        return cls(min(seconds), median(seconds))
+
+
+def with_elsewhere(stages: Mapping[str, float], wall_s: float) -> dict[str, float]:
+    """Seconds by stage, and the rest of the whole [s]; not below zero, should stages overlap."""
+    return {**stages, ELSEWHERE: max(wall_s - sum(stages.values()), 0.0)}
+
+
+def to_cloud_s(stages: Mapping[str, float], wall_s: float) -> float:
+    """Time of a run that leads to the range-Doppler-time cloud [s]: all but `NOT_TO_CLOUD`."""
+    return wall_s - sum(stages.get(name, 0.0) for name in NOT_TO_CLOUD)
+
+
+def by_stage(runs: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
+    """Seconds by stage over runs, in order of appearance; a run without a stage spent 0 s there."""
+    names = dict.fromkeys(name for run in runs for name in run)
+    return {name: Spread.of([run.get(name, 0.0) for run in runs]) for name in names}
+
+
+def paired_ratio(seconds: Sequence[float], of: Sequence[float]) -> float:
+    """Median of the ratios of neighbours, so that a slow minute affects both.
+
+    Raises
+    ------
+    ValueError
+        Where they are not pairs.
+    """
+    return median(one / other for one, other in zip(seconds, of, strict=True))
+
+
+@dataclass(frozen=True)
+class Run:
+    """What one process gave: its time from start to end [s], and its summary."""
 
     process_s: float
     summary: dict[str, Any]
@@ -49,17 +107,17 @@ class Run:
 
     @property
     def whole_s(self) -> float:
-        """The run after warm-up [s]."""
+        """Time of the run after warm-up [s]."""
         return float(self.summary["wall_s"])
 
     @property
     def to_cloud_s(self) -> float:
-        """What of it leads to the range-Doppler-time cloud [s]."""
+        """Time that leads to the range-Doppler-time cloud [s]."""
         return to_cloud_s(self.summary["stages"], self.whole_s)
 
     @property
     def from_start_to_cloud_s(self) -> float:
-        """The process but for what does not lead to the cloud: with start, imports, compiling and warm-up [s]."""
+        """Time to the cloud with start, imports, compiling and warm-up [s]."""
         return self.process_s - self.whole_s + self.to_cloud_s
 
     @property
@@ -74,15 +132,7 @@ def can_pin() -> bool:
 
 
 class Runner:
-    """Runs cases in fresh processes, whose compiled code it keeps in a folder of its own, model by model.
-
-    So the first run of a model finds nothing compiled, all later ones everything, and the user's caches are left alone.
-
-    Parameters
-    ----------
-    folder : path
-        For the caches and for what runs write, which is thrown away.
-    """
+    """Runs cases in processes of their own, with caches in a folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -90,7 +140,7 @@ class Runner:
         """First use of each model."""
 
     def measure(self, cases: Sequence[Case], repeats: int, what: str) -> dict[Case, list[Run]]:
-        """Run every case so often, all cases in turn; models that were not used yet are first used, apart.
+        """Run every case some times, all cases in turn, each model once before that.
 
         Raises
         ------
@@ -103,9 +153,8 @@ class Runner:
             if case.fidelity not in self.first and not case.one_core
         }
         runs: dict[Case, list[Run]] = {case: [] for case in cases}
-        with tqdm(
-            total=len(fresh) + repeats * len(cases), desc=what, unit="run", disable=None
-        ) as bar:
+        count = len(fresh) + repeats * len(cases)
+        with tqdm(total=count, desc=what, unit="run", disable=None) as bar:
             for fidelity, case in reversed(fresh.items()):
                 self.first[fidelity] = self.run(case)
                 bar.update()
@@ -118,38 +167,13 @@ class Runner:
     def run(self, case: Case) -> Run:
         """One run of a case."""
         with temporary_folder(inside=self._folder) as out:
-            written = out / "said.json"
-            command = [
-                sys.executable,
-                "-m",
-                "rtradar",
-                "run",
-                MOTION,
-                "--duration",
-                str(case.duration_s),
-                "--radar",
-                case.radar,
-            ]
-            # Its floors are of the CPU.
-            command += [
-                "--fidelity",
-                case.fidelity,
-                "--variant",
-                "cpu",
-                "--out",
-                str(out / "run"),
-                "--json",
-                str(written),
-            ]
+            written = out / "summary.json"
+            words = f"-m rtradar run {MOTION} --duration {case.duration_s} --variant cpu".split()
+            words += ["--radar", case.radar, "--fidelity", case.fidelity]
+            words += ["--out", str(out / "run"), "--json", str(written)]
             with _on_one_core(case.one_core):
                 began = time.perf_counter()
-                done = subprocess.run(
-                    command,
-                    env=self._environment(case.fidelity),
-                    capture_output=True,
-                    text=True,
-                    check=False,
-                )
+                done = _run([sys.executable, *words], self._environment(case.fidelity))
                 process_s = time.perf_counter() - began
             if done.returncode != 0:
                 lines = done.stderr.strip().splitlines() or [f"ended with status {done.returncode}"]
@@ -157,16 +181,22 @@ class Runner:
             return Run(process_s, json.loads(written.read_text(encoding="utf-8")))
 
     def _environment(self, fidelity: str) -> dict[str, str]:
-        """With caches of compiled code, of Numba and of Dr.Jit, and of fonts in a folder of the model."""
+        """Environment with all caches of compiled code and of fonts in a folder of the model."""
         home = self._folder / fidelity
         home.mkdir(exist_ok=True)
-        # Packages that the user installed for himself are found through HOME, unless told otherwise.
+        # Packages of the user are found through HOME, unless their folder is named.
         moved = {"HOME": home, "XDG_CACHE_HOME": home / "cache", "NUMBA_CACHE_DIR": home / "numba"}
         return {
             **os.environ,
             "PYTHONUSERBASE": site.getuserbase(),
             **{name: str(place) for name, place in moved.items()},
         }
+
+
+def _run(
+    command: list[str], environment: dict[str, str] | None = None
+) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
 
 
 @contextmanager
@@ -181,3 +211,63 @@ def _on_one_core(wanted: bool) -> Iterator[None]:
         yield
     finally:
         os.sched_setaffinity(0, allowed)
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Time of the paper's method for one frame.
+
+    Parameters
+    ----------
+    stages : dict of str to Spread
+        Seconds by stage.
+    total : Spread
+        All of it [s].
+    cycles, cycles_per_frame : int
+        TDM cycles that were synthesised, and those of a frame, to which the times are scaled.
+    """
+
+    stages: dict[str, Spread]
+    total: Spread
+    cycles: int
+    cycles_per_frame: int
+
+
+def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | None:
+    """Time the paper's method in plain NumPy, one thread, for some frames.
+
+    Parameters
+    ----------
+    radar : str
+        Preset or TOML file.
+    repeats : int
+        Number of frames.
+    quick : bool
+        Whether a part of each frame is enough.
+
+    Returns
+    -------
+    Baseline or None
+        None where the validation scripts, one of which it is, are not there.
+
+    Raises
+    ------
+    RunError
+        Where the script fails.
+    """
+    script = validation_folder() / "other_methods" / "paper_numpy.py"
+    if not script.is_file():
+        return None
+    with temporary_folder() as folder:
+        written = folder / "frames.json"
+        command = [sys.executable, str(script), "--radar", radar, "--repeats", str(repeats)]
+        command += ["--json", str(written)]
+        command += ["--cycles", str(_QUICK_CYCLES)] if quick else []
+        done = _run(command)
+        if done.returncode != 0:
+            last = (done.stderr.strip().splitlines() or ["failed"])[-1]
+            raise RunError(f"bench: {script.name}: {last}")
+        found = json.loads(written.read_text(encoding="utf-8"))
+    frames = found["frames"]
+    total = Spread.of([sum(frame.values()) for frame in frames])
+    return Baseline(by_stage(frames), total, found["cycles"], found["cycles_per_frame"])

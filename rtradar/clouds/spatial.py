@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.angles.peaks import Peaks, find_peaks
-from rtradar.process.angles.spectra import AngleSpectra
+from rtradar.process.angles import AngleSpectra, Peaks, find_peaks
 from rtradar.radar import Radar
 
 SPATIAL_AXES = ("x", "y", "z")

@@ -26,11 +26,11 @@ _C2, _C4, _C6, _C8, _C10 = (
 def add_noise(streams, rows, sigma, out):
     """Add complex normal numbers to ``out (chirp, rx, sample)``, from 64 random bits each.
 
-    Either part has the deviation ``sigma``. ``streams (cycle, 4)`` are states of the generator SFC64
-    (Doty-Humphrey, PractRand), each for ``rows`` chirps; it gives the same bits as NumPy's. The
-    transform of Box and Muller (1958), sigma sqrt(-2 ln u) at the angle 2 pi t, needs a logarithm
-    and a sine, but no branch. 31 bits make u, the middles of 2^31 equal steps, and 32 bits t; so no
-    number exceeds 6.66 sigma, where a true tail has one sample in 4e9.
+    Either part has the deviation ``sigma``. ``streams (cycle, 4)`` are states of the generator
+    SFC64 (Doty-Humphrey, PractRand), each for ``rows`` chirps; it gives the same bits as NumPy's.
+    The transform of Box and Muller (1958), sigma sqrt(-2 ln u) at the angle 2 pi t, needs a
+    logarithm and a sine, but no branch. 31 bits make u, the middles of 2^31 equal steps, and 32
+    bits t; so no number exceeds 6.66 sigma, where a true tail has one sample in 4e9.
     """
     n_samples = out.shape[2]
     for_radius, for_angle = np.empty(n_samples, dtype=np.int32), np.empty(n_samples, dtype=np.int32)

@@ -25,7 +25,7 @@ from rtradar.kernels.phasor import phasor
 from rtradar.kernels.tone_sum import Tones
 
 _POWERS = 3
-"""Powers of the sample number that one grid takes: all of an amplitude at up to three frequencies."""
+"""Powers of the sample number that one grid takes, for an amplitude at three frequencies."""
 
 _CUBIC = (0.0, -6.0, 0.0, 32.0)
 """Chebyshev's polynomial over the chirp, by which polynomials of more powers are divided: quotient

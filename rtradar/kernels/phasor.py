@@ -11,7 +11,7 @@ from rtradar.kernels.jit import compiled, inlined
 
 @inlined(fastmath={"contract"})
 def phasor(turns):
-    """Cosine and sine of a phase [turns], to 2e-16: Taylor's series of an eighth, without branches."""
+    """Cosine and sine of a phase [turns], to 2e-16: Taylor's series of an eighth, no branches."""
     quarters = np.floor(4 * turns + 0.5)
     angle = (turns - 0.25 * quarters) * (2 * math.pi)
     x = angle * angle

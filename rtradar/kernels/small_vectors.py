@@ -1,4 +1,4 @@
-"""Vectors of three and their matrices inside compiled loops, where NumPy's call a library and take seconds to compile."""
+"""Vectors of three and their matrices in compiled loops, where NumPy's take seconds to compile."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ LANES = 32
 """Samples that are computed side by side."""
 
 MIDDLE = 0.5
-"""Fraction of the sweep about which powers of the sample number are taken: they cancel least there."""
+"""Fraction of the sweep from which powers of the sample number count: they cancel least there."""
 
 _TOGETHER = 6
 """Tones added in one loop, so that sums are read and written a sixth as often."""
@@ -89,7 +89,7 @@ def tone_tables(kind: type[np.floating]) -> ToneTables:
 
 
 def tone_sum_reference(tones, samples, origin):
-    """The sum of `add_tones`, sample by sample; ``origin`` is where powers of the sample count from."""
+    """The sum of `add_tones`, by NumPy; powers of the sample number count from ``origin``."""
     time, fraction = np.arange(samples) / tones.sample_rate, np.arange(samples) / samples - origin
     delay = tones.length[..., None] / SPEED_OF_LIGHT_MPS
     beat = tones.slope * delay
@@ -106,8 +106,8 @@ class _Store(NamedTuple):
     ``start``, ``step (tone,)`` are turns at the first sample and per sample, ``lanes`` the powers
     of each tone, ``middle_re``, ``middle_im (pair * tone,)`` its values in the middle of each pair
     of blocks of lanes, and ``weighted_re``, ``weighted_im`` the same times its amplitude.
-    ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real and
-    imaginary * tone)`` how much more they are at the others, ``now`` coefficients of one power.
+    ``first (real and imaginary * tone,)`` are amplitudes at the first node, ``change (node, real
+    and imaginary * tone)`` how much more they are at the others, ``now`` coefficients of a power.
     ``sum_re``, ``sum_im (sample,)`` are the result.
     """
 
@@ -129,7 +129,7 @@ class _Store(NamedTuple):
 
 @inlined(fastmath={"contract"})
 def _lanes(row, rest, tables, out):
-    """Powers of a tone side by side: those of the next step on the grid, turned by the rest [rad]."""
+    """Powers of a tone side by side: of the next step on the grid, rotated by the rest [rad]."""
     sines, cosines = tables.sines, tables.cosines
     for lane in range(LANES):
         angle = rest * tables.middles[lane]
@@ -142,7 +142,7 @@ def _lanes(row, rest, tables, out):
 
 @inlined(fastmath={"contract"})
 def _together(w, x, i):
-    """Sum of `_TOGETHER` tones: weights times what ``x`` has of each at place ``i`` of its lanes."""
+    """Sum of `_TOGETHER` tones: weights times the values ``x`` of each at place ``i``."""
     first = w[0] * x[i] + w[1] * x[i + _NEXT] + w[2] * x[i + 2 * _NEXT]
     return first + w[3] * x[i + 3 * _NEXT] + w[4] * x[i + 4 * _NEXT] + w[5] * x[i + 5 * _NEXT]
 
@@ -206,7 +206,7 @@ def _weigh(power, powers, store):
 
 @inlined(fastmath={"contract"})
 def _take(tones, chirp, receiver, store, received):
-    """Fill start, step and amplitudes of the tones that are in the band and visible; their count."""
+    """Fill start, step and amplitudes of the visible tones in the band, and count them."""
     length, amplitude = tones.length[chirp, receiver], tones.amplitude[:, chirp, receiver]
     size, count = len(store.start), 0
     for echo in range(len(length)):
@@ -234,7 +234,7 @@ def _take(tones, chirp, receiver, store, received):
 
 @compiled(fastmath={"contract"})
 def add_tones(begin, end, tones, tables, out):
-    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, in the tables' precision."""
+    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, as precise as the tables."""
     receivers, samples = out.shape[1:]
     nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
     # The last pair of blocks may go beyond the last sample, and the last tones that are added

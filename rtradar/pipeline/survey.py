@@ -12,7 +12,7 @@ from rtradar.body import Body
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, MINIMUM_KA, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline.rooms.inside_walls import Inside
-from rtradar.process.angles.spectra import folded_angle_deg
+from rtradar.process.angles import folded_angle_deg
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter import EchoModel

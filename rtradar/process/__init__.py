@@ -1,25 +1,25 @@
 """From IF samples to range-Doppler maps, their detections, directions and spectrograms."""
 
-from rtradar.process.angles.maps import angle_grid, range_azimuth, range_elevation
-from rtradar.process.angles.spectra import AngleSpectra, angle, angle_spectra
-from rtradar.process.angles.steering import measured_angles, measures_angle
-from rtradar.process.cells import cell_spectra
-from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
-from rtradar.process.detection.cfar import ca_cfar, os_cfar
-from rtradar.process.detection.cfar_thresholds import ca_scale, os_scale
-from rtradar.process.detection.clutter_map import ClutterMap, clutter_map_scale
-from rtradar.process.detection.detectors import (
+from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
+from rtradar.process.angles import AngleSpectra, angle, angle_spectra
+from rtradar.process.cfar import (
     DETECTORS,
     Detector,
     build_detector,
+    ca_cfar,
+    os_cfar,
     register_detector,
 )
+from rtradar.process.cfar_thresholds import ca_scale, os_scale
+from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
+from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.frames import SlidingWindows
-from rtradar.process.power_maps import power_map, range_time
-from rtradar.process.sliding_range_time import SlidingRangeTime
-from rtradar.process.spectra import RangeDoppler, range_doppler, range_spectrum
+from rtradar.process.power_maps import power_map
+from rtradar.process.range_time import SlidingRangeTime, range_time
+from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
+from rtradar.process.steering import measured_angles, measures_angle
 from rtradar.process.window_functions import WindowFunctions
 
 __all__ = [

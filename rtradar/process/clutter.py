@@ -1,32 +1,36 @@
-"""Removal of what stands still from range spectra, before Doppler.
+"""Removal of static clutter from range spectra, before Doppler.
 
-A still echo has the same range spectrum in every TDM cycle, each Tx, Rx and range bin by itself; whatever is constant there
-from cycle to cycle is taken out. T is the cycle, f the Doppler frequency:
+A static echo has the same range spectrum in every TDM cycle, each Tx, Rx and range bin by itself;
+what is constant there from cycle to cycle is removed. T is the cycle, f the Doppler frequency:
 
 ``none``
-    Nothing is taken out.
+    Nothing is removed.
 ``mean``
-    The mean over each processing window; in the spectrogram over each of its own windows, in the range-time map over one
-    processing window about each step (`rtradar.process.SlidingRangeTime`). Doppler bins -1, 0 and 1 of a Hann window change,
-    the others keep their values, for a constant has no part in them. A slow echo goes with the clutter: of one of d bins of
-    Doppler the share sinc(d) is taken for standing still. That is all of a person who stands still in that window, and of the
-    highest peak more than half below 0.6 bins (0.06 m/s for the paper's radar at 12 GHz, 0.011 m/s at 77 GHz). A fast echo
-    loses nothing, but leaves up to 1 / (pi d) of its amplitude in the bins about zero, a ghost that no still thing made:
-    -23 dB at 5.5 bins, -34 dB at 20.5.
+    The mean over each frame is removed; in the spectrogram that over each of its own windows, in
+    the range-time map that over one frame about each step (`rtradar.process.SlidingRangeTime`).
+    Doppler bins -1, 0 and 1 of a Hann window change; the others keep their values, for a constant
+    has no part in them. A slow echo is removed with the clutter: of one of d bins of Doppler the
+    fraction sinc(d) counts as static. That is all of a person who does not move in that frame, and
+    more than half of the highest peak below 0.6 bins (0.06 m/s for the paper's radar at 12 GHz,
+    0.011 m/s at 77 GHz). A fast echo loses nothing, but leaves up to 1 / (pi d) of its amplitude in
+    the bins about zero, where nothing static made it: -23 dB at 5.5 bins, -34 dB at 20.5.
 ``exponential``
-    A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is taken from the next. It starts
-    as the first chirp and is the mean of all of them until 1 / a cycles are there: one chirp alone would leave its noise in
-    every range bin at zero Doppler for as long. Gain |2 sin(pi f T)| / |1 - (1 - a) exp(-j 2 pi f T)|: half the power at
-    f = 1 / (2 pi time constant), all of it well above; white noise comes out 2 / (2 - a) as strong. Who stands still fades
-    with the time constant, and leaves a hole that fades likewise, at zero Doppler.
+    A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is
+    subtracted from the next. It starts as the first chirp and is the mean of all of them until
+    1 / a cycles are there: one chirp alone would leave its noise in every range bin at zero Doppler
+    for as long. Gain |2 sin(pi f T)| / |1 - (1 - a) exp(-j 2 pi f T)|: half the power at
+    f = 1 / (2 pi time constant), all of it well above; white noise becomes 2 / (2 - a) as strong. A
+    person who does not move fades with the time constant, and leaves a hole that fades likewise, at
+    zero Doppler.
 ``mti``
-    A canceller of two or three pulses of the same Tx: x[n] - x[n-1], or x[n] - 2 x[n-1] + x[n-2], over sqrt(2) or sqrt(6), so
-    that white noise keeps its mean power. Gain |2 sin(pi f T)| / sqrt(2), or |2 sin(pi f T)|^2 / sqrt(6): blind at zero and
-    at multiples of 1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar at 12 GHz). Noise
-    takes on the same colour. The first one or two cycles come out as zeros.
+    A canceller of two or three pulses of the same Tx: x[n] - x[n-1], or x[n] - 2 x[n-1] + x[n-2],
+    over sqrt(2) or sqrt(6), so that white noise keeps its mean power. Gain
+    |2 sin(pi f T)| / sqrt(2), or |2 sin(pi f T)|^2 / sqrt(6): blind at zero and at multiples of
+    1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar at 12 GHz).
+    Noise takes on the same colour. The first one or two cycles come out as zeros.
 
-``mean`` works window by window, the other two on the stream. All of them are linear, and treat all channels alike, so that
-directions stay.
+``mean`` works frame by frame, the other two on the stream. All of them are linear, and treat all
+channels alike, so that directions stay.
 """
 
 from __future__ import annotations
@@ -37,26 +41,27 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.spectra import subtract_mean
 from rtradar.radar import Radar
+from rtradar.system.threads import in_threads
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
 
 _TIME_CONSTANT_S = 1.0
 _PULSES = 2
 
-_FEW_CELLS = 1024
+_CELLS_AT_ONCE = 2048
+"""Cells of one task of a thread: a short frame of them fits the cache of a core."""
 
 
 class ClutterRemoval:
-    """What `clutter_removal` gives: every block of the stream passes `block`, and every window made of them `window`.
+    """What `clutter_removal` gives: every block of the stream passes `block`, every frame `window`.
 
     This one removes nothing.
 
     Parameters
     ----------
     radar : Radar
-        Gives the schedule and the shape.
+        Radar that gives the schedule and the shape.
 
     Attributes
     ----------
@@ -71,26 +76,28 @@ class ClutterRemoval:
         self._next: int | None = None  # chirp that the next block must begin with
 
     def block(self, spectra: ArrayLike, first_chirp: int) -> NDArray[np.complexfloating]:
-        """Range spectra of the next chirps without what stands still, for a method that works on the stream.
+        """Range spectra of the next chirps without clutter, for a method that works on the stream.
 
         The values do not depend on how the stream is cut into blocks, to the last bit.
 
         Parameters
         ----------
         spectra : (chirp, rx, range) complex
-            From `range_spectrum`: whole TDM cycles, those that follow the last call's. Not written to.
+            Spectra from `range_spectrum`: whole TDM cycles, those that follow the last call's. Not
+            written to.
         first_chirp : int
-            Number of the first of them in the capture.
+            Number of the first chirp in the capture.
 
         Returns
         -------
         (chirp, rx, range) complex64 or complex128
-            As precise as ``spectra``; ``spectra`` themselves where the method works by windows.
+            As precise as ``spectra``; ``spectra`` themselves where the method works by frames.
 
         Raises
         ------
         InputError
-            Where the shape does not fit the radar, the block does not hold whole cycles or does not follow the last one.
+            Where the shape does not fit the radar, the block does not hold whole cycles or does not
+            follow the last one.
         """
         chirps, radar = _complex(spectra, "spectra"), self._radar
         if chirps.ndim != 3 or chirps.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
@@ -100,25 +107,27 @@ class ClutterRemoval:
             )
         if first_chirp % radar.n_tx or len(chirps) % radar.n_tx:
             raise InputError(
-                f"clutter removal: {len(chirps)} chirps from chirp {first_chirp} on are not whole TDM cycles; "
-                f"begin with a multiple of {radar.n_tx}, and take a multiple of it"
+                f"clutter removal: {len(chirps)} chirps from chirp {first_chirp} on are not whole "
+                f"TDM cycles; begin with a multiple of {radar.n_tx}, and take a multiple of it"
             )
         if self._next not in (None, first_chirp):
             raise InputError(
-                f"clutter removal: the block begins with chirp {first_chirp}, the last one ended before {self._next}; "
-                "give the chirps without a gap, or begin anew with another removal"
+                f"clutter removal: the block begins with chirp {first_chirp}, the last one ended "
+                f"before {self._next}; give the chirps without a gap, or begin anew with another "
+                "removal"
             )
         self._next = first_chirp + len(chirps)
         cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])
         return self._stream(cycles).reshape(chirps.shape)
 
     def window(self, cycles: ArrayLike) -> NDArray[np.complexfloating]:
-        """Range spectra of one window without what stands still, for a method that works by windows.
+        """Range spectra of one frame without clutter, for a method that works by frames.
 
         Parameters
         ----------
         cycles : (cycle, ...) complex
-            Such as the ``cube (cycle, tx, rx, range)`` of `SlidingWindows`, made of what `block` gave. Not written to.
+            Frame such as the ``cube (cycle, tx, rx, range)`` of `SlidingWindows`, made of what
+            `block` gave. Not written to.
 
         Returns
         -------
@@ -133,7 +142,8 @@ class ClutterRemoval:
         values = _complex(cycles, "cycles")
         if values.ndim < 1 or len(values) < 1:
             raise InputError(
-                f"clutter removal: cycles have shape {values.shape}; a window needs at least one cycle"
+                f"clutter removal: cycles have shape {values.shape}; a window needs at least one "
+                "cycle"
             )
         return self._window(values)
 
@@ -143,7 +153,7 @@ class ClutterRemoval:
         Parameters
         ----------
         window_cycles : int
-            TDM cycles in each of the windows that are made of the stream.
+            TDM cycles in each of the frames that are made of the stream.
 
         Returns
         -------
@@ -153,7 +163,7 @@ class ClutterRemoval:
         return "none"
 
     def _stream(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        """``cycles (cycle, tx, rx, range)``, the next of the stream."""
+        """The next ``cycles (cycle, tx, rx, range)`` of the stream without clutter."""
         return cycles
 
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
@@ -164,29 +174,32 @@ class _Mean(ClutterRemoval):
     works_by_windows = True
 
     def description(self, window_cycles: int) -> str:
-        return f"mean over {window_cycles} cycles ({window_cycles * self._radar.cycle_duration_s:.3g} s)"
+        seconds = window_cycles * self._radar.cycle_duration_s
+        return f"mean over {window_cycles} cycles ({seconds:.3g} s)"
 
     def _window(self, cycles: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-        if cycles.size <= len(cycles) * _FEW_CELLS:
-            # Such as a window of the spectrogram: threads would be woken for longer than they work.
-            return cycles - cycles.mean(axis=0, dtype=np.complex128).astype(cycles.dtype)
-        out = np.empty(cycles.shape, dtype=cycles.dtype)
-        subtract_mean(
-            np.ascontiguousarray(cycles).reshape(len(cycles), -1), out.reshape(len(cycles), -1)
-        )
-        return out
+        flat = cycles.reshape(len(cycles), -1)
+        out = np.empty(flat.shape, flat.dtype)
+
+        def subtract(first: int) -> None:
+            cells = flat[:, first : first + _CELLS_AT_ONCE]
+            # In double: the mean of equal values is that value, and their difference is zero.
+            mean = cells.mean(axis=0, dtype=np.complex128).astype(cells.dtype)
+            np.subtract(cells, mean, out=out[:, first : first + _CELLS_AT_ONCE])
+
+        in_threads(subtract, range(0, flat.shape[1], _CELLS_AT_ONCE))
+        return out.reshape(cycles.shape)
 
 
 class _Exponential(ClutterRemoval):
     def __init__(self, radar: Radar, time_constant_s: float) -> None:
         super().__init__(radar)
         self._time_constant_s = time_constant_s
-        self._share = -math.expm1(-radar.cycle_duration_s / time_constant_s)
+        self._weight = -math.expm1(-radar.cycle_duration_s / time_constant_s)
         self._count = 0  # cycles in the background
         shape = (radar.n_tx, radar.n_rx, radar.samples_per_chirp)
-        self._background = np.zeros(
-            shape, np.complex128
-        )  # double, for it takes steps of 1e-3 and less
+        # In double, because it takes steps of 1e-3 and less.
+        self._background = np.zeros(shape, np.complex128)
 
     def description(self, window_cycles: int) -> str:
         return f"exponential background, time constant {self._time_constant_s:g} s"
@@ -200,7 +213,7 @@ class _Exponential(ClutterRemoval):
             step = cycle - self._background
             left[...] = step
             parts = step.view(np.float64)
-            parts *= max(self._share, 1 / self._count)
+            parts *= max(self._weight, 1 / self._count)
             self._background += step
         return out
 
@@ -209,12 +222,11 @@ class _Mti(ClutterRemoval):
     def __init__(self, radar: Radar, pulses: int) -> None:
         super().__init__(radar)
         self._order = pulses - 1
-        self._gain = 1 / math.sqrt(
-            math.comb(2 * self._order, self._order)
-        )  # the squares of the weights sum to this number
-        self._held = np.empty(
-            (0, radar.n_tx, radar.n_rx, radar.samples_per_chirp), np.complex64
-        )  # the last cycles, as received
+        # The squares of the weights sum to this binomial coefficient.
+        self._gain = 1 / math.sqrt(math.comb(2 * self._order, self._order))
+        # The last cycles, as received.
+        shape = (0, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
+        self._held = np.empty(shape, np.complex64)
 
     def description(self, window_cycles: int) -> str:
         return f"MTI canceller of {self._order + 1} pulses"
@@ -223,19 +235,19 @@ class _Mti(ClutterRemoval):
         out = np.zeros_like(cycles)
         known = np.concatenate([self._held, cycles])
         self._held = known[-self._order :].copy()  # a view would keep the whole block
-        for _ in range(self._order):
-            known = known[1:] - known[:-1]
-        # From cycle to cycle little changes, so differences of differences lose nothing to rounding.
-        out[len(out) - len(known) :] = known * known.real.dtype.type(self._gain)
+        # Little changes from cycle to cycle, so differences of differences hardly round.
+        differences = np.diff(known, n=self._order, axis=0)
+        out[len(out) - len(differences) :] = differences * known.real.dtype.type(self._gain)
         return out
 
 
 def clutter_removal(
     method: str, radar: Radar, *, time_constant_s: float | None = None, pulses: int | None = None
 ) -> ClutterRemoval:
-    """Remove what stands still from a stream of range spectra and from its windows; memory does not grow with the stream.
+    """Remove static clutter from a stream of range spectra and from its frames.
 
-    Whoever processes a stream calls both steps, whatever the method::
+    :eq:`clutter-gain` of the theory page has the gains of ``exponential`` and ``mti``. Memory does
+    not grow with the stream. A stream passes both steps, whatever the method::
 
         removal = clutter_removal("mean", radar)
         for first_chirp, spectra in blocks:
@@ -245,9 +257,9 @@ def clutter_removal(
     Parameters
     ----------
     method : {"none", "mean", "exponential", "mti"}
-        As told at the head of this module.
+        Method, as the head of this module describes them.
     radar : Radar
-        Gives the schedule and the shape.
+        Radar that gives the schedule and the shape.
     time_constant_s : float, optional
         Time constant of ``exponential`` [s]; 1 s if left out.
     pulses : {2, 3}, optional
@@ -261,12 +273,8 @@ def clutter_removal(
     Raises
     ------
     InputError
-        Where there is no such method, a setting has no meaning or belongs to another method, or ``mean`` has only one cycle
-        to average.
-
-    Notes
-    -----
-    Equation :eq:`clutter-gain` of the theory page has the gains of ``exponential`` and ``mti``.
+        Where there is no such method, a setting has no meaning or belongs to another method, or
+        ``mean`` has only one cycle to average.
     """
     if method not in CLUTTER_REMOVALS:
         raise InputError(
@@ -274,8 +282,9 @@ def clutter_removal(
         )
     if method != "none" and radar.multiplexing == "ddm":
         raise InputError(
-            f"clutter removal '{method}': under multiplexing = 'ddm' what stands still has a Doppler of its own for each Tx, "
-            "which this would leave in; choose 'none', or another multiplexing"
+            f"clutter removal '{method}': under multiplexing = 'ddm' what stands still has a "
+            "Doppler of its own for each Tx, which this would leave in; choose 'none', or another "
+            "multiplexing"
         )
     for name, value, owner in (
         ("time_constant_s", time_constant_s, "exponential"),
@@ -288,15 +297,13 @@ def clutter_removal(
     if method == "mean":
         if radar.cycles_per_frame < 2:
             raise InputError(
-                f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and its mean is all of it; "
-                "lengthen the frame or choose 'exponential' or 'mti'"
+                f"clutter removal 'mean': a frame of radar '{radar.name}' holds one TDM cycle, and "
+                "its mean is all of it; lengthen the frame or choose 'exponential' or 'mti'"
             )
         return _Mean(radar)
     if method == "exponential":
-        return _Exponential(
-            radar,
-            check_time_constant(_TIME_CONSTANT_S if time_constant_s is None else time_constant_s),
-        )
+        given = _TIME_CONSTANT_S if time_constant_s is None else time_constant_s
+        return _Exponential(radar, check_time_constant(given))
     if method == "mti":
         if pulses not in (None, 2, 3):
             raise InputError(f"clutter removal 'mti': pulses = {pulses!r}; allowed: 2, 3")
@@ -306,9 +313,8 @@ def clutter_removal(
 
 def check_time_constant(time_constant_s: float) -> float:
     """The time constant as a float; InputError unless it is positive and finite."""
-    if isinstance(time_constant_s, bool) or not isinstance(
-        time_constant_s, int | float | np.integer | np.floating
-    ):
+    numbers = int | float | np.integer | np.floating
+    if isinstance(time_constant_s, bool) or not isinstance(time_constant_s, numbers):
         raise InputError(f"time_constant_s = {time_constant_s!r}; it must be a number of seconds")
     if not 0 < time_constant_s < math.inf:
         raise InputError(

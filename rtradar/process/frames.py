@@ -1,4 +1,4 @@
-"""Cuts a stream of range spectra into the overlapping processing windows of the radar, in constant memory."""
+"""The overlapping frames of a radar, cut from a stream of range spectra in constant memory."""
 
 from __future__ import annotations
 
@@ -12,21 +12,24 @@ from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.system.threads import in_threads
 
+_Frame = tuple[int, int, NDArray[np.complex64]]
+"""Index, first cycle and cube of a frame."""
+
 _CHIRPS_AT_ONCE = 256
-"""Copied by one thread: 4 MB of 8 receivers and 256 samples."""
+"""Chirps that one task of a thread copies: 4 MB of 8 receivers and 256 samples."""
 
 
 class SlidingWindows:
-    """The processing windows of a stream of chirps, however the stream is cut into blocks.
+    """The frames of a stream of chirps, however the stream is cut into blocks.
 
-    The windows are those of `Radar.window_starts` for as many chirps as were pushed. The buffer holds one and a half
-    windows, whatever the size of the blocks: the half is there so that what is kept moves to its front at most once
-    for every half a window of new chirps.
+    The frames are those of `Radar.window_starts` for as many chirps as were pushed. The buffer
+    holds one and a half frames, whatever the size of the blocks: with the half, what is kept moves
+    to its front at most once for every half a frame of new chirps.
 
     Parameters
     ----------
     radar : Radar
-        Gives the schedule and the shape.
+        Radar that gives the schedule and the shape.
 
     Attributes
     ----------
@@ -36,60 +39,56 @@ class SlidingWindows:
 
     def __init__(self, radar: Radar) -> None:
         self._radar = radar
-        window = radar.chirps_per_frame
-        self._buffer = np.empty(
-            (window + max(2 * radar.n_tx, window // 2), radar.n_rx, radar.samples_per_chirp),
-            np.complex64,
-        )
+        frame = radar.chirps_per_frame
+        chirps = frame + max(2 * radar.n_tx, frame // 2)
+        shape = (chirps, radar.n_rx, radar.samples_per_chirp)
+        self._buffer = np.empty(shape, np.complex64)
         self._first = 0  # chirp at the front of the buffer
         self._held = 0  # chirps in the buffer
-        self._candidate = 0  # windows are counted by multiples of the hop ...
-        self._index = 0  # ... of which those that round to the same cycle are one window
+        self._candidate = 0  # frames are counted by multiples of the hop ...
+        self._index = 0  # ... of which those that round to the same cycle are one frame
         self._last_start = -1
         self._busy = False
         self.n_chirps = 0
 
-    def push(
-        self, spectra: NDArray[np.complexfloating]
-    ) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
-        """Take the next block of chirps and give every window that it completes.
+    def push(self, spectra: NDArray[np.complexfloating]) -> Iterator[_Frame]:
+        """Take the next block of chirps and give every frame that it completes.
 
         Parameters
         ----------
         spectra : (chirp, rx, range) complex
-            Range spectra of the chirps that follow those of the last call, from `rtradar.process.range_spectrum`;
+            Range spectra of the chirps that follow those of the last call, from `range_spectrum`;
             the first chirp of all comes from Tx 0.
 
         Yields
         ------
         window_index : int
-            Counts the windows of the capture from 0.
+            Number of the frame in the capture, from 0.
         start_cycle : int
-            First TDM cycle of the window.
+            First TDM cycle of the frame.
         cube : (cycle, tx, rx, range) complex64
-            A read-only view of the buffer, valid until the next step of the iteration: copy what is to be kept.
+            Read-only view of the buffer, valid until the next step of the iteration.
 
         Raises
         ------
         InputError
             Where the shape does not fit the radar.
         RuntimeError
-            Where the windows of the last call were not all taken: the block is read while they are.
+            Where the frames of the last call were not all taken: the block is read meanwhile.
         """
         block = np.asarray(spectra)
         if block.ndim != 3 or block.shape[1:] != self._buffer.shape[1:]:
             raise InputError(
-                f"SlidingWindows: spectra have shape {block.shape}; radar '{self._radar.name}' needs "
-                f"(chirp, rx, range) = (any, {self._buffer.shape[1]}, {self._buffer.shape[2]})"
+                f"SlidingWindows: spectra have shape {block.shape}; radar '{self._radar.name}' "
+                f"needs (chirp, rx, range) = (any, {self._buffer.shape[1]}, "
+                f"{self._buffer.shape[2]})"
             )
         if self._busy:
             raise RuntimeError("SlidingWindows: take every window of one push before the next push")
         self._busy = True
-        return self._windows(block)
+        return self._frames(block)
 
-    def _windows(
-        self, block: NDArray[np.complexfloating]
-    ) -> Iterator[tuple[int, int, NDArray[np.complex64]]]:
+    def _frames(self, block: NDArray[np.complexfloating]) -> Iterator[_Frame]:
         taken = 0
         while taken < len(block):
             taken += self._take(block[taken:])
@@ -104,24 +103,22 @@ class SlidingWindows:
         self._busy = False
 
     def _take(self, block: NDArray[np.complexfloating]) -> int:
-        """Copy what fits of the block behind what is still needed; how many chirps were dealt with."""
-        wanted = (
-            self._start_of(self._candidate) * self._radar.n_tx
-        )  # no later window needs a chirp before this one
+        """Copy what fits of the block behind what is still needed; how many chirps it took."""
+        # No later frame needs a chirp before this one.
+        wanted = self._start_of(self._candidate) * self._radar.n_tx
         gone = min(max(wanted - self._first, 0), self._held)
         room = len(self._buffer) - self._held
         if self._held == gone:
             self._first, self._held = self._first + gone, 0
-            skip = min(
-                max(wanted - self._first, 0), len(block)
-            )  # a hop longer than the window leaves chirps unused
+            # A hop longer than the frame leaves chirps unused.
+            skip = min(max(wanted - self._first, 0), len(block))
             if skip:
                 self._first += skip
                 self.n_chirps += skip
                 return skip
         elif room == 0:
             kept = self._held - gone
-            # No farther at once than it goes: what overlaps NumPy copies twice, through new memory.
+            # At most as many at once as it moves, for NumPy copies overlapping arrays twice.
             for begin in range(0, kept, gone):
                 end = min(begin + gone, kept)
                 _copy(self._buffer[begin + gone : end + gone], self._buffer[begin:end])
@@ -136,7 +133,7 @@ class SlidingWindows:
         return round(candidate * self._radar.hop_cycles)
 
     def _next_start(self) -> int | None:
-        """First cycle of the next window if its last chirp is there; the rule of `Radar.window_starts`, step by step."""
+        """First cycle of the next frame if its last chirp is there, as in `Radar.window_starts`."""
         last = self.n_chirps // self._radar.n_tx - self._radar.cycles_per_frame
         newest = math.floor((last + 0.5) / self._radar.hop_cycles)
         while self._candidate <= newest and (start := self._start_of(self._candidate)) <= last:

@@ -1,4 +1,18 @@
-"""Range spectra to power: over range and time, and the range-Doppler map that CFAR reads."""
+"""Range spectra to the range-Doppler power that CFAR reads, also under Doppler division.
+
+Doppler division: the sum of all Tx, transformed over slow time, has D bands; an echo at Doppler bin
+d lies in bins d + k P / D for Tx k, P the bins of the whole axis. Adding the power of those n bins
+up for every d gives a map in which the echo has copies whole bands away, (n - 1) / n, (n - 2) / n,
+... as strong. Empty bands tell them apart: of the D places where the block of n filled bands could
+begin, the one with most power in it is taken, and the copies lose what that echo explains; the mean
+of the empty bands replaces it.
+
+Parts of a body interfere, so a Tx may receive next to nothing of an echo in one cell; where the
+block begins is therefore decided for the cells about it together, as far as the main lobes of the
+window functions spread an echo. Of two echoes so near each other in range and, but for a whole
+number of bands, in speed, the weaker is taken for a copy: a person who moves in more than one
+band's width of speeds at one range needs fewer bands or shorter chirps.
+"""
 
 from __future__ import annotations
 
@@ -10,80 +24,14 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
-from rtradar.process.doppler_division import without_copies
 from rtradar.process.spectra import complex_kind
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.threads import in_threads
 
-
-def range_time(
-    spectra: NDArray[np.complexfloating],
-    radar: Radar,
-    *,
-    first_chirp: int = 0,
-    step_s: float = 5e-3,
-) -> tuple[NDArray[np.floating], NDArray[np.float64]]:
-    """Power over slow time and range, averaged over channels and over whole TDM cycles.
-
-    Parameters
-    ----------
-    spectra : (chirp, rx, range) complex
-        From `range_spectrum`; the first chirp comes from Tx 0.
-    radar : Radar
-        Gives the schedule.
-    first_chirp : int
-        Its number in the capture.
-    step_s : float
-        About how long each average is [s]; at least one cycle. The last may be shorter.
-
-    Returns
-    -------
-    power : (slow_time, range) float32 or float64
-        Power of each range bin, in the unit of the squared IF.
-    slow_time : (slow_time,) float64
-        Centre of each average since the start of the capture [s].
-
-    Raises
-    ------
-    InputError
-        Where the shape does not fit the radar.
-    """
-    chirps = np.asarray(spectra)
-    if chirps.ndim != 3 or chirps.shape[1] != radar.n_rx:
-        raise InputError(
-            f"range_time: spectra have shape {chirps.shape}; radar '{radar.name}' needs (chirp, {radar.n_rx}, range)"
-        )
-    together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
-    bounds, times = range_time_steps(len(chirps), radar, first_chirp, step_s)
-    power = in_threads(
-        lambda step: mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds))
-    )
-    return np.array(power, dtype=chirps.real.dtype).reshape(len(power), chirps.shape[2]), times
-
-
-def step_cycles(radar: Radar, step_s: float) -> int:
-    """TDM cycles in one step of `range_time`."""
-    return max(1, round(step_s / radar.cycle_duration_s))
-
-
-def range_time_steps(
-    n_chirps: int, radar: Radar, first_chirp: int, step_s: float
-) -> tuple[list[tuple[int, int]], NDArray[np.float64]]:
-    """First chirp of each step of `range_time` and the one after its last, and centres of the steps (step,) [s]."""
-    rows = step_cycles(radar, step_s) * radar.n_tx
-    begins = np.arange(0, n_chirps, rows)
-    ends = np.minimum(begins + rows, n_chirps)
-    return list(zip(begins.tolist(), ends.tolist(), strict=True)), (
-        first_chirp + (begins + ends) / 2
-    ) * radar.chirp_interval_s
-
-
-def mean_power(values: NDArray[np.complexfloating]) -> NDArray[np.floating]:
-    """Squared magnitude of ``values (..., range)``, averaged over all axes but the last."""
-    # Row by row: no squares of a whole block are kept.
-    parts = np.ascontiguousarray(values).view(values.real.dtype).reshape(-1, 2 * values.shape[-1])
-    return np.asarray(np.einsum("ri,ri->i", parts, parts).reshape(-1, 2).sum(axis=1) / len(parts))
+_CHANCE = 1e-3
+"""Chance that noise alone passes for an echo, whose copies are removed, on the Doppler axis of a
+range bin. Detections in noise are rarer."""
 
 
 def power_map(
@@ -93,26 +41,26 @@ def power_map(
     channel: int | None = None,
     window_functions: WindowFunctions = HANN,
 ) -> NDArray[np.floating]:
-    """Range-Doppler power of one window: the squared magnitudes of all channels summed, or of one channel.
+    """Range-Doppler power of one frame: squared magnitudes summed over channels, or of one channel.
 
     Parameters
     ----------
     spectra : (cycle, tx, rx, range) complex
         Range spectra of whole TDM cycles, from `range_spectrum`.
     radar : Radar
-        Gives the shape.
+        Radar that gives the shape.
     channel : int, optional
-        Only this channel, tx * n_rx + rx; all of them when left out.
+        Index tx * n_rx + rx of the only channel; all channels when left out.
     window_functions : WindowFunctions
-        Window functions of the range spectra and in slow time. Only that in slow time is applied here; under DDM both tell
-        how far an echo spreads over cells.
+        Window functions of the range spectra and in slow time. Only that in slow time is applied
+        here; under DDM both tell how far an echo spreads over cells.
 
     Returns
     -------
     (range, velocity) float32 or float64
-        Power in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian noise a cell follows
-        the Gamma law of as many looks as there are channels in the sum. Under DDM the copies of an echo are removed,
-        except from a single channel.
+        Power in the precision of ``spectra``; velocity as in `RangeDoppler`. With complex Gaussian
+        noise a cell follows the Gamma law of as many looks as there are channels in the sum. Under
+        DDM the copies of an echo are removed, except from a single channel.
 
     Raises
     ------
@@ -127,18 +75,18 @@ def power_map(
         )
     if channel is not None and not 0 <= channel < radar.n_channels:
         raise InputError(
-            f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
+            f"power_map: channel = {channel}; radar '{radar.name}' has channels 0 to "
+            f"{radar.n_channels - 1}"
         )
     n_cycles, _, _, n_range = cube.shape
     scale = weights(window_functions.doppler, n_cycles)
     channels = np.ascontiguousarray(cube).reshape(n_cycles, radar.n_channels, n_range)
     divided = channel is None and radar.multiplexing == "ddm"
-    # Under DDM the rows of all Tx are the same sum; those of the first are not turned.
-    chosen = (
-        range(radar.n_rx if divided else radar.n_channels)
-        if channel is None
-        else range(channel, channel + 1)
-    )
+    if channel is not None:
+        chosen = range(channel, channel + 1)
+    else:
+        # Under DDM the rows of all Tx hold the same sum; those of the first are not rotated.
+        chosen = range(radar.n_rx if divided else radar.n_channels)
     power = _doppler_power(channels, chosen, scale, radar.n_rx)
     if divided:
         power = without_copies(power, radar, radar.n_rx, window_functions)
@@ -148,7 +96,7 @@ def power_map(
 def _doppler_power(
     channels: NDArray[np.complexfloating], chosen: range, window: NDArray[np.float64], together: int
 ) -> NDArray[np.floating]:
-    """Power (doppler, range) of chosen ``channels (cycle, channel, range)``, ``together`` of them in turn in one thread."""
+    """Power (doppler, range) of chosen ``channels (cycle, channel, range)``, some to a thread."""
     n_cycles, _, n_range = channels.shape
     kind = complex_kind(channels)
     real = np.float32 if kind == np.complex64 else np.float64
@@ -175,3 +123,78 @@ def _doppler_power(
     for power in others:
         first += power
     return first
+
+
+def without_copies(
+    band_power: NDArray[np.floating],
+    radar: Radar,
+    receivers: int,
+    window_functions: WindowFunctions = HANN,
+) -> NDArray[np.floating]:
+    """Power of all Tx together, each echo at its own Doppler only.
+
+    Parameters
+    ----------
+    band_power : (doppler, range) float
+        Power of the sum over slow time, in the order of the DFT; of one or more Rx together.
+    radar : Radar
+        Radar with Doppler division.
+    receivers : int
+        Number of Rx whose power is summed.
+    window_functions : WindowFunctions
+        Window functions of the power. Their main lobes tell how far an echo spreads over cells.
+
+    Returns
+    -------
+    (doppler, range) float
+        Power in the same order: of one echo, what all Tx give together.
+
+    Raises
+    ------
+    InputError
+        Where the Doppler axis does not divide into the bands.
+    """
+    bands, n_tx = radar.n_doppler_bands, radar.n_tx
+    if len(band_power) % bands:
+        raise InputError(
+            f"Doppler division of radar '{radar.name}': {len(band_power)} cycles do not divide "
+            f"into {bands} bands; take a multiple of {bands}"
+        )
+    from scipy.ndimage import maximum_filter  # here, because SciPy is slow to import
+    from scipy.special import gammainccinv, gammaincinv
+
+    power = band_power.reshape(bands, -1, band_power.shape[1])
+    filled = _block_sums(power, n_tx)
+    spread = window_functions.main_lobe_bins
+    # The block of bands with most power in and about each cell, and its power in the cell.
+    begin = _block_sums(_about(band_power, spread).reshape(power.shape), n_tx).argmax(axis=0)
+    strongest = np.take_along_axis(filled, begin[None], axis=0)[0]
+    empty = (power.sum(axis=0) - strongest) / (bands - n_tx)
+    usual = np.median(filled, axis=(0, 1))
+    looks = n_tx * receivers
+    place = (np.arange(bands)[:, None, None] - begin) % bands
+    echo = strongest > usual * float(gammainccinv(looks, _CHANCE / bands) / gammaincinv(looks, 0.5))
+    # The skirts of an echo have copies, too, weaker than what passes for an echo by itself.
+    echoes = ((place == 0) & echo).reshape(band_power.shape)
+    size = [2 * bins + 1 for bins in spread]
+    near = maximum_filter(echoes, size=size, mode=("wrap", "nearest")).reshape(power.shape)
+    echo = np.take_along_axis(near, begin[None], axis=0)[0]
+    # Band by band: with what power the echo fills bands of the copy that begins there.
+    copies = _block_sums(np.where(place < n_tx, power - empty, 0), n_tx)
+    # Few looks are left in a copy's place, and their tail must not be detected: no more remains
+    # than what is usual at that range.
+    left = np.where(echo & (place != 0), np.clip(filled - copies, 0, usual), filled)
+    return np.asarray(left.reshape(band_power.shape))
+
+
+def _block_sums(power: NDArray[np.floating], count: int) -> NDArray[np.floating]:
+    """Sum of so many bands from each band on, around the axis (band, ...)."""
+    return sum((np.roll(power, -k, axis=0) for k in range(1, count)), power)
+
+
+def _about(power: NDArray[np.floating], spread: tuple[int, int]) -> NDArray[np.floating]:
+    """Sum over the cells about each one (doppler, range)."""
+    for axis, bins in enumerate(spread):
+        steps = range(-bins, bins + 1)
+        power = sum((np.roll(power, step, axis=axis) for step in steps), np.zeros_like(power))
+    return power

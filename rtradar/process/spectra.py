@@ -1,15 +1,16 @@
-"""IF samples to range spectra and range-Doppler spectra.
+"""IF samples to range spectra and range-Doppler spectra, whole or in chosen cells.
 
-The IF turns with exp(+j 2 pi f tau), so an echo at range R peaks in range bin R / range_bin (paper, eq. 12) and one
-that recedes in a positive Doppler bin (paper, eq. 16). Window functions are periodic Hann windows unless others are named.
-Spectra are divided by the sums of their weights: a tone of amplitude 1 on the middle of a bin reads 1.
+The IF turns with exp(+j 2 pi f tau), so an echo at range R peaks in range bin R / range_bin (paper,
+eq. 12) and one that recedes in a positive Doppler bin (paper, eq. 16). Spectra are divided by the
+sums of their window functions: a tone of amplitude 1 in the middle of a bin reads 1.
 
-Range spectra, which are streamed, keep complex64: their rounding stays some 140 dB below the strongest echo, and a map of 666
-cycles takes 131 MB instead of 262 MB.
+Range spectra, which are streamed, are complex64: their rounding is some 140 dB below the strongest
+echo, and a map of 666 cycles takes 131 MB instead of 262 MB.
 """
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,29 +18,33 @@ import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.kernels.spectra import weigh_samples
+from rtradar.process.steering import range_walk
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
 from rtradar.system.threads import in_threads
 
 _CHIRPS_PER_BATCH = 128
-"""Chirps transformed at once: 8 receivers x 256 samples x 8 bytes make 2 MB, which stays in the cache of a core."""
+"""Chirps of one transform: 8 receivers x 256 samples x 8 bytes make 2 MB, the cache of a core."""
+
+_CACHE_BYTES = 2_500_000
+"""What a thread transforms at once for cells: several channels of a short frame, one of a long."""
 
 
 @dataclass(frozen=True)
 class RangeDoppler:
-    """Range-Doppler spectra of one coherent processing window, every channel apart.
+    """Range-Doppler spectra of one frame, every channel by itself.
 
     Parameters
     ----------
     values : (range, velocity, channel) complex
-        Spectra with coherent gain 1, in the unit of the IF; channel = tx * n_rx + rx. The Tx of one cycle transmit
-        one after the other; the phase that a moving echo gains meanwhile is left in.
+        Spectra with coherent gain 1, in the unit of the IF; channel = tx * n_rx + rx. The phase
+        that a moving echo gains between the Tx of one cycle is left in.
     range_m : (range,) float64
         Range of each range bin [m], half the Tx..Rx path.
     velocity : (velocity,) float64
-        Range rate of each Doppler bin [m/s], positive receding, ascending, zero at index ``n_cycles // 2``.
+        Range rate of each Doppler bin [m/s], positive receding, ascending, zero at index
+        ``n_cycles // 2``.
     """
 
     values: NDArray[np.complexfloating]
@@ -48,19 +53,17 @@ class RangeDoppler:
 
 
 def range_doppler(
-    x: ArrayLike,
-    radar: Radar,
-    *,
-    window_functions: WindowFunctions = HANN,
+    x: ArrayLike, radar: Radar, *, window_functions: WindowFunctions = HANN
 ) -> RangeDoppler:
-    """Windowed range and Doppler spectra of IF samples, every channel apart.
+    """Range and Doppler spectra of IF samples (:eq:`range-doppler`), every channel by itself.
 
     Parameters
     ----------
     x : (chirp, rx, sample) complex
-        IF samples; chirp 0 comes from Tx 0. Whole TDM cycles are used, the chirps after the last are left out.
+        IF samples; chirp 0 comes from Tx 0. Whole TDM cycles are used, the chirps after the last
+        are left out.
     radar : Radar
-        Gives the schedule and the axes.
+        Radar that gives the schedule and the axes.
     window_functions : WindowFunctions
         Window functions in fast time and in slow time.
 
@@ -72,17 +75,15 @@ def range_doppler(
     Raises
     ------
     InputError
-        Where the shape does not fit the radar, not one whole cycle is there, or a sample is not finite.
-
-    Notes
-    -----
-    Equation :eq:`range-doppler` of the theory page.
+        Where the shape does not fit the radar, not one whole cycle is there, or a sample is not
+        finite.
     """
     samples = _checked_if(x, radar)
     n_cycles = samples.shape[0] // radar.n_tx
     if n_cycles < 1:
         raise InputError(
-            f"range_doppler: {samples.shape[0]} chirps hold no whole TDM cycle; give at least {radar.n_tx}, one for each Tx"
+            f"range_doppler: {samples.shape[0]} chirps hold no whole TDM cycle; give at least "
+            f"{radar.n_tx}, one for each Tx"
         )
     if not np.isfinite(samples).all():
         raise InputError("range_doppler: x holds NaN or infinity; every IF sample must be finite")
@@ -104,16 +105,16 @@ def range_spectrum(
     window_functions: WindowFunctions = HANN,
     out: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.complex64]:
-    """Range spectrum of each chirp, the part of the work that overlapping windows share.
+    """Range spectrum of each chirp, the part of the work that overlapping frames share.
 
     Parameters
     ----------
     x : (chirp, rx, sample) complex
         IF samples of any number of chirps.
     radar : Radar
-        Gives the shape.
+        Radar that gives the shape.
     window_functions : WindowFunctions
-        The window function in fast time is taken from it.
+        Window functions, of which that in fast time is applied.
     out : (chirp, rx, range) complex64, optional
         Array to fill, C-contiguous; otherwise a new one is made.
 
@@ -130,13 +131,15 @@ def range_spectrum(
         Where ``out`` is not an array of that shape and type.
     """
     samples = _checked_if(x, radar)
-    scale = weights(window_functions.range, samples.shape[2]).astype(np.float32)
+    scale = weights(window_functions.range, samples.shape[2]).astype(np.float32).repeat(2)
     spectra = array_to_fill("range_spectrum", out, samples.shape, np.complex64)
 
     def transform(first: int) -> None:
         block = spectra[first : first + _CHIRPS_PER_BATCH]
-        weigh_samples(samples[first : first + len(block)], scale, block)
-        # Where it stands, if SciPy can.
+        part = np.ascontiguousarray(samples[first : first + len(block)], dtype=np.complex64)
+        # Real and imaginary parts by themselves: NumPy would make complex numbers of the weights.
+        np.multiply(part.view(np.float32), scale, out=block.view(np.float32))
+        # SciPy transforms in place if it can.
         done = scipy.fft.fft(block, axis=2, overwrite_x=True)
         if not np.shares_memory(done, block):
             block[...] = done
@@ -160,3 +163,94 @@ def _checked_if(x: ArrayLike, radar: Radar) -> NDArray[np.generic]:
 def complex_kind(values: NDArray[np.generic]) -> type[np.complex64] | type[np.complex128]:
     """Complex numbers as precise as the values."""
     return np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128
+
+
+def cell_spectra(
+    spectra: NDArray[np.complexfloating],
+    radar: Radar,
+    range_bins: ArrayLike,
+    velocity_bins: ArrayLike,
+    *,
+    window_functions: WindowFunctions = HANN,
+) -> NDArray[np.complexfloating]:
+    """Complex values of chosen cells in every channel, with those of the range bins beside them.
+
+    An echo from the side reaches the ends of the array sooner and later than the middle, by more
+    than a range bin: some channels have it in the neighbours of its cell. A frame has some hundred
+    detected cells among 30 000 to 170 000, in a few dozen range bins; only these are transformed.
+
+    Parameters
+    ----------
+    spectra : (cycle, tx, rx, range) complex
+        Range spectra of one frame, from `range_spectrum`.
+    radar : Radar
+        Radar that gives the shape.
+    range_bins, velocity_bins : (cell,) int
+        Indices of the cells in the map of `power_map`: velocity ascending, zero at
+        ``n_cycles // 2``.
+    window_functions : WindowFunctions
+        Window functions, of which that in slow time is applied.
+
+    Returns
+    -------
+    (cell, offset, channel) complex
+        What `range_doppler` gives at range bins ``-walk`` to ``+walk`` about each cell, where walk
+        is `range_walk` of the radar: offset ``walk`` is the cell itself; past the end of the range
+        axis it goes on at the other. In the precision of ``spectra``, with coherent gain 1; channel
+        = tx * n_rx + rx. The phase that a moving echo gains between the Tx of one cycle is left in.
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, the cells are no whole numbers within the map, or
+        the radar has no line of channels to measure an angle.
+    """
+    cube = np.asarray(spectra)
+    shape = radar.n_tx, radar.n_rx
+    if cube.ndim != 4 or cube.shape[1:3] != shape or len(cube) < 1 or cube.dtype.kind != "c":
+        raise InputError(
+            f"cell_spectra: spectra have shape {cube.shape}, type {cube.dtype}; radar "
+            f"'{radar.name}' needs complex (cycle, tx, rx, range) = (>= 1, {shape[0]}, {shape[1]}, "
+            "any)"
+        )
+    n_cycles, n_range = cube.shape[0], cube.shape[3]
+    rows = _indices(range_bins, n_range, "range_bins")
+    columns = _indices(velocity_bins, n_cycles, "velocity_bins")
+    if rows.shape != columns.shape:
+        raise InputError(
+            f"cell_spectra: {len(rows)} range_bins and {len(columns)} velocity_bins; give one of "
+            "each for a cell"
+        )
+    walk = range_walk(radar)
+    steps = (rows[:, None] + np.arange(-walk, walk + 1)) % n_range
+    # Index 0 of the map is the DFT bin of the most negative velocity.
+    turns = np.broadcast_to(((columns - n_cycles // 2) % n_cycles)[:, None], steps.shape)
+    values = np.empty((*steps.shape, radar.n_channels), dtype=cube.dtype)
+    scale = weights(window_functions.doppler, n_cycles).astype(cube.real.dtype)[:, None, None]
+    used, place = np.unique(steps, return_inverse=True)
+    place = place.reshape(steps.shape)
+    # Before the used range bins are picked out, NumPy copies all of them.
+    at_once = min(radar.n_rx, max(1, _CACHE_BYTES // (n_cycles * n_range * cube.itemsize)))
+    batches = math.ceil(radar.n_rx / at_once)
+
+    def transform(item: int) -> None:
+        # Channels of one Tx lie side by side in what is filled.
+        tx, rx = item // batches, item % batches * at_once
+        weighted = np.take(cube[:, tx, rx : rx + at_once], used, axis=2)
+        weighted *= scale
+        doppler = scipy.fft.fft(weighted, axis=0, overwrite_x=True)
+        first = tx * radar.n_rx + rx
+        values[:, :, first : first + weighted.shape[1]] = doppler[turns, :, place]
+
+    in_threads(transform, range(radar.n_tx * batches))
+    return values
+
+
+def _indices(bins: ArrayLike, n: int, name: str) -> NDArray[np.int64]:
+    indices = np.asarray(bins)
+    if indices.ndim == 1 and indices.size == 0:
+        return np.zeros(0, dtype=np.int64)
+    whole = indices.ndim == 1 and indices.dtype.kind in "iu"
+    if not whole or indices.min() < 0 or indices.max() >= n:
+        raise InputError(f"cell_spectra: {name} must be whole numbers (cell,) from 0 to {n - 1}")
+    return indices.astype(np.int64)

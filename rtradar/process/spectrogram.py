@@ -1,14 +1,16 @@
-"""Micro-Doppler: short-time Fourier transform of one virtual channel over slow time, power summed over range bins.
+"""Micro-Doppler: short-time Fourier transform of one virtual channel over slow time.
 
-One channel is sampled once a TDM cycle, at the middle of its own chirp, so its slow-time rate is 1 / cycle, and its
-Doppler axis ends where that of the range-Doppler map does. The paper transforms its first channel (section 3.2.3).
+One channel is sampled once a TDM cycle, at the middle of its own chirp, so its slow-time rate is
+1 / cycle, and its Doppler axis ends where that of the range-Doppler map does. The paper transforms
+its first channel (section 3.2.3).
 
-Of each range bin the power is summed, not the signal: neighbouring bins of a Hann-windowed range spectrum turn against each
-other by half a turn, so their signals cancel (over all bins, to nothing), and whoever walks goes through bins. By Parseval's
-theorem the sum does not depend on where in a bin an echo lies.
+The power of all range bins is summed, not their signals: neighbouring bins of a Hann-windowed range
+spectrum differ in phase by half a turn, so their signals cancel (over all bins, to nothing), and a
+person who walks goes through bins. By Parseval's theorem the sum does not depend on where in a bin
+an echo lies.
 
-The transform is written out, on SciPy's FFT, for it has to run column by column on a stream; `scipy.signal.ShortTimeFFT`
-gives the same columns and is what the tests compare with.
+The transform is written out, on SciPy's FFT, for it has to run column by column on a stream;
+`scipy.signal.ShortTimeFFT`, with which the tests compare it, gives the same columns.
 """
 
 from __future__ import annotations
@@ -22,12 +24,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
-from rtradar.process.doppler_division import without_copies
+from rtradar.process.power_maps import without_copies
+from rtradar.process.spectra import complex_kind
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
-WINDOW_CYCLES = 128
-OVERLAP = 0.95
+WINDOW_CYCLES, OVERLAP = 128, 0.95
 """Window and overlap of the paper's spectrograms (section 3.2.3)."""
 
 
@@ -37,11 +39,13 @@ def window_cycles(radar: Radar) -> int:
     Parameters
     ----------
     radar : Radar
+        Radar that gives the schedule.
 
     Returns
     -------
     int
-        As long as the paper's `WINDOW_CYCLES` of TDM; under Doppler division a multiple of the bands.
+        As long as the paper's `WINDOW_CYCLES` of TDM; under Doppler division a multiple of the
+        bands.
     """
     cycles = WINDOW_CYCLES * (radar.n_tx if radar.at_once else 1)
     return max(1, round(cycles / radar.n_doppler_bands)) * radar.n_doppler_bands
@@ -56,9 +60,10 @@ class Spectrogram:
     power : (time, velocity) float32 or float64
         Power of the range bins together, in the unit of the squared IF; coherent gain 1 in a bin.
     time : (time,) float64
-        Where each window has its middle and greatest weight [s since the start of the capture].
+        Middle of each window, where its weight is greatest [s since the start of the capture].
     velocity : (velocity,) float64
-        Range rate [m/s], positive receding, ascending, zero at index ``window // 2``; wavelength of the sweep centre.
+        Range rate [m/s], positive receding, ascending, zero at index ``window // 2``; wavelength of
+        the sweep centre.
     """
 
     power: NDArray[np.floating]
@@ -75,79 +80,82 @@ def spectrogram(
     overlap: float = OVERLAP,
     window_functions: WindowFunctions = HANN,
 ) -> Spectrogram:
-    """Spectrogram of one virtual channel, its power summed over the given range bins.
+    """Spectrogram of one virtual channel (:eq:`spectrogram`), summed over the given range bins.
 
     Parameters
     ----------
     signals : (cycle, range) complex
-        Range spectra of the channel in consecutive TDM cycles: ``spectra[tx :: radar.n_tx, rx]`` of what
-        `rtradar.process.range_spectrum` gives. One range bin, or a gate of them, is a slice of the last axis.
+        Range spectra of the channel in consecutive TDM cycles: ``spectra[tx :: radar.n_tx, rx]`` of
+        what `rtradar.process.range_spectrum` gives. One range bin, or a gate of them, is a slice of
+        the last axis.
     radar : Radar
-        Gives the schedule and the wavelength.
+        Radar that gives the schedule and the wavelength.
     tx : int
         Transmitter of the channel: its chirp is that far into the cycle, which moves the time axis.
     window : int
         Number of cycles in one window.
     overlap : float
-        Least share of a window that it has in common with the next: 0.95 of 128 cycles is a hop of 6.
+        Least fraction of a window that it has in common with the next: 0.95 of 128 cycles is a hop
+        of 6.
     window_functions : WindowFunctions
-        Window functions of the range spectra and in slow time. Only that in slow time is applied here; under DDM both tell
-        how far an echo spreads over cells.
+        Window functions of the range spectra and in slow time. Only that in slow time is applied
+        here; under DDM both tell how far an echo spreads over cells.
 
     Returns
     -------
     Spectrogram
-        Only whole windows. Under Hann windows an echo of constant amplitude a and velocity reads 1.5 a^2 in its velocity bin
-        where all range bins are given: the three bins of a Hann-windowed range spectrum hold 1/4, 1 and 1/4. float32 where ``signals`` are
-        complex64 or float32, else float64.
+        Only whole windows. Under Hann windows an echo of constant amplitude a and velocity reads
+        1.5 a^2 in its velocity bin where all range bins are given: the three bins of a
+        Hann-windowed range spectrum hold 1/4, 1 and 1/4. float32 where ``signals`` are complex64 or
+        float32, else float64.
 
     Raises
     ------
     InputError
-        Where the shape or type is wrong, a value is not finite, there are fewer cycles than one window takes, or ``tx``,
-        ``window`` or ``overlap`` have no meaning.
-
-    Notes
-    -----
-    Equation :eq:`spectrogram` of the theory page.
+        Where the shape or type is wrong, a value is not finite, there are fewer cycles than one
+        window takes, or ``tx``, ``window`` or ``overlap`` have no meaning.
     """
     hop = _hop(radar, tx, window, overlap)
     values = np.asarray(signals)
     if values.ndim != 2 or values.shape[1] < 1 or values.dtype.kind not in "fc":
         raise InputError(
-            f"spectrogram: signals have shape {values.shape}, type {values.dtype}; they must be complex (cycle, range), "
-            "at least 1 in range"
+            f"spectrogram: signals have shape {values.shape}, type {values.dtype}; they must be "
+            "complex (cycle, range), at least 1 in range"
         )
     if len(values) < window:
         raise InputError(
-            f"spectrogram: {len(values)} cycles are fewer than the window of {window}; give a longer capture or a shorter window"
+            f"spectrogram: {len(values)} cycles are fewer than the window of {window}; give a "
+            "longer capture or a shorter window"
         )
     if not np.isfinite(values).all():
         raise InputError("spectrogram: signals hold NaN or infinity; every value must be finite")
-    values = values.astype(
-        np.complex64 if values.dtype in (np.complex64, np.float32) else np.complex128, copy=False
-    )
+    values = values.astype(complex_kind(values), copy=False)
     starts = np.arange(0, len(values) - window + 1, hop)
     power = _columns(values, starts, window, radar, tx, ClutterRemoval(radar), window_functions)
     return Spectrogram(power, _times(starts, radar, tx, window), radar.velocity_mps(window))
 
 
 class SlidingSpectrogram:
-    """`spectrogram` of all range bins of one virtual channel, of a stream of chirps in constant memory.
+    """`spectrogram` of all range bins of one virtual channel of a stream, in constant memory.
 
     The columns are those of `spectrogram`, to the last bit, however the stream is cut into blocks.
 
     Parameters
     ----------
     radar : Radar
-        Gives the schedule and the shape.
+        Radar that gives the schedule and the shape.
     channel : int
-        tx * n_rx + rx.
-    window, overlap, window_functions
-        See `spectrogram`; a window has `window_cycles` cycles if left out.
+        Index of the channel, tx * n_rx + rx.
+    window : int, optional
+        Number of cycles in one window; `window_cycles` if left out.
+    overlap : float
+        Least fraction of a window that it has in common with the next.
     removal : ClutterRemoval, optional
-        The removal whose `ClutterRemoval.block` the spectra have passed; each window of the spectrogram passes its
-        `ClutterRemoval.window`. Who stands still for the length of a window is then removed with the clutter.
+        Removal whose `ClutterRemoval.block` the spectra have passed; each window of the spectrogram
+        passes its `ClutterRemoval.window`. A person who does not move during a window is then
+        removed with the clutter.
+    window_functions : WindowFunctions
+        See `spectrogram`.
 
     Raises
     ------
@@ -168,7 +176,8 @@ class SlidingSpectrogram:
         window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:
             raise InputError(
-                f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to {radar.n_channels - 1}"
+                f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to "
+                f"{radar.n_channels - 1}"
             )
         self._radar, self._window, self._removal = radar, window, removal or ClutterRemoval(radar)
         self._window_functions = window_functions
@@ -176,9 +185,7 @@ class SlidingSpectrogram:
         self._hop = _hop(radar, self._tx, window, overlap)
         self._chirps = 0  # pushed so far
         self._start = 0  # cycle that the next window begins with, and the first of those held
-        self._held = np.empty(
-            (0, radar.samples_per_chirp), np.complex64
-        )  # fewer than window cycles
+        self._held = np.empty((0, radar.samples_per_chirp), np.complex64)  # less than a window
 
     def push(self, spectra: NDArray[np.complexfloating]) -> Spectrogram:
         """Take the next block of chirps and give the columns that it completes.
@@ -186,21 +193,20 @@ class SlidingSpectrogram:
         Parameters
         ----------
         spectra : (chirp, rx, range) complex
-            Range spectra of the chirps that follow those of the last call, from `rtradar.process.range_spectrum`; the first
-            chirp of all comes from Tx 0.
+            Range spectra of the chirps that follow those of the last call, from `range_spectrum`;
+            the first chirp of all comes from Tx 0.
 
         Returns
         -------
         Spectrogram
-            In float32; no row at all where no window is complete yet.
+            Columns in float32; none where no window is complete yet.
 
         Raises
         ------
         InputError
             Where the shape does not fit the radar.
         """
-        block = np.asarray(spectra)
-        radar = self._radar
+        block, radar = np.asarray(spectra), self._radar
         if block.ndim != 3 or block.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
             raise InputError(
                 f"SlidingSpectrogram: spectra have shape {block.shape}; radar '{radar.name}' needs "
@@ -238,7 +244,7 @@ def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
 
 
 def _times(starts: NDArray[np.int64], radar: Radar, tx: int, window: int) -> NDArray[np.float64]:
-    """Middle of the windows that begin with these cycles (time,) [s]: a DFT-even window is even about sample window / 2."""
+    """Middle of the windows from these cycles on (time,) [s]; they are even about window / 2."""
     own = float(radar.tx_delay_s[tx]) + radar.chirp_duration_s / 2
     return np.asarray((starts + window / 2) * radar.cycle_duration_s + own, dtype=np.float64)
 
@@ -252,22 +258,19 @@ def _columns(
     removal: ClutterRemoval,
     window_functions: WindowFunctions,
 ) -> NDArray[np.floating]:
-    """Power (time, velocity) of the windows that begin at these rows of the signals (cycle, range)."""
+    """Power (time, velocity) of windows of signals (cycle, range), which begin at these rows."""
     real = np.float32 if signals.dtype == np.complex64 else np.float64
     scale: NDArray[Any] = weights(window_functions.doppler, window).astype(real)[:, None]
     power = np.empty((len(starts), window), dtype=real)
-    # One window at a time stays in the cache of a core, and a column cannot depend on its neighbours in the stream.
+    # One window at a time stays in the cache of a core, and columns do not depend on each other.
     for row, start in enumerate(starts):
-        spectra = scipy.fft.fft(
-            removal.window(signals[start : start + window]) * scale, axis=0, overwrite_x=True
-        )
-        parts = spectra.view(real)
+        weighted = removal.window(signals[start : start + window]) * scale
+        parts = scipy.fft.fft(weighted, axis=0, overwrite_x=True).view(real)
         squares = np.square(parts, out=parts)
         if radar.multiplexing == "ddm":
-            # Rows of a Tx hold all of them, turned back by its code: by so many bands.
-            received = np.roll(
-                squares[:, ::2] + squares[:, 1::2], tx * window // radar.n_doppler_bands, axis=0
-            )
+            # Rows of a Tx hold all of them, moved back by its code, by so many bands.
+            bands = tx * window // radar.n_doppler_bands
+            received = np.roll(squares[:, ::2] + squares[:, 1::2], bands, axis=0)
             own = without_copies(received, radar, 1, window_functions) / radar.n_tx
             power[row] = own.sum(axis=1)
         else:

@@ -14,23 +14,11 @@ from rtradar.errors import InputError
 WindowName = str | tuple[str, float]
 """Name of a window function, or its name and its parameter."""
 
-NAMES = (
-    "barthann",
-    "bartlett",
-    "blackman",
-    "blackmanharris",
-    "bohman",
-    "boxcar",
-    "cosine",
-    "flattop",
-    "hamming",
-    "hann",
-    "nuttall",
-    "parzen",
-    "taylor",
-    "triang",
-    "tukey",
+_WITHOUT_PARAMETER = (
+    "barthann bartlett blackman blackmanharris bohman boxcar cosine flattop hamming hann nuttall "
+    "parzen taylor triang tukey"
 )
+NAMES = tuple(_WITHOUT_PARAMETER.split())
 """Window functions that take no parameter, as `scipy.signal.get_window` names them."""
 
 PARAMETERS = {"chebwin": (45.0, 300.0), "kaiser": (0.0, 50.0)}

@@ -27,7 +27,7 @@ number, and with amplitudes at several frequencies (`validation/other_methods/if
 ways)."""
 
 _CHIRPS_A_THREAD = 16
-"""Least number of chirps of one task of a thread, for Python takes its time to hand out the next."""
+"""Least number of chirps of one task of a thread, because handing out the next takes time."""
 
 _MOST_POWERS = 3
 """Most powers of the sample number in float32: those beyond a parabola cancel too much."""
@@ -66,7 +66,9 @@ def synthesize(
     dtype: DTypeLike = np.complex128,
     out: NDArray[np.complexfloating] | None = None,
 ) -> NDArray[np.complexfloating]:
-    """IF samples of a block of chirps, without noise (:eq:`if-signal` of the theory page).
+    """IF samples of a block of chirps, without noise.
+
+    Equation :eq:`if-signal` of the theory page, which follows from the sweep, :eq:`chirp`.
 
     Parameters
     ----------
@@ -159,7 +161,7 @@ def _on_own_carriers(echoes: Echoes, radar: Radar) -> Echoes:
 def _powers_of_sample_number(
     frequency: NDArray[np.float64], radar: Radar, origin: float
 ) -> NDArray[np.float64]:
-    """Weights (power, node) of an amplitude's values at the nodes in its polynomial in n / samples less an origin."""
+    """Weights (power, node) of values at nodes in the polynomial in n / samples less an origin."""
     if len(frequency) == 1:
         return np.ones((1, 1))
     nodes = (frequency - radar.start_frequency_hz) / radar.bandwidth_hz - origin

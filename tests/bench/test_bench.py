@@ -13,13 +13,10 @@ import pytest
 import rtradar.bench
 import rtradar.bench.kernel_cases
 from rtradar.antenna import Antenna
-from rtradar.bench import kernels, paper, runs
+from rtradar.bench import arrays, as_toml, kernels, runs, with_echoes
 from rtradar.bench.floors import Rates
-from rtradar.bench.growth import arrays, as_toml, with_echoes
-from rtradar.bench.paper import Baseline
 from rtradar.bench.plan import Case
-from rtradar.bench.runs import Run, RunError, Runner
-from rtradar.bench.times import Spread
+from rtradar.bench.runs import Baseline, Run, RunError, Runner, Spread
 from rtradar.cli import main
 from rtradar.radar import Radar
 
@@ -192,8 +189,8 @@ def test_without_the_validation_scripts_the_table_says_so(
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    monkeypatch.setattr(rtradar.bench, "measure_baseline", paper.measure_baseline)
-    monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
+    monkeypatch.setattr(rtradar.bench, "measure_baseline", runs.measure_baseline)
+    monkeypatch.setattr(runs, "validation_folder", lambda: tmp_path)
     assert main(["bench", "--quick", "--only", "models", "--json", str(tmp_path / "b.json")]) == 0
     assert "the paper's method was not timed: there is no paper_numpy.py" in capsys.readouterr().out
     assert json.loads((tmp_path / "b.json").read_text())["models"][0]["paper_over"] is None
@@ -211,14 +208,14 @@ def test_the_baseline_is_timed_in_a_process_of_its_own(
         "found = {'cycles': 12, 'cycles_per_frame': 133, 'frames': frames}\n"
         "open(sys.argv[sys.argv.index('--json') + 1], 'w').write(json.dumps(found))\n"
     )
-    monkeypatch.setattr(paper, "validation_folder", lambda: tmp_path)
-    found = paper.measure_baseline("paper-77ghz", 2, quick=True)
+    monkeypatch.setattr(runs, "validation_folder", lambda: tmp_path)
+    found = runs.measure_baseline("paper-77ghz", 2, quick=True)
     assert found == Baseline(
         {"echoes and IF": Spread(1.0, 2.0), "cfar": Spread(0.5, 0.5)}, Spread(1.5, 2.5), 12, 133
     )
     (folder / "paper_numpy.py").write_text("raise ArithmeticError('the abacus is broken')")
     with pytest.raises(RunError, match=r"paper_numpy.py: ArithmeticError: the abacus is broken"):
-        paper.measure_baseline("paper-77ghz", 2, quick=True)
+        runs.measure_baseline("paper-77ghz", 2, quick=True)
 
 
 def test_a_run_that_fails_is_one_line_and_status_1(

@@ -11,7 +11,7 @@ import pytest
 
 from rtradar.clouds import SpatialCloud, save_spatial_npz, spatial_points
 from rtradar.errors import InputError
-from rtradar.process.angles.spectra import AngleSpectra
+from rtradar.process.angles import AngleSpectra
 from rtradar.radar import Radar
 
 RADAR = Radar.preset("paper-12ghz")  # at (-4, 1, 1)

@@ -25,7 +25,7 @@ from rtradar.process import (
     range_time,
     spectrogram,
 )
-from rtradar.process.angles.steering import range_walk
+from rtradar.process.steering import range_walk
 from rtradar.process.window_functions import NAMES, WindowName, weights
 from rtradar.radar import Radar
 

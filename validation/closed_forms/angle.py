@@ -22,9 +22,9 @@ from scipy.interpolate import CubicSpline
 
 from rtradar.clouds.spatial import spatial_points
 from rtradar.process import range_spectrum
-from rtradar.process.angles.spectra import AngleSpectra, angle, angle_spectra
-from rtradar.process.angles.steering import Taper
-from rtradar.process.cells import cell_spectra
+from rtradar.process.angles import AngleSpectra, angle, angle_spectra
+from rtradar.process.spectra import cell_spectra
+from rtradar.process.steering import Taper
 from rtradar.radar import Radar
 from rtradar.validate.rows import Row, judged, main, reported
 

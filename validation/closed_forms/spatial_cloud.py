@@ -19,7 +19,7 @@ import numpy as np
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.process.angles import peaks
+from rtradar.process import angles as peaks
 from rtradar.validate.rows import Row, main, reported
 
 FAR_M = 0.3

@@ -28,7 +28,7 @@ import numpy as np
 from trade import seconds
 
 import rtradar as rt
-from rtradar.bench.times import to_cloud_s
+from rtradar.bench.runs import to_cloud_s
 from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.scatter import build_model

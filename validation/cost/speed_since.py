@@ -25,7 +25,7 @@ from statistics import median
 
 from tqdm import tqdm
 
-from rtradar.bench.times import paired_ratio, to_cloud_s
+from rtradar.bench.runs import paired_ratio, to_cloud_s
 
 CASES = {
     "analytic": ("--fidelity", "analytic"),

@@ -1,23 +1,28 @@
-"""Clutter-map CFAR: each cell of a range-Doppler map against its own past, not against its neighbours.
+"""Clutter-map CFAR: each cell of a range-Doppler map against its own past, not its neighbours.
 
-The map of a cell is the mean of its power in past windows, the weight of a window falling with its age by the time constant;
-until there are enough, all weigh the same. Whatever stays in its cell becomes part of the map and is no longer detected: the
-room, but also a person who stands still.
+The map of a cell is the mean of its power in past frames, whose weights fall with their age by the
+time constant; until there are enough, all have the same weight. Whatever stays in its cell becomes
+part of the map and is no longer detected: the room, but also a person who does not move.
 
-The law. In noise the power of one channel in past windows j is the sum of w_j |z_j|^2, the z_j complex Gaussian with the
-correlation C of windows that share chirps. That is the sum of l_j E_j, with independent exponential E_j and l_j the
-eigenvalues of sqrt(w_i) C_ij sqrt(w_j). With L channels ("looks") the cell under test follows the Gamma law of shape L, and
-the map is the sum of l_j G_j, G_j of that same law. For one look the false-alarm rate at the multiplier alpha is the product
-of 1 / (1 + alpha l_j); for l_j = a (1 - a)^j that is the digital exponential filter of R. Nitzberg (Clutter map CFAR analysis,
-IEEE Trans. AES 22(4), 1986). For L looks: a Gamma variable of shape L is the wait for L Poisson events, so the rate is the
-probability of fewer than L events while alpha times the map passes. Those are a sum of negative binomial numbers of success
-probabilities r_j = alpha l_j / (1 + alpha l_j), and the probabilities c_k of k events follow from the power sums of r_j,
-k c_k = L (p_1 c_(k-1) + ... + p_k c_0), p_m = sum r_j^m, without cancellation.
+The law. In noise the power of one channel in past frames j is the sum of w_j |z_j|^2, the z_j
+complex Gaussian with the correlation C of frames that share chirps. That is the sum of l_j E_j,
+with independent exponential E_j and l_j the eigenvalues of sqrt(w_i) C_ij sqrt(w_j). With L
+channels ("looks") the cell under test follows the Gamma law of shape L, and the map is the sum of
+l_j G_j, G_j of that same law. For one look the false-alarm rate at the multiplier alpha is the
+product of 1 / (1 + alpha l_j); for l_j = a (1 - a)^j that is the digital exponential filter of
+R. Nitzberg (Clutter map CFAR analysis, IEEE Trans. AES 22(4), 1986). For L looks: a Gamma variable
+of shape L is the wait for L Poisson events, so the rate is the probability of fewer than L events
+while alpha times the map passes. Those are a sum of negative binomial numbers of success
+probabilities r_j = alpha l_j / (1 + alpha l_j), and the probabilities c_k of k events follow from
+the power sums of r_j, k c_k = L (p_1 c_(k-1) + ... + p_k c_0), p_m = sum r_j^m, without
+cancellation.
 
-Windows that share chirps with the one under test (three of the paper's radars) wait outside the map until they no longer do:
-else an echo would hide behind itself. Windows in the map that share chirps with each other count for fewer than they are, 40
-of the paper's for 21, which C holds. Taken for independent they would let the rate asked at 1e-3 rise to 2.2 times with one
-look and 1.4 times with 96 while the map is young, to 1.25 and 1.1 times later (validation/closed_forms/clutter.py).
+Frames that share chirps with the one under test (three of the paper's radars) wait outside the map
+until they no longer do; otherwise an echo would hide itself. Frames in the map that share chirps
+with each other count for fewer than they are, 40 of the paper's for 21, which C contains. If they
+were taken for independent, the rate asked at 1e-3 would rise to 2.2 times with one look and 1.4
+times with 96 while the map is young, to 1.25 and 1.1 times later
+(validation/closed_forms/clutter.py).
 """
 
 from __future__ import annotations
@@ -31,36 +36,37 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig_banded
 
 from rtradar.errors import InputError
+from rtradar.process.cfar_thresholds import check_looks, check_pfa, multiplier
 from rtradar.process.clutter import check_time_constant
-from rtradar.process.detection.cfar_thresholds import check_looks, check_pfa, multiplier
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
 _FORGOTTEN = 1e-4
-"""Weight of all windows that are left out of the law because of their age."""
+"""Weight of all frames that are left out of the law because of their age."""
 
 _MOST_WINDOWS = 4000
-"""The law looks no further back; the rate of a map of more windows is up to 5 % lower than asked at 1e-6, less above."""
+"""Most frames of the law; with more the rate is up to 5 % lower than asked at 1e-6, less above."""
 
 
 class ClutterMap:
-    """Clutter-map CFAR on the maps of a stream of windows, in constant memory.
+    """Clutter-map CFAR on the maps of a stream of frames, in constant memory.
 
     Parameters
     ----------
     radar : Radar
-        Gives the windows and what they share.
+        Radar that gives the frames and what they share.
     time_constant_s : float
         Time constant of the exponential average [s].
     pfa : float
-        False-alarm rate in white noise, in (0, 1). It holds from the first window on that is tested. Where a cell holds a
-        steady echo as well, its power scatters less and alarms are fewer.
+        False-alarm rate in white noise, in (0, 1). It holds from the first frame that is tested.
+        Where a cell holds a steady echo as well, its power scatters less and alarms are fewer.
     looks : int
         Channels summed in each cell.
     scale : float, optional
         The multiplier itself, instead of those solved for ``pfa``.
     window_functions : WindowFunctions
-        Window functions of the maps; that in slow time tells how windows that share chirps are correlated.
+        Window functions of the maps; that in slow time tells how frames that share chirps are
+        correlated.
 
     Raises
     ------
@@ -87,65 +93,59 @@ class ClutterMap:
         self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
         self._window_functions = window_functions
         hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
-        self._share = -math.expm1(-1 / hops)
-        self._memory = math.ceil(
-            min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS)
-        )  # windows that the law looks at
+        self._weight = -math.expm1(-1 / hops)
+        self._memory = math.ceil(min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS))  # of the law
         self._apart = _windows_apart(radar)
         self._waiting: deque[NDArray[np.floating]] = deque()
         self._map = np.empty((0, 0))
-        self._count = 0  # windows in the map
+        self._count = 0  # frames in the map
         self._solved_for, self._scale = 0, math.inf
 
     def push(self, power: ArrayLike) -> NDArray[np.bool_]:
-        """Test the next window against the map, and let the map go on.
+        """Test the next frame against the map, and update the map.
 
         Parameters
         ----------
         power : (range, velocity) float
-            Power, linear, in any unit, of the window that follows the last call's in the radar's schedule.
+            Power, linear, in any unit, of the frame that follows the last call's.
 
         Returns
         -------
         (range, velocity) bool
-            True where a cell exceeds the multiplier times its map. Nowhere in the first windows, which have no map: the
-            first of all and those that share chirps with it.
+            True where a cell exceeds the multiplier times its map. Nowhere in the first frames,
+            which have no map: the first of all and those that share chirps with it.
 
         Raises
         ------
         InputError
-            Where the map is not two-dimensional, of another shape than the last, or holds NaN, infinity or a negative value.
+            Where the map is not two-dimensional, of another shape than the last, or holds NaN,
+            infinity or a negative value.
         """
         cells = np.asarray(power)
         if cells.ndim != 2 or cells.dtype.kind not in "fiu":
             raise InputError(
-                f"clutter map: power has shape {cells.shape}, type {cells.dtype}; it must be a real (range, velocity) map"
+                f"clutter map: power has shape {cells.shape}, type {cells.dtype}; it must be a "
+                "real (range, velocity) map"
             )
-        known = (
-            self._map.shape
-            if self._count
-            else self._waiting[0].shape
-            if self._waiting
-            else cells.shape
-        )
+        earlier = self._map if self._count else self._waiting[0] if self._waiting else cells
+        known = earlier.shape
         if cells.shape != known:
             raise InputError(
-                f"clutter map: power has shape {cells.shape}, the windows before it {known}; all must be alike"
+                f"clutter map: power has shape {cells.shape}, the windows before it {known}; all "
+                "must be alike"
             )
         if not (cells >= 0).all() or not np.isfinite(cells).all():
             raise InputError(
-                "clutter map: power holds NaN, infinity or a negative value; give linear power, not decibels"
+                "clutter map: power holds NaN, infinity or a negative value; give linear power, "
+                "not decibels"
             )
-        found = (
-            cells > self._multiplier() * self._map
-            if self._count
-            else np.zeros(cells.shape, dtype=np.bool_)
-        )
+        found = np.zeros(cells.shape, dtype=np.bool_)
+        if self._count:
+            found = cells > self._multiplier() * self._map
         self._waiting.append(cells.copy())
         if len(self._waiting) == self._apart:
-            self._learn(
-                self._waiting.popleft()
-            )  # it shares no chirp with the window that comes next
+            # It shares no chirp with the frame that comes next.
+            self._learn(self._waiting.popleft())
         return found
 
     def _learn(self, cells: NDArray[np.floating]) -> None:
@@ -153,17 +153,18 @@ class ClutterMap:
         if self._count == 1:
             self._map = cells.astype(np.float64)
         else:
-            self._map += max(self._share, 1 / self._count) * (cells - self._map)
+            self._map += max(self._weight, 1 / self._count) * (cells - self._map)
 
     def _multiplier(self) -> float:
         if self._given is not None:
             return self._given
         count = min(self._count, self._memory)
-        # The more windows, the less one more matters: solved anew for each of the first 100, then in growing steps. What is
-        # kept meanwhile is the multiplier of fewer windows, and the rate at most 5 % too low at 1e-6, less above.
+        # The more frames, the less one more matters: it is solved anew for each of the first 100,
+        # then in growing steps. Meanwhile that of fewer frames is kept, whose rate is at most 5 %
+        # too low at 1e-6, less above.
         if count >= self._solved_for + max(1.0, self._solved_for**2 / 5000):
             self._scale = _scale_after(
-                count, self._share, self._radar, self._pfa, self._looks, self._window_functions
+                count, self._weight, self._radar, self._pfa, self._looks, self._window_functions
             )
             self._solved_for = count
         return self._scale
@@ -171,6 +172,8 @@ class ClutterMap:
 
 def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     """Multiplier of a detector whose level is a weighted sum of independent cells of noise.
+
+    For one look equation :eq:`clutter-map` of the theory page.
 
     Parameters
     ----------
@@ -190,22 +193,15 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     ------
     InputError
         Where an argument is out of its range.
-
-    Notes
-    -----
-    Equation :eq:`clutter-map` of the theory page, for one look; the head of this module has the law for more.
     """
     check_pfa(pfa)
     check_looks(looks)
     spread = np.asarray(weights)
-    if (
-        spread.ndim != 1
-        or spread.dtype.kind not in "fiu"
-        or not np.isfinite(spread).all()
-        or not (spread >= 0).all()
-    ):
+    real = spread.ndim == 1 and spread.dtype.kind in "fiu"
+    if not real or not (np.isfinite(spread) & (spread >= 0)).all():
         raise InputError(
-            f"clutter map: weights have shape {spread.shape}; they must be finite numbers (window,), at least 0"
+            f"clutter map: weights have shape {spread.shape}; they must be finite numbers "
+            "(window,), at least 0"
         )
     total = float(spread.sum())
     if total <= 0:
@@ -220,11 +216,10 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
 
 
 def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:
-    """Logarithm of the false-alarm rate, as told at the head of this module."""
+    """Logarithm of the false-alarm rate, by the law at the head of this module."""
     r = alpha * spread / (1 + alpha * spread)
-    log_unit = -looks * float(
-        np.log1p(alpha * spread).sum()
-    )  # c_0; the c_k are in units of it, or they would underflow
+    # The c_k are in units of c_0, or they would underflow.
+    log_unit = -looks * float(np.log1p(alpha * spread).sum())
     c, p, powers = np.zeros(looks), np.zeros(looks), np.ones_like(r)
     c[0] = 1.0
     for k in range(1, looks):
@@ -240,17 +235,16 @@ def _log_rate(alpha: float, spread: NDArray[np.float64], looks: int) -> float:
 @lru_cache(maxsize=1024)
 def _scale_after(
     count: int,
-    share: float,
+    weight: float,
     radar: Radar,
     pfa: float,
     looks: int,
     window_functions: WindowFunctions,
 ) -> float:
-    """Multiplier of a map that holds this many windows; the captures of one radar share these."""
-    steps = np.maximum(share, 1 / np.arange(1.0, count + 1))
-    later = np.append(
-        np.cumprod((1 - steps)[:0:-1])[::-1], 1.0
-    )  # what the steps after it leave of each
+    """Multiplier of a map that holds this many frames; the captures of one radar share these."""
+    steps = np.maximum(weight, 1 / np.arange(1.0, count + 1))
+    # What the steps after it leave of each.
+    later = np.append(np.cumprod((1 - steps)[:0:-1])[::-1], 1.0)
     root = np.sqrt(steps * later)
     band = np.zeros((min(_windows_apart(radar), count), count))
     band[0] = root**2
@@ -268,5 +262,5 @@ def _scale_after(
 
 
 def _windows_apart(radar: Radar) -> int:
-    """How many windows on one shares no chirp with this one; the windows of the schedule are rounded to whole cycles."""
+    """Number of frames after which one shares no chirp with this one; both begin with a cycle."""
     return math.ceil(radar.cycles_per_frame / radar.hop_cycles * (1 - 1e-12))

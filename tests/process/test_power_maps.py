@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from rtradar.process.doppler_division import _about, _block_sums
+from rtradar.process.power_maps import _about, _block_sums
 
 
 @pytest.mark.parametrize("count", [1, 3, 5])

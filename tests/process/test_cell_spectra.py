@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.process import range_doppler, range_spectrum
-from rtradar.process.angles.steering import range_walk
-from rtradar.process.cells import cell_spectra
+from rtradar.process.spectra import cell_spectra
+from rtradar.process.steering import range_walk
 from rtradar.radar import Radar
 
 LOW = Radar.preset("paper-12ghz")

@@ -1,15 +1,18 @@
-"""Multipliers of CFAR detectors: how far above its neighbours a cell must stand for an asked false-alarm rate.
+"""Multipliers of CFAR detectors: by how much a detected cell exceeds its neighbours.
 
-The power of one channel of complex Gaussian noise is exponential; the sum over L channels ("looks") follows the Gamma
-law of shape L. With the training cells independent of the cell under test and of each other, all of one law:
+The power of one channel of complex Gaussian noise is exponential; the sum over L channels ("looks")
+follows the Gamma law of shape L. The training cells follow the same law, independent of the cell
+under test and of each other. Then:
 
-- cell averaging: the ratio to the mean of N training cells follows the F law with 2L and 2NL degrees of freedom;
-- order statistic: the k-th smallest of N training cells stands at the quantile U of the Gamma law, U ~ Beta(k, N-k+1), so
-  Pfa(alpha) = E[Q(L, alpha z)], z = P^-1(L, U), Q and P the regularised incomplete Gamma functions. For one look this is
-  Rohling's product of (N - i) / (N - i + alpha), i = 0 .. k-1 (H. Rohling, IEEE Trans. AES 19(4), 1983, eq. 22).
+- cell averaging: the ratio to the mean of N training cells follows the F law with 2L and 2NL
+  degrees of freedom;
+- order statistic: the k-th smallest of N training cells is at the quantile U of the Gamma law,
+  U ~ Beta(k, N-k+1), so Pfa(alpha) = E[Q(L, alpha z)], z = P^-1(L, U), Q and P the regularised
+  incomplete Gamma functions. For one look this is Rohling's product of (N - i) / (N - i + alpha),
+  i = 0 .. k-1 (H. Rohling, IEEE Trans. AES 19(4), 1983, eq. 22).
 
-In windowed maps neighbouring cells are correlated: the training cells count for fewer, and the rate comes out higher than
-asked; validation/closed_forms/cfar.py measures by how much.
+In windowed maps neighbouring cells are correlated: the training cells count for fewer, and the rate
+is higher than asked; validation/closed_forms/cfar.py measures by how much.
 """
 
 from __future__ import annotations
@@ -29,15 +32,15 @@ _DEPTH = 46.0
 """The integrand is followed down to exp(-46) = 1e-20 of its peak."""
 
 _NODES = 160
-"""Nodes of the trapezoidal rule on the smooth, bell-shaped integrand; 160 leave less than 1e-9 of the integral."""
-
+"""Nodes of the trapezoidal rule on the bell-shaped integrand: an error of 1e-9 of the integral."""
 
 _TINY = 1e-290
-"""Below this the incomplete Gamma functions lose digits; far outside the peak a leading term will do."""
+"""Below this the incomplete Gamma functions lose digits; far outside the peak a leading term
+suffices."""
 
 
 def order_rank(n_train: int, quantile: float) -> int:
-    """Rank ``k = ceil(quantile * n_train)`` of the order statistic, counted from the smallest, at least 1.
+    """Rank ``k = ceil(quantile * n_train)`` of the order statistic from the smallest, at least 1.
 
     A product that exceeds a whole number only by rounding (0.1 * 30) counts as that number.
     """
@@ -45,7 +48,7 @@ def order_rank(n_train: int, quantile: float) -> int:
 
 
 def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float:
-    """Multiplier of the order-statistic detector.
+    """Multiplier of the order-statistic detector (:eq:`os-cfar`, :eq:`os-cfar-looks`).
 
     Parameters
     ----------
@@ -61,16 +64,13 @@ def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float
     Returns
     -------
     float
-        alpha such that a cell above alpha times the order statistic is a false alarm with probability ``pfa``.
+        alpha such that a cell above alpha times the order statistic is a false alarm with
+        probability ``pfa``.
 
     Raises
     ------
     InputError
         Where an argument is out of its range.
-
-    Notes
-    -----
-    Equations :eq:`os-cfar`, for one look, and :eq:`os-cfar-looks` of the theory page.
     """
     _check_law(n_train, pfa, looks)
     check_quantile(quantile)
@@ -78,7 +78,7 @@ def os_scale(n_train: int, quantile: float, pfa: float, looks: int = 1) -> float
 
 
 def ca_scale(n_train: int, pfa: float, looks: int = 1) -> float:
-    """Multiplier of the cell-averaging detector, on the mean of the training cells.
+    """Multiplier of the cell-averaging detector, on the mean of its training cells (:eq:`ca-cfar`).
 
     Parameters
     ----------
@@ -92,20 +92,17 @@ def ca_scale(n_train: int, pfa: float, looks: int = 1) -> float:
     Returns
     -------
     float
-        alpha such that a cell above alpha times the mean is a false alarm with probability ``pfa``; for one look
-        N (pfa^(-1/N) - 1).
+        alpha such that a cell above alpha times the mean is a false alarm with probability ``pfa``;
+        for one look N (pfa^(-1/N) - 1).
 
     Raises
     ------
     InputError
         Where an argument is out of its range.
-
-    Notes
-    -----
-    Equation :eq:`ca-cfar` of the theory page.
     """
     _check_law(n_train, pfa, looks)
-    # F.isf(pfa, 2L, 2NL) = N (1 - y) / y with y the pfa-quantile of Beta(NL, L); 1 - y by itself, without cancellation.
+    # F.isf(pfa, 2L, 2NL) = N (1 - y) / y with y the pfa-quantile of Beta(NL, L); 1 - y by itself,
+    # without cancellation.
     remainder = betainccinv(looks, n_train * looks, pfa)
     return float(n_train * remainder / betaincinv(n_train * looks, looks, pfa))
 
@@ -150,7 +147,7 @@ def _os_scale(n_train: int, rank: int, pfa: float, looks: int) -> float:
 
 
 def multiplier(excess: Callable[[float], float], *, xtol: float, rtol: float) -> float:
-    """The multiplier at whose logarithm a falling function passes 0; tolerances of that logarithm, as of `brentq`."""
+    """The multiplier at whose logarithm, to these tolerances, a falling function passes 0."""
     low, high = -1.0, 1.0
     while excess(low) < 0:
         low -= 2.0
@@ -160,19 +157,16 @@ def multiplier(excess: Callable[[float], float], *, xtol: float, rtol: float) ->
 
 
 def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
-    """Logarithm of the false-alarm rate: the expectation over the order statistic z, integrated over t = log z.
+    """Logarithm of the false-alarm rate: the mean over the order statistic z, over t = log z.
 
-    The integrand has one peak and falls at least exponentially on both sides, so the trapezoidal rule between the points
-    where it has died away converges faster than any power of the step.
+    The integrand has one peak and falls at least exponentially on both sides, so the trapezoidal
+    rule between the points where it has vanished converges faster than any power of the step.
     """
 
     def log_integrand(t: NDArray[np.float64]) -> NDArray[np.float64]:
         z = np.exp(t)
-        below, above, alarm = (
-            _log_lower(looks, z),
-            _log_upper(looks, z),
-            _log_upper(looks, alpha * z),
-        )
+        below, above = _log_lower(looks, z), _log_upper(looks, z)
+        alarm = _log_upper(looks, alpha * z)
         return constant + looks * t - z + (rank - 1) * below + (n_train - rank) * above + alarm
 
     constant = float(
@@ -185,18 +179,18 @@ def _log_os_pfa(alpha: float, n_train: int, rank: int, looks: int) -> float:
 
 
 def _log_lower(looks: int, z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Logarithm of the regularised lower incomplete Gamma function; its leading term where that underflows."""
-    value = gammainc(looks, z)
-    small = value < _TINY
-    leading = looks * np.log(z) - z - gammaln(looks + 1)
-    return np.where(small, leading, np.log(np.where(small, 1.0, value)))
+    """Logarithm of the regularised lower incomplete Gamma function."""
+    return _log_or(gammainc(looks, z), looks * np.log(z) - z - gammaln(looks + 1))
 
 
 def _log_upper(looks: int, z: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Logarithm of the regularised upper incomplete Gamma function; its leading term where that underflows."""
-    value = gammaincc(looks, z)
+    """Logarithm of the regularised upper incomplete Gamma function."""
+    return _log_or(gammaincc(looks, z), (looks - 1) * np.log(z) - z - gammaln(looks))
+
+
+def _log_or(value: NDArray[np.float64], leading: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Logarithm of a value, or its ``leading`` term where the value underflows."""
     small = value < _TINY
-    leading = (looks - 1) * np.log(z) - z - gammaln(looks)
     return np.where(small, leading, np.log(np.where(small, 1.0, value)))
 
 

@@ -1,7 +1,8 @@
-"""CFAR detectors on a range-Doppler power map: order statistic and cell averaging, in two dimensions.
+"""CFAR detectors on a range-Doppler power map: order statistic and cell averaging; their registry.
 
-The training cells of a cell are the square ring of half-width ``guard + train`` without the square of half-width ``guard``
-around it. At the edges of the map only those that exist count, with the rank and the multiplier of their number.
+The training cells of a cell are the square ring of half-width ``guard + train`` without the square
+of half-width ``guard`` around it. At the edges of the map only those that exist count, with the
+rank and the multiplier of their number.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.kernels.cfar import ca_cfar_rows, os_cfar_rows
-from rtradar.process.detection.cfar_thresholds import (
+from rtradar.process.cfar_thresholds import (
     ca_scale,
     check_looks,
     check_pfa,
@@ -22,9 +23,60 @@ from rtradar.process.detection.cfar_thresholds import (
     order_rank,
     os_scale,
 )
+from rtradar.system.registry import Registry
 from rtradar.system.threads import in_threads
 
 _ROWS_A_THREAD = 64
+
+Detector = Callable[[NDArray[np.floating]], NDArray[np.bool_]]
+"""Power (range, velocity) in, mask of the same shape out."""
+
+DETECTORS = Registry(
+    "rtradar.detectors",
+    "detector",
+    {"os-cfar": "rtradar.process.cfar:os_cfar", "ca-cfar": "rtradar.process.cfar:ca_cfar"},
+)
+"""Functions of power (range, velocity), ``pfa`` and ``looks``, the channels summed in the power."""
+
+register_detector = DETECTORS.register
+
+
+def build_detector(name: str, *, pfa: float, looks: int) -> Detector:
+    """Detector of a name, for a false-alarm rate and a number of looks.
+
+    Parameters
+    ----------
+    name : str
+        Name in `DETECTORS`.
+    pfa : float
+        Asked false-alarm rate of each cell.
+    looks : int
+        Channels summed in the power.
+
+    Returns
+    -------
+    callable
+        From power (range, velocity) to a bool mask of the same shape.
+
+    Raises
+    ------
+    InputError
+        Where there is no such detector.
+    ExtensionError
+        Where it comes from another package, and fails; also when it is called.
+    """
+    find = DETECTORS.find(name)
+
+    def detect(power: NDArray[np.floating]) -> NDArray[np.bool_]:
+        with DETECTORS.guarded(name):
+            mask = np.asarray(find(power, pfa=pfa, looks=looks))
+        if mask.dtype != np.bool_ or mask.shape != power.shape:
+            raise DETECTORS.refuse(
+                name, f"gave {mask.dtype} of shape {mask.shape}, not bool of shape {power.shape}"
+            )
+        return mask
+
+    return detect
 
 
 def os_cfar(
@@ -38,8 +90,8 @@ def os_cfar(
 ) -> NDArray[np.bool_]:
     """Order-statistic CFAR (Rohling, 1983).
 
-    A cell is detected where it exceeds the multiplier times the k-th smallest of its N training cells,
-    k = ceil(quantile N).
+    A cell is detected where it exceeds the multiplier times the k-th smallest of its N training
+    cells, k = ceil(quantile N).
 
     Parameters
     ----------
@@ -64,15 +116,14 @@ def os_cfar(
     Raises
     ------
     InputError
-        Where the map is not two-dimensional, holds NaN, infinity or a negative value, or has a cell without training
-        cells, or where another argument is out of its range.
+        Where the map is not two-dimensional, holds NaN, infinity or a negative value, or has a cell
+        without training cells, or where another argument is out of its range.
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     check_quantile(quantile)
     scales, ranks = _os_law(cells.shape, guard, train, quantile, pfa, looks, scale)
-    return _by_rows(
-        os_cfar_rows, cells, cells / scales.astype(cells.dtype), ranks, counts, guard, guard + train
-    )
+    thresholds = cells / scales.astype(cells.dtype)
+    return _by_rows(os_cfar_rows, cells, thresholds, ranks, counts, guard, guard + train)
 
 
 def ca_cfar(
@@ -83,12 +134,20 @@ def ca_cfar(
     looks: int = 1,
     scale: float | None = None,
 ) -> NDArray[np.bool_]:
-    """Cell-averaging CFAR: a cell is detected where it exceeds the multiplier times the mean of its training cells.
+    """Cell-averaging CFAR: a cell is detected where it exceeds a multiple of the mean of its ring.
 
     Parameters
     ----------
-    power, guard, train, pfa, looks, scale
-        As in `os_cfar`; `ca_scale` turns ``pfa`` into the multiplier.
+    power : (range, velocity) float
+        Power, linear, in any unit: only ratios count. Not decibels, not magnitudes.
+    guard, train : int
+        Width of the guard and of the training band [cells].
+    pfa : float
+        False-alarm rate for independent cells, in (0, 1); `ca_scale` turns it into the multiplier.
+    looks : int
+        Channels summed in ``power``.
+    scale : float, optional
+        The multiplier itself, instead of the one solved for ``pfa``.
 
     Returns
     -------
@@ -98,16 +157,15 @@ def ca_cfar(
     Raises
     ------
     InputError
-        As in `os_cfar`.
+        Where `os_cfar` raises it.
     """
     cells, counts = _checked(power, guard, train, pfa, looks, scale)
     scales = _ca_law(cells.shape, guard, train, pfa, looks, scale)
-    return _by_rows(
-        ca_cfar_rows, cells, cells * (counts / scales).astype(cells.dtype), guard, guard + train
-    )
+    sums_wanted = cells * (counts / scales).astype(cells.dtype)
+    return _by_rows(ca_cfar_rows, cells, sums_wanted, guard, guard + train)
 
 
-# What depends on the shape of the map alone is the same for all maps of a capture, and takes as long as the map itself.
+# What depends on the shape alone is the same for all maps of a capture, and as slow as a map.
 _remembered = lru_cache(maxsize=4)
 
 
@@ -123,10 +181,10 @@ def _os_law(
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Multiplier and rank of each cell (range, velocity)."""
     counts = _training_counts(*shape, guard, guard + train)
-    scales = _by_count(
-        counts, lambda n: os_scale(n, quantile, pfa, looks) if scale is None else scale
-    )
-    return scales, _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
+    ranks = _by_count(counts, lambda n: order_rank(n, quantile)).astype(np.int32)
+    if scale is not None:
+        return np.full(shape, scale), ranks
+    return _by_count(counts, lambda n: os_scale(n, quantile, pfa, looks)), ranks
 
 
 @_remembered
@@ -147,7 +205,8 @@ def _checked(
     cells = np.asarray(power)
     if cells.ndim != 2 or cells.dtype.kind not in "fiu":
         raise InputError(
-            f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real (range, velocity) map"
+            f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real "
+            "(range, velocity) map"
         )
     for name, value, least in (("guard", guard, 0), ("train", train, 1)):
         if isinstance(value, bool) or value != int(value) or value < least:
@@ -168,24 +227,27 @@ def _checked(
     counts = _training_counts(cells.shape[0], cells.shape[1], guard, guard + train)
     if counts.size and counts.min() == 0:
         raise InputError(
-            f"CFAR: in a map of {cells.shape[0]} x {cells.shape[1]} a cell has no training cells with guard = {guard}; "
-            f"each axis, or one of them, needs more than {2 * guard + 1} cells"
+            f"CFAR: in a map of {cells.shape[0]} x {cells.shape[1]} a cell has no training cells "
+            f"with guard = {guard}; each axis, or one of them, needs more than {2 * guard + 1} "
+            "cells"
         )
     return cells, counts
 
 
 @_remembered
-def _training_counts(n_range: int, n_velocity: int, guard: int, reach: int) -> NDArray[np.int32]:
+def _training_counts(n_range: int, n_velocity: int, guard: int, outer: int) -> NDArray[np.int32]:
     def overlap(n: int, half: int) -> NDArray[np.int32]:
         i = np.arange(n)
         return (np.minimum(i + half, n - 1) - np.maximum(i - half, 0) + 1).astype(np.int32)
 
-    outer = overlap(n_range, reach)[:, None] * overlap(n_velocity, reach)
-    return outer - overlap(n_range, guard)[:, None] * overlap(n_velocity, guard)
+    all_of_it, inner = (
+        overlap(n_range, half)[:, None] * overlap(n_velocity, half) for half in (outer, guard)
+    )
+    return all_of_it - inner
 
 
 def _by_count(counts: NDArray[np.int32], of_count: Callable[[int], float]) -> NDArray[np.float64]:
-    """A function of the number of training cells, worked out once for each number that occurs, (range, velocity)."""
+    """A function of the number of training cells (range, velocity), once for each that occurs."""
     table = np.zeros(int(counts.max(initial=0)) + 1)
     for n in np.unique(counts):
         table[n] = of_count(int(n))

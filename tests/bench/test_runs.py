@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench.times import (
+from rtradar.bench.runs import (
     ELSEWHERE,
     Spread,
     by_stage,

@@ -1,9 +1,10 @@
-"""The two virtual lines of the cross, and the phases by which a direction is told on them.
+"""The two virtual lines of the cross, and the phases by which they measure a direction.
 
-An echo that reaches Rx j from Tx i over L_ij metres stands in its range bin with the phase 2 pi f L_ij / c, f the middle of
-the sweep. Tx and Rx of the y-line lie at (0, t, 0) and (0, q, 0) about the radar, so the way to a point P at range r is
-|P|^2 - 2 t P_y + t^2 under the root: it depends on the sine u = P_y / r alone and tells nothing of the elevation. The z-line
-tells w = P_z / r alike. Both sines are exact at any range, near field included.
+An echo that reaches Rx j from Tx i over L_ij metres lies in its range bin with the phase
+2 pi f L_ij / c, f the middle of the sweep. Tx and Rx of the y-line are at (0, t, 0) and (0, q, 0)
+about the radar, so the path to a point P at range r contains the square root of
+|P|^2 - 2 t P_y + t^2: it depends on the sine u = P_y / r alone and not on the elevation. The z-line
+measures w = P_z / r alike. Both sines are exact at any range, near field included.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ Taper = Literal["uniform", "taylor"]
 """Weights of the elements of a line."""
 
 SIDE_LOBE_DB = 25.0
-"""Side lobes of the Taylor taper below the main lobe, in the far field."""
+"""Side lobes of the Taylor taper below the main lobe, in the far field [dB]."""
 
 _OVERSAMPLING = 4  # sines for each resolution cell of the longest line
 _MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.5 million
@@ -42,7 +43,7 @@ class Line:
     channels : (element,) int64
         Channel of each element, tx * n_rx + rx.
     tx_m, rx_m : (element,) float64
-        Place of its Tx and of its Rx along the line, about the radar [m].
+        Positions of its Tx and of its Rx along the line, about the radar [m].
     """
 
     axis: int
@@ -51,18 +52,14 @@ class Line:
     rx_m: NDArray[np.float64]
 
     def excess_m(self, sines: ArrayLike, range_m: float | None) -> NDArray[np.float64]:
-        """Path over each element less twice the range, (..., element) [m].
+        """Path over each element less twice the range, :eq:`near-field` (..., element) [m].
 
         Parameters
         ----------
         sines : (...) float
             Sine of the direction along the line.
         range_m : float or None
-            Range of the point; None for a plane wave.
-
-        Notes
-        -----
-        Equation :eq:`near-field` of the theory page.
+            Range of the point [m]; None for a plane wave.
         """
         u = np.asarray(sines, dtype=np.float64)[..., None]
         if range_m is None:
@@ -78,7 +75,8 @@ class Line:
 def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     """The y-line and the z-line; None where a line has fewer than two elements.
 
-    Channels of a Tx on one line and an Rx on the other, which ``channels = "all"`` has, belong to neither.
+    Channels of a Tx on one line and an Rx on the other, which ``channels = "all"`` has, belong to
+    neither.
 
     Raises
     ------
@@ -88,7 +86,8 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     lines = _line(radar, 1), _line(radar, 2)
     if not measures_angle(radar):
         raise InputError(
-            f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx (or 2 Tx and an Rx) along y or z"
+            f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx "
+            "(or 2 Tx and an Rx) along y or z"
         )
     return lines
 
@@ -99,6 +98,7 @@ def measures_angle(radar: Radar) -> bool:
     Parameters
     ----------
     radar : Radar
+        Radar whose array counts.
 
     Returns
     -------
@@ -108,13 +108,14 @@ def measures_angle(radar: Radar) -> bool:
 
 
 def measured_angles(radar: Radar) -> tuple[str, ...]:
-    """Which of ``azimuth`` and ``elevation`` the radar measures: two channels on a line tell the angle along it.
+    """Which of ``azimuth`` and ``elevation`` the radar measures, by two channels on a line.
 
     Without a line along z, azimuth is the cone angle asin(y / r).
 
     Parameters
     ----------
     radar : Radar
+        Radar whose array counts.
 
     Returns
     -------
@@ -140,25 +141,22 @@ def _line(radar: Radar, axis: int) -> Line | None:
 
 @lru_cache(maxsize=16)
 def sine_grid(radar: Radar) -> NDArray[np.float64]:
-    """Uniform grid of sines (sine,) within the unambiguous angle, fine enough for a parabola through three of them.
+    """Uniform sines (sine,) within the unambiguous angle, fine enough for a parabola through three.
 
     Raises
     ------
     InputError
-        Where the radar has no line at all, or one so long that there would be no end of sines.
+        Where the radar has no line at all, or one so long that there would be too many sines.
     """
     largest = np.sin(np.radians(radar.max_angle_deg))
-    apertures = [
-        np.ptp(line.tx_m + line.rx_m) / radar.wavelength_m
-        for line in virtual_lines(radar)
-        if line is not None
-    ]
-    half = int(np.ceil(_OVERSAMPLING * largest * max(apertures))) + 1
-    elements = max(len(line.channels) for line in virtual_lines(radar) if line is not None)
+    lines = [line for line in virtual_lines(radar) if line is not None]
+    aperture = max(np.ptp(line.tx_m + line.rx_m) for line in lines) / radar.wavelength_m
+    half = int(np.ceil(_OVERSAMPLING * largest * aperture)) + 1
+    elements = max(len(line.channels) for line in lines)
     if (2 * half + 1) * elements * radar.samples_per_chirp > _MOST_WEIGHTS:
         raise InputError(
-            f"angle: radar '{radar.name}' has a line {max(apertures):.3g} wavelengths long, whose beams are too many to keep; "
-            "lessen tx_spacing_wavelengths or rx_spacing_wavelengths"
+            f"angle: radar '{radar.name}' has a line {aperture:.3g} wavelengths long, whose beams "
+            "are too many to keep; lessen tx_spacing_wavelengths or rx_spacing_wavelengths"
         )
     grid = np.linspace(-largest, largest, 2 * half + 1)
     grid.flags.writeable = False
@@ -166,13 +164,12 @@ def sine_grid(radar: Radar) -> NDArray[np.float64]:
 
 
 def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
-    """Weights of the elements (element,), sum 1, by their place on the virtual line."""
+    """Weights of the elements (element,), sum 1, by their positions on the virtual line."""
     if taper == "uniform":
         return np.full(len(line.channels), 1 / len(line.channels))
-    from scipy.signal.windows import taylor  # here, for scipy.signal is slow to import
+    from scipy.signal.windows import taylor  # here, because scipy.signal is slow to import
 
-    places = line.tx_m + line.rx_m
-    count = len(places)
+    places, count = line.tx_m + line.rx_m, len(line.channels)
     window = taylor(count, nbar=_TAYLOR_EQUAL_LOBES, sll=SIDE_LOBE_DB)
     # A line without gaps gets the window itself.
     weights = np.interp(places, np.linspace(places.min(), places.max(), count), window)
@@ -188,57 +185,54 @@ def _taper(radar: Radar, axis: int, taper: Taper) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=16)
 def range_walk(radar: Radar) -> int:
-    """Range bins on either side of a cell in which the elements see an echo of that cell from the side."""
-    largest = float(sine_grid(radar)[-1])
-    ways = [
-        np.abs(line.tx_m + line.rx_m).max() for line in virtual_lines(radar) if line is not None
-    ]
-    return int(np.ceil(max(ways) * largest / 2 / radar.range_bin_m))
+    """Range bins on either side of a cell in which some elements receive its echo from the side."""
+    lines = [line for line in virtual_lines(radar) if line is not None]
+    farthest = max(np.abs(line.tx_m + line.rx_m).max() for line in lines)
+    return int(np.ceil(farthest * float(sine_grid(radar)[-1]) / 2 / radar.range_bin_m))
 
 
 def steering(
     radar: Radar, axis: int, range_bins: NDArray[np.int64] | None, taper: Taper
 ) -> Steering:
-    """Phases and range bins of a line for points at some ranges.
+    """Phases and range bins of a line for points at some ranges, for every sine of `sine_grid`.
 
     Parameters
     ----------
     radar : Radar
     axis : {1, 2}
-        Which line.
+        Axis of the line.
     range_bins : (bin,) int64 or None
-        Ranges of the points, whose echoes are looked for in the bin nearest to half their path over each element; None for
-        a plane wave, looked for in the bin of the cell alone (the far-field FFT): one entry, for all bins.
+        Ranges of the points, whose echoes are read in the bin nearest to half their path over each
+        element; None for a plane wave, read in the bin of the cell alone (the far-field FFT): one
+        entry, for all bins.
     taper : {"uniform", "taylor"}
-        Weighting of the antennas along the line, see `taper_weights`.
+        Weights along the line, see `taper_weights`.
     """
     line = virtual_lines(radar)[axis - 1]
     if line is None:
         raise InputError(
-            f"angle: radar '{radar.name}' has no line of at least 2 channels along {'xyz'[axis]}; give it one"
+            f"angle: radar '{radar.name}' has no line of at least 2 channels along "
+            f"{'xyz'[axis]}; give it one"
         )
-    reach, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
-    weights = np.empty(
-        (1 if range_bins is None else len(range_bins), len(line.channels), len(sines)),
-        dtype=np.complex64,
-    )
+    walk, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
+    count = 1 if range_bins is None else len(range_bins)
+    weights = np.empty((count, len(line.channels), len(sines)), dtype=np.complex64)
     carrier = radar.centre_frequency_hz + radar.tx_offset_hz[line.channels // radar.n_rx]
     runs = []
-    for place in range(len(weights)):
+    for place in range(count):
         range_m = None if range_bins is None else radar.range_bin_m * int(range_bins[place])
         excess = line.excess_m(sines, range_m)
-        steps = (
-            np.zeros(excess.shape) if range_m is None else np.rint(excess / (2 * radar.range_bin_m))
-        )
-        offsets = np.clip(steps, -reach, reach).astype(np.int64)
-        # From one range bin to the next the phase also turns by half a turn: the window is even about the middle of the chirp.
+        steps = np.rint(excess / (2 * radar.range_bin_m)) * (range_m is not None)
+        offsets = np.clip(steps, -walk, walk).astype(np.int64)
+        # From one range bin to the next the phase also turns by half a turn, because the window
+        # function is even about the middle of the chirp.
         turns = excess * (carrier / SPEED_OF_LIGHT_MPS) - offsets / 2
         weights[place] = (np.exp(-2j * np.pi * turns) * own).T
-        runs.append(_runs(offsets.T + reach))
+        runs.append(_runs(offsets.T + walk))
     return Steering(weights, np.concatenate(runs), np.cumsum([0, *map(len, runs)]))
 
 
-# Both lines of two radars; 20 MB each, all at once: so memory stays the same wherever somebody goes.
+# Both lines of two radars; 20 MB each, computed at once, so that memory does not grow with motion.
 @lru_cache(maxsize=4)
 def steering_everywhere(radar: Radar, axis: int) -> Steering:
     """`steering` for every range bin of a radar, with the Taylor taper."""
@@ -246,12 +240,10 @@ def steering_everywhere(radar: Radar, axis: int) -> Steering:
 
 
 def _runs(offsets: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Stretches of sines along which an element is read at the same offset, from offsets (element, sine)."""
-    n_sines = offsets.shape[1]
+    """Runs of sines along which an element is read at the same offset (element, sine)."""
     fresh = np.ones(offsets.shape, dtype=np.bool_)
     fresh[:, 1:] = np.diff(offsets, axis=1) != 0
     element, first = np.nonzero(fresh)
     last = np.append(first[1:], 0)
-    return np.stack(
-        [element, offsets[element, first], first, np.where(last == 0, n_sines, last)], axis=1
-    )
+    last[last == 0] = offsets.shape[1]
+    return np.stack([element, offsets[element, first], first, last], axis=1)

@@ -13,17 +13,16 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.process import range_spectrum
-from rtradar.process.angles.maps import angle_grid, range_azimuth, range_elevation
-from rtradar.process.angles.peaks import find_peaks
-from rtradar.process.angles.spectra import angle, angle_spectra, folded_angle_deg
-from rtradar.process.angles.steering import (
+from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
+from rtradar.process.angles import angle, angle_spectra, find_peaks, folded_angle_deg
+from rtradar.process.spectra import cell_spectra
+from rtradar.process.steering import (
     measures_angle,
     range_walk,
     sine_grid,
     taper_weights,
     virtual_lines,
 )
-from rtradar.process.cells import cell_spectra
 from rtradar.radar import Radar
 
 Array = NDArray[np.float64]

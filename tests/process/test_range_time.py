@@ -122,7 +122,7 @@ def test_memory_does_not_grow() -> None:
     held = []
     for block in range(12):
         sliding.push(noise(5 * STEP), block * 5 * STEP * RADAR.n_tx)
-        held.append((len(sliding._window), len(sliding._waiting)))
+        held.append((len(sliding._frame), len(sliding._waiting)))
     assert len(set(held[2:])) == 1
     assert max(held[-1]) == WINDOW // STEP
 

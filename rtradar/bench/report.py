@@ -1,0 +1,269 @@
+"""What was measured as Markdown tables, and as a picture of stages, their bounds and growth."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any, BinaryIO
+
+from rtradar.bench.plan import CHEAPEST
+from rtradar.bench.runs import NOT_TO_CLOUD
+
+Row = dict[str, Any]
+
+# -- tables ----------------------------------------------------------------------------------------
+
+
+def tables(found: dict[str, Any]) -> str:
+    """All tables of what `rtradar.bench.bench` found."""
+    return "\n\n".join(_blocks(found))
+
+
+def _blocks(found: dict[str, Any]) -> Iterator[str]:
+    models = found["models"]
+    yield (
+        f"{found['settings']['motion']}, {found['machine']['cores']} cores, each run a process of "
+        f"its own, medians of {found['settings']['repeats']} after warm-up. To the cloud: all "
+        f"stages but {', '.join(NOT_TO_CLOUD)}. The paper's method goes to detections; IF: its "
+        "echoes and IF over ours."
+    )
+    if models:
+        yield _rates(found["rates"])
+        yield _models(models)
+        if found["paper"]["trouble"]:
+            yield f"the paper's method was not timed: {found['paper']['trouble']}"
+        else:
+            yield _paper(found["paper"]["radars"])
+        for radar in dict.fromkeys(row["radar"] for row in models):
+            own = [row for row in models if row["radar"] == radar and row["cores"] == "all"]
+            yield _stages(radar, own)
+    yield from _growth(found["growth"])
+    if found["kernels"]:
+        yield table(
+            ["kernel", "computes", "takes", "its reference", "ratio", "differs by"],
+            [
+                [
+                    f"`{row['name']}`",
+                    row["does"],
+                    f"{1e3 * row['kernel_s']:.3g} ms",
+                    f"{1e3 * row['reference_s']:.3g} ms",
+                    f"{row['ratio']:.3g}",
+                    f"{row['difference']:.1g}",
+                ]
+                for row in found["kernels"]
+            ],
+        )
+
+
+def _rates(rates: dict[str, Any]) -> str:
+    own = next(iter(rates.values()))
+    return (
+        f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, "
+        f"{own['random_words'] / 1e6:.0f} million random words, "
+        f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
+    )
+
+
+def _models(models: Sequence[Row]) -> str:
+    head = ["radar", "model", "to the cloud: best", "median", "whole run", "first use adds"]
+    head += ["peak memory", f"over `{CHEAPEST}`", "paper's method over it"]
+    lines = [
+        [
+            row["radar"],
+            f"`{row['fidelity']}`" + (", one core" if row["cores"] == "one" else ""),
+            f"{row['to_cloud_s']['best']:.2f} s",
+            _median(row["to_cloud_s"]),
+            _median(row["whole_s"]),
+            f"{row['first_use']['adds_s']:.1f} s" if row["first_use"] else "-",
+            _memory(row),
+            f"{row[f'over_{CHEAPEST}']:.2f}" if row[f"over_{CHEAPEST}"] else "-",
+            "{to_cloud:.3g} (IF {if:.3g})".format(**row["paper_over"])
+            if row["paper_over"]
+            else "-",
+        ]
+        for row in models
+    ]
+    return table(head, lines)
+
+
+def _paper(radars: dict[str, Any]) -> str:
+    names = dict.fromkeys(name for baseline in radars.values() for name in baseline["stages"])
+    lines = [
+        [
+            radar,
+            *(f"{baseline['stages'][name]['median']:.3f} s" for name in names),
+            _median(baseline["total"]),
+        ]
+        for radar, baseline in radars.items()
+    ]
+    return table(["the paper's method in NumPy, one thread, a frame", *names, "all"], lines)
+
+
+def _stages(radar: str, models: Sequence[Row]) -> str:
+    """Medians of every stage, the bound, and in brackets how many times it they are."""
+    lines = []
+    for name in dict.fromkeys(name for row in models for name in row["stages"]):
+        own = [row["stages"].get(name) for row in models]
+        known = next(stage for stage in own if stage is not None)
+        label = f"{name} (not to the cloud)" if name in NOT_TO_CLOUD else name
+        times = ["-" if stage is None else _over(stage["median"], stage["floor"]) for stage in own]
+        floor = "-" if known["floor"] is None else f"{known['floor']:.3f} s"
+        lines.append([label, *times, floor, known["rule"]])
+    # The bounds of all stages to the cloud, as if nothing else took time.
+    sums = [
+        sum(own["floor"] or 0 for name, own in row["stages"].items() if name not in NOT_TO_CLOUD)
+        for row in models
+    ]
+    medians = [row["to_cloud_s"]["median"] for row in models]
+    whole = [_over(own, least) for own, least in zip(medians, sums, strict=True)]
+    lines.append(["all to the cloud", *whole, f"{sums[0]:.3f} s", "sum of the floors"])
+    names = [f"`{row['fidelity']}`" for row in models]
+    return table([f"{radar}: stage", *names, "floor", "floor's work"], lines)
+
+
+def _growth(growth: dict[str, Any]) -> Iterator[str]:
+    model = f"`{growth['fidelity']}`"
+    if growth["chirps"]:
+        lines = [
+            [
+                f"{row['radar']} / {row['of_radar']}",
+                f"`{row['fidelity']}`",
+                *(f"{row[name]:.2f}" for name in ("chirps", "to_cloud", "peak_memory")),
+            ]
+            for row in growth["chirps"]
+        ]
+        yield table(["radars", "model", "chirps", "to the cloud", "peak memory"], lines)
+    if growth["duration"]:
+        seconds = [row["to_cloud_s"]["median"] / row["capture_s"] for row in growth["duration"]]
+        lines = [
+            [
+                f"{row['duration_s']:g} s",
+                _median(row["to_cloud_s"]),
+                _median(row["whole_s"]),
+                f"{own / seconds[0]:.3f}",
+                _memory(row),
+            ]
+            for row, own in zip(growth["duration"], seconds, strict=True)
+        ]
+        head = [f"recording, {model}", "to the cloud", "whole run"]
+        yield table([*head, "to the cloud a second, over the first", "peak memory"], lines)
+    if growth["channels"]:
+        lines = [
+            [str(row["channels"]), _median(row["to_cloud_s"]), _memory(row)]
+            for row in growth["channels"]
+        ]
+        yield table([f"channels, {model}", "to the cloud", "peak memory"], lines)
+    if growth["echoes"]:
+        lines = [
+            [str(row["echoes"]), f"{1e9 * row['signal_s'] / row['samples']:.2f} ns"]
+            for row in growth["echoes"]
+        ]
+        yield table(["echoes of a chirp and receiver", "IF alone, a sample"], lines)
+
+
+def _median(spread: Row) -> str:
+    return f"{spread['median']:.2f} s"
+
+
+def _memory(row: Row) -> str:
+    return f"{row['peak_memory_mb']:.0f} MB"
+
+
+def _over(seconds: float, floor: float | None) -> str:
+    return f"{seconds:.3f} s" + (f" ({seconds / floor:.3g}x)" if floor else "")
+
+
+def table(head: Sequence[str], lines: Sequence[Sequence[str]]) -> str:
+    """Cells in aligned columns, as Markdown."""
+    widths = [max(map(len, column)) for column in zip(head, *lines, strict=True)]
+    rows = [
+        " | ".join(cell.ljust(width) for cell, width in zip(line, widths, strict=True))
+        for line in (head, *lines)
+    ]
+    rule = "|" + "|".join("-" * (width + 2) for width in widths) + "|"
+    first, *others = (f"| {row} |" for row in rows)
+    return "\n".join([first, rule, *others])
+
+
+# -- figure ----------------------------------------------------------------------------------------
+
+
+def draw(found: dict[str, Any], file: BinaryIO) -> None:
+    """Draw what `rtradar.bench.bench` found, as PNG."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    models = [row for row in found["models"] if row["cores"] == "all"]
+    growth = found["growth"]
+    radars = list(dict.fromkeys(row["radar"] for row in models))
+    grown = [name for name in ("duration", "channels", "echoes") if growth[name]]
+    rows = max(1, len(radars) + bool(grown))
+    figure = plt.figure(figsize=(11, 3.4 * rows), layout="constrained")
+    places = figure.add_gridspec(rows, max(1, len(grown)))
+    for number, radar in enumerate(radars):
+        own = [row for row in models if row["radar"] == radar]
+        _bars(figure.add_subplot(places[number, :]), own, radar)
+    for column, name in enumerate(grown):
+        axes, rows = figure.add_subplot(places[-1, column]), growth[name]
+        if name == "echoes":
+            label = "echoes of a chirp and receiver"
+            _lines(axes, rows, "echoes", label, {"signal_s": "IF of a block"})
+            continue
+        key, label = {
+            "duration": ("duration_s", "recording [s]"),
+            "channels": ("channels", "channels"),
+        }[name]
+        series = {"to_cloud_s": "to the cloud", "whole_s": "whole run"}
+        _lines(axes, rows, key, label, series)
+        axes.set_title(f"`{growth['fidelity']}`", fontsize=9)
+        memory = [row["peak_memory_mb"] for row in rows]
+        beside = axes.twinx()
+        beside.plot([row[key] for row in rows], memory, "s--", color="0.5", markersize=4)
+        beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))
+    figure.savefig(file, format="png", dpi=110)
+    plt.close(figure)
+
+
+def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
+    """Stages side by side, hatched unless they lead to the cloud; bounds as black bars in them."""
+    import matplotlib as mpl
+
+    colours = mpl.colormaps["tab20"]
+    names = list(dict.fromkeys(name for row in models for name in row["stages"]))
+    names.sort(key=lambda name: name in NOT_TO_CLOUD)  # stays in order otherwise
+    for number, row in enumerate(models):
+        left = 0.0
+        for place, name in enumerate(names):
+            stage = row["stages"].get(name)
+            if stage is None:
+                continue
+            axes.barh(
+                number,
+                stage["median"],
+                left=left,
+                color=colours(place % colours.N),
+                hatch="//" if name in NOT_TO_CLOUD else None,
+                label=None if number else name,
+                height=0.7,
+            )
+            if stage["floor"]:
+                axes.barh(number, stage["floor"], left=left, color="black", height=0.15)
+            left += stage["median"]
+    axes.barh([0], [0], color="black", label="floor")
+    axes.set_yticks(range(len(models)), [row["fidelity"] for row in models])
+    axes.invert_yaxis()
+    capture_s = models[0]["capture_s"]
+    axes.set(ylabel="model", xlabel=f"time of a run of {capture_s:.2f} s of radar, median [s]")
+    axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9)
+    axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
+def _lines(axes: Any, rows: Sequence[Row], key: str, label: str, series: dict[str, str]) -> None:
+    x = [row[key] for row in rows]
+    for name, said in series.items():
+        y = [row[name] if isinstance(row[name], float) else row[name]["median"] for row in rows]
+        axes.plot(x, y, "o-", label=said)
+    axes.set(xlabel=label, ylabel="time [s]", xlim=(0, None), ylim=(0, None))
+    axes.legend(fontsize=7, loc="upper left")
+    axes.grid(alpha=0.2)

@@ -1,0 +1,358 @@
+"""Directions of echoes: power over the sines of the two virtual lines, its peaks, and one cell.
+
+In one TDM cycle Tx k transmits k chirps late; meanwhile the phase of an echo of range rate v grows
+by 2 pi f_D k T, f_D = 2 v / lambda with the wavelength of the sweep centre. That is removed with
+the velocity of the cell; an echo faster than the unambiguous velocity keeps a part of it, and
+appears in a wrong direction (`folded_angle_deg`).
+
+The line along y measures the sine u = y / r, the line along z the sine w = z / r;
+azimuth = atan2(y, x) = asin(u / sqrt(1 - w^2)), elevation = asin(w). A radar with one line alone
+measures the cone about that line: along y azimuth is asin(u), the cone angle, which is the true
+azimuth only at the height of the radar, and elevation is not measured; along z azimuth is not.
+
+Off the boresight an echo reaches the ends of the line up to several range bins before and behind
+its cell (12 GHz: 1 bin at 14 degrees, 2 at 30, 3.3 at the unambiguous 59). Each element is
+therefore read in the bin where the echo from that direction lies. Read in the cell alone, a point
+at 30 degrees and 12 GHz would appear 5.2 dB weaker, in a beam of 3.4 degrees instead of 2.1, and at
+1 m/s half a degree beside its place, for the elements would receive it at different times.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.kernels.angles import beam_power, highest_maxima
+from rtradar.process.spectra import cell_spectra, range_spectrum
+from rtradar.process.steering import (
+    Taper,
+    range_walk,
+    sine_grid,
+    steering,
+    steering_everywhere,
+    virtual_lines,
+)
+from rtradar.process.window_functions import HANN, WindowFunctions
+from rtradar.radar import Radar
+from rtradar.system.threads import in_threads
+
+MOST_PEAKS = 3
+"""Peaks taken of one spectrum."""
+
+BELOW_HIGHEST_DB = 6.0
+"""Peaks further below the highest are left out [dB]. Off the boresight, elements read different
+range bins: in a cell beside a strong, fast echo its side lobes in range and angle meet.
+``validation/closed_forms/spatial_cloud.py`` counts the points that are of no body part: 4 % of
+those of a walk at 6 dB, 9 % at 10 dB."""
+
+ABOVE_MEDIAN_DB = 11.0
+"""Peaks, except the highest, nearer to the median of their spectrum are left out as well [dB];
+noise alone exceeds it in 2 of 100 spectra."""
+
+_CELLS_A_THREAD = 64
+
+
+@dataclass(frozen=True)
+class AngleSpectra:
+    """Power over the sine of direction of range-Doppler cells, on each virtual line.
+
+    Parameters
+    ----------
+    sines : (sine,) float64
+        Uniform grid within the unambiguous angle.
+    y, z : (cell, sine) float32, or None
+        Power over u = y / r and over w = z / r; an echo of amplitude 1 in every channel reads 1.
+        None where the radar has no such line.
+    range_m : (cell,) float64
+        Range of the cells [m].
+    velocity : (cell,) float64
+        Range rate of the cells [m/s].
+    """
+
+    sines: NDArray[np.float64]
+    y: NDArray[np.float32] | None
+    z: NDArray[np.float32] | None
+    range_m: NDArray[np.float64]
+    velocity: NDArray[np.float64]
+
+
+def angle_spectra(
+    values: NDArray[np.complexfloating],
+    radar: Radar,
+    range_m: ArrayLike,
+    velocity: ArrayLike,
+    *,
+    focus: bool = True,
+    taper: Taper = "taylor",
+) -> AngleSpectra:
+    """Power over direction of range-Doppler cells, without the motion within a TDM cycle.
+
+    The phases :eq:`tdm-phase` of the theory page are removed; elements are added along
+    :eq:`near-field`.
+
+    Parameters
+    ----------
+    values : (cell, offset, channel) complex
+        Values from `cell_spectra`.
+    radar : Radar
+        Radar that gives the array.
+    range_m : (cell,) float
+        Range of each cell [m]; the nearest range bin counts.
+    velocity : (cell,) float
+        Range rate of each cell [m/s].
+    focus : bool
+        Steer with the exact path over each element at the range of the cell; else with plane waves,
+        which is a far-field FFT.
+    taper : {"taylor", "uniform"}
+        Weights along the line. ``taylor`` (side lobes at -25 dB) for several echoes in a cell: a
+        uniform line has side lobes at -13 dB, and two that meet pass for an echo; Hann widens the
+        beam by 63 %, this by 20 %. ``uniform`` for a single echo.
+
+    Returns
+    -------
+    AngleSpectra
+
+    Raises
+    ------
+    InputError
+        Where the shapes do not fit each other or the radar, a number is not finite, a range lies
+        outside the map, or the radar has no line of at least 2 channels.
+    """
+    cells, lines = np.asarray(values), virtual_lines(radar)
+    ranges, rates = np.asarray(range_m, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
+    bins = _checked_bins(cells, ranges, rates, radar)
+    # Phase that a moving echo gains between the Tx of one cycle, and phase of its way there and
+    # back by its Tx's own carrier.
+    turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
+    turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)
+    samples = cells.astype(np.complex64, copy=False)
+    still = np.exp(-2j * np.pi * turns).astype(np.complex64).repeat(radar.n_rx, axis=1)
+
+    def power(axis: int) -> NDArray[np.float32] | None:
+        line = lines[axis - 1]
+        if line is None:
+            return None
+        result = np.empty((len(cells), len(sine_grid(radar))), dtype=np.float32)
+        if not focus:
+            known, place = steering(radar, axis, None, taper), np.zeros_like(bins)
+        elif taper == "taylor":
+            known, place = steering_everywhere(radar, axis), bins
+        else:
+            used, place = np.unique(bins, return_inverse=True)
+            known = steering(radar, axis, used, taper)
+
+        def fill(first: int) -> None:
+            end = min(first + _CELLS_A_THREAD, len(samples))
+            beam_power(first, end, samples, still, place, line.channels, known, result)
+
+        in_threads(fill, range(0, len(samples), _CELLS_A_THREAD))
+        return result
+
+    return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)
+
+
+def _checked_bins(
+    cells: NDArray[np.generic],
+    ranges: NDArray[np.float64],
+    rates: NDArray[np.float64],
+    radar: Radar,
+) -> NDArray[np.int64]:
+    """Range bins (cell,) of cells whose arrays fit each other and the radar."""
+    needed = (2 * range_walk(radar) + 1, radar.n_channels)
+    count = cells.shape[:1]
+    if cells.ndim != 3 or cells.shape[1:] != needed or not count == ranges.shape == rates.shape:
+        raise InputError(
+            f"angle: values, range_m and velocity have shapes {cells.shape}, {ranges.shape} and "
+            f"{rates.shape}; radar '{radar.name}' needs (cell, {needed[0]}, {needed[1]}), (cell,) "
+            "and (cell,)"
+        )
+    if not all(np.isfinite(array).all() for array in (cells, ranges, rates)):
+        raise InputError(
+            "angle: values, range_m or velocity hold NaN or infinity; all must be finite"
+        )
+    bins = np.rint(ranges / radar.range_bin_m).astype(np.int64)
+    if len(bins) and not 0 <= bins.min() <= bins.max() < radar.samples_per_chirp:
+        raise InputError(
+            f"angle: range_m must lie between 0 and {radar.range_m[-1]:.3f} m, the last range bin"
+        )
+    return bins
+
+
+def angle(
+    x: ArrayLike,
+    radar: Radar,
+    range_m: float,
+    velocity: float,
+    focus: bool = True,
+    *,
+    window_functions: WindowFunctions = HANN,
+) -> tuple[float, float]:
+    """Direction of the strongest echo in one range-Doppler cell (:eq:`direction`).
+
+    Parameters
+    ----------
+    x : (chirp, rx, sample) complex
+        IF samples of one frame; chirp 0 comes from Tx 0. Whole TDM cycles are used.
+    radar : Radar
+        Radar that gives schedule and array.
+    range_m, velocity : float
+        Range [m] and range rate [m/s] in the middle of the frame; the nearest cell of the map is
+        taken.
+    focus : bool
+        See `angle_spectra`.
+    window_functions : WindowFunctions
+        Window functions in fast time and in slow time.
+
+    Returns
+    -------
+    azimuth, elevation : float
+        Angles in the radar's frame [rad], within its unambiguous angle; NaN where the radar has no
+        line for it. Without a line along z azimuth is the cone angle asin(y / r).
+
+    Raises
+    ------
+    InputError
+        Where the shape does not fit the radar, a sample is not finite, the cell lies outside the
+        map or holds nothing, or the radar has no line of at least 2 channels.
+    """
+    virtual_lines(radar)
+    spectra = range_spectrum(np.asarray(x), radar, window_functions=window_functions)
+    if not np.isfinite(spectra).all():
+        raise InputError("angle: x holds NaN or infinity; every IF sample must be finite")
+    n_cycles = len(spectra) // radar.n_tx
+    if n_cycles < 1:
+        raise InputError(
+            f"angle: {len(spectra)} chirps hold no whole TDM cycle; give at least {radar.n_tx}, "
+            "one for each Tx"
+        )
+    row = _nearest(range_m / radar.range_bin_m, 0, radar.samples_per_chirp - 1)
+    if row is None:
+        raise InputError(
+            f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m, the "
+            "last range bin"
+        )
+    step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
+    column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
+    if column is None:
+        raise InputError(
+            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s, "
+            "the unambiguous one"
+        )
+    cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
+    cell = [row], [(column + n_cycles // 2) % n_cycles]
+    values = cell_spectra(cube, radar, *cell, window_functions=window_functions)
+    at = [row * radar.range_bin_m], [column * step]
+    found = angle_spectra(values, radar, *at, focus=focus, taper="uniform")
+    u, w = (_peak(found.sines, power) for power in (found.y, found.z))
+    azimuth = math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
+    return (
+        math.nan if found.y is None else azimuth,
+        math.nan if found.z is None else math.asin(w),
+    )
+
+
+def folded_angle_deg(radar: Radar) -> float:
+    """How far beside its direction an echo appears whose velocity is folded once, at broadside.
+
+    With a range rate that is wrong by twice the unambiguous velocity, one Tx after the other is
+    rotated by 1 / n_tx of a turn too little or too much, which on a line of Tx d apart is the
+    effect of a direction whose sine differs by lambda / (n_tx d).
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar whose schedule and array count.
+
+    Returns
+    -------
+    float
+        Angle [deg]; 0 where Tx do not take turns, or no line has two of them.
+    """
+    take_turns = radar.tx_delay_s[-1] > 0
+    on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
+    if not (take_turns and on_a_line):
+        return 0.0
+    spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
+    return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
+
+
+def _nearest(bins: float, least: float, largest: float) -> int | None:
+    """The nearest whole number, or None where the bins lie half a bin or more outside, or NaN."""
+    return round(bins) if least - 0.5 < bins < largest + 0.5 else None
+
+
+def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> float:
+    if power is None:
+        return 0.0
+    if not power.max() > 0:
+        raise InputError("angle: the cell holds no echo at all; choose one that was detected")
+    return float(_refine(sines, power, power.argmax(axis=1)[:, None])[0][0, 0])
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Highest maxima of a number of spectra, the strongest first.
+
+    Parameters
+    ----------
+    sine, power : (cell, peak) float64
+        Refined between the points of the grid.
+    real : (cell, peak) bool
+        False where a cell has fewer peaks; sine and power are then those of its strongest. A cell
+        with any power has a peak.
+    """
+
+    sine: NDArray[np.float64]
+    power: NDArray[np.float64]
+    real: NDArray[np.bool_]
+
+
+def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
+    """Up to `MOST_PEAKS` maxima of each spectrum that are neither side lobes nor noise.
+
+    Parameters
+    ----------
+    sines : (sine,) float64
+        Uniform grid.
+    power : (cell, sine) float32
+
+    Returns
+    -------
+    Peaks
+    """
+    index = np.empty((len(power), MOST_PEAKS), dtype=np.int64)
+    count = np.empty(len(power), dtype=np.int64)
+    below, above = (np.float32(10 ** (db / 10)) for db in (-BELOW_HIGHEST_DB, ABOVE_MEDIAN_DB))
+    highest_maxima(power, below, above, index, count)
+    real = np.arange(MOST_PEAKS) < count[:, None]
+    return Peaks(*_refine(sines, power, index), real)
+
+
+def _refine(
+    sines: NDArray[np.float64], power: NDArray[np.float32], index: NDArray[np.int64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sine and power (cell, peak) of maxima, by the parabola through three logarithms of power.
+
+    ``index (cell, peak)`` is where the maxima of ``power (cell, sine)`` are on the grid; at its
+    ends they are left there.
+    """
+    last = len(sines) - 1
+    around = (np.clip(index + step, 0, last) for step in (-1, 0, 1))
+    left, middle, right = (
+        np.log(
+            np.maximum(
+                np.take_along_axis(power, at, axis=1), np.finfo(np.float32).tiny, dtype=np.float64
+            )
+        )
+        for at in around
+    )
+    bend = left - 2 * middle + right
+    inside = (bend < 0) & (index > 0) & (index < last)
+    shift = np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5) * inside
+    sine = sines[index] + shift * (sines[1] - sines[0])
+    return sine, np.exp(middle - 0.25 * (left - right) * shift)

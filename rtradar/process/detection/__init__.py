@@ -1,1 +1,0 @@
-"""CFAR detectors, their thresholds, and how detections are scored."""
