@@ -168,8 +168,8 @@ class Runner:
         """One run of a case."""
         with temporary_folder(inside=self._folder) as out:
             written = out / "summary.json"
-            words = f"-m rtradar run {MOTION} --duration {case.duration_s} --variant cpu".split()
-            words += ["--radar", case.radar, "--fidelity", case.fidelity]
+            words = f"-m rtradar run {MOTION} --duration {case.duration_s}".split()
+            words += ["--radar", case.radar, "--fidelity", case.fidelity, "--variant", "cpu"]
             words += ["--out", str(out / "run"), "--json", str(written)]
             with _on_one_core(case.one_core):
                 began = time.perf_counter()
