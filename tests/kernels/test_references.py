@@ -28,5 +28,5 @@ def test_every_exported_kernel_has_a_case_and_a_short_reference() -> None:
             if own and not name.startswith("_"):
                 exported.add(f"{module.name}.{name}".removeprefix("rtradar.kernels."))
             if name.endswith("_reference") and value.__module__ == module.name:
-                assert len(inspect.getsource(value).splitlines()) <= 18, name
+                assert len(inspect.getsource(value).splitlines()) <= 20, name
     assert exported <= set(CASES)
