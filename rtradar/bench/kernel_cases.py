@@ -192,4 +192,60 @@ def _interpolated() -> tuple[Call, Call]:
 # -- specular points and facets --------------------------------------------------------------------
 
 
+def _geometry(chirps: int, receivers: int, parts: int) -> Any:
+    from rtradar.kernels.scatter.specular_point import Geometry
+
+    rng = np.random.default_rng(0)
+    frames = np.linalg.qr(rng.normal(size=(chirps, parts, 3, 3)))[0]
+    return Geometry(
+        rng.normal(0, 0.2, (chirps, 3)),
+        rng.normal(0, 0.2, (chirps, receivers, 3)),
+        np.array([4.0, 0.0, 1.0]) + rng.normal(0, 0.4, (chirps, parts, 3)),
+        frames * np.linalg.det(frames)[..., None, None],
+        rng.uniform(0.06, 0.2, (parts, 3)),
+    )
+
+
+@kernel_case("scatter.specular_point.solve", "21 ellipsoids, 100 chirps, 8 receivers", 1e-6)
+def _specular_points() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.specular_point import Options, solve, solve_reference
+
+    at = _geometry(100, 8, 21)
+    start, shape = np.full(at.centres.shape, np.nan), (100, 8, 21)
+    given = 0, 100, at, start, Options(polarized=False, horizontal=False, spreading=True)
+    out = np.empty(shape), np.empty(shape), np.empty((*shape, 3))
+    return filled(solve, *given, out=out), lambda: solve_reference(at)
+
+
+@kernel_case("scatter.nearby_points.nearby_echoes", "147 echoes, 100 chirps, 8 receivers", 0.03)
+def _nearby_points() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter import nearby_points as nearby
+    from rtradar.kernels.scatter.specular_point import solve_reference
+
+    at, part, zero = _geometry(1, 8, 147), np.arange(147), np.zeros(100, dtype=np.int64)
+    points = solve_reference(at._replace(rx=at.rx.mean(axis=1, keepdims=True)))[2][0, 0]
+    local = np.einsum("pji,pj->pi", at.frames[0], points - at.centres[0]).astype(np.float32)
+    places = np.broadcast_to(local, (1, 1, 2, 147, 3)).copy()
+    ends = np.broadcast_to([0.5, 0.5], (100, 2)).copy()
+    wanted = np.ones((1, 1, 147), dtype=bool)
+    near = nearby.Nearby(places, places, wanted, zero, zero, np.linspace(0, 1, 100), ends)
+    rx = np.ascontiguousarray(at.rx[None, :1].swapaxes(2, 3))
+    middle = at.rx.mean(axis=1)[None]
+    images = nearby.Images(at.tx[None], rx, middle, 0 * part, 0 * part, part)
+    centres, frames = (np.repeat(array, 100, axis=0) for array in at[2:4])
+    given = images, zero, nearby.Ellipsoids(centres, frames, at.semi_axes)
+    out = np.empty((100, 8, 147)), np.empty((100, 8, 147))
+    call = filled(nearby.nearby_echoes, *given, near, out=out)
+    return call, lambda: nearby.nearby_echoes_reference(*given)
+
+
+@kernel_case("scatter.far_field.far_field", "21 ellipsoids, 1000 chirps, 8 receivers")
+def _far_field() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.far_field import far_field, far_field_reference
+
+    at = _geometry(1000, 8, 21)
+    out = np.empty((1000, 8, 21)), np.empty((1000, 8, 21))
+    return filled(far_field, at, True, out=out), lambda: far_field_reference(at, True)
+
+
 # -- rooms -----------------------------------------------------------------------------------------

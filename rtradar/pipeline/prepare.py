@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.errors import InputError, ValidityWarning
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.rooms.indoors import indoors
@@ -22,7 +23,7 @@ from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
 from rtradar.scatter.antenna_gain import is_shaped
 from rtradar.scatter.multipath.multipath import Multipath
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
@@ -49,7 +50,9 @@ def prepare(
         paths, model = _echo_model(radar, body, scene, settings)
         echoes = (paths or model).echoes(np.arange(2 * radar.n_tx))
         # Not every model has specular points; the report shows them of all.
-        mirror(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]), points=True)
+        solve_specular_points(
+            Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0])), points=True
+        )
     warm_up_processing(echoes, radar)
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.validity import warn_of_small_radii
 from rtradar.scatter.echo_models import MODELS
 from rtradar.scatter.models.analytic import far_field_echo
@@ -117,7 +118,9 @@ def scattering_length(
     if isinstance(target, Ellipsoids) and model.traces:  # type: ignore[attr-defined]
         target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
-        _, amplitude = far_field_echo(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
+        _, amplitude = far_field_echo(
+            Geometry(tx_array, rx_array[:, None], *_poses(target, len(tx_array)))
+        )
         wavenumber = 2 * np.pi * frequencies / SPEED_OF_LIGHT_MPS
         warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
     return field(
@@ -132,7 +135,7 @@ def _analytic_field(
     frequency: NDArray[np.float64],
     polarization: Literal["v", "h"],
 ) -> NDArray[np.complex128]:
-    length, amplitude = far_field_echo(tx, rx[:, None], *_poses(target, len(tx)))
+    length, amplitude = far_field_echo(Geometry(tx, rx[:, None], *_poses(target, len(tx))))
     return _sum(length, amplitude, tx, rx, frequency)
 
 
@@ -144,13 +147,13 @@ def _specular_field(
     polarization: Literal["v", "h"],
     variant: str = "auto",
 ) -> NDArray[np.complex128]:
-    from rtradar.scatter.specular_point.solver import mirror
+    from rtradar.scatter.specular_point.solver import solve_specular_points
     from rtradar.scatter.specular_point.visibility import unobstructed
     from rtradar.trace.backends.backend import select, use
     from rtradar.trace.body_tracer import BodyTracer
 
-    length, amplitude, points = mirror(
-        tx, rx[:, None], *_poses(target, len(tx)), polarization=polarization, points=True
+    length, amplitude, points = solve_specular_points(
+        Geometry(tx, rx[:, None], *_poses(target, len(tx))), polarization=polarization, points=True
     )
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
     tracer.pose(target.centres, target.frames)

@@ -334,16 +334,16 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
         (
             "rtradar.kernels.small_vectors.dot",
             "rtradar.kernels.scatter.fresnel_zones.zone_sums",
-            "rtradar.scatter.specular_point.solver._mirror",
+            "rtradar.kernels.scatter.specular_point.solve",
         ),
         (
             "rtradar.kernels.jit.on_cache_lines",
             "rtradar.kernels.prime_factor_dft._add_power",
-            "rtradar.scatter.specular_point.solver._mirror",
+            "rtradar.kernels.scatter.specular_point.solve",
         ),
         (
-            "rtradar.scatter.specular_point.solver._newton",
-            "rtradar.scatter.specular_point.solver._mirror",
+            "rtradar.kernels.scatter.specular_point.newton",
+            "rtradar.kernels.scatter.specular_point.solve",
             "rtradar.kernels.prime_factor_dft._add_power",
         ),
     ],

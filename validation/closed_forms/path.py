@@ -29,8 +29,9 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.body.body import Poses
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter import build_model
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.validate.rows import Row, judged, main
 
 Array = NDArray[np.float64]
@@ -190,8 +191,14 @@ def mirror_rows(quick: bool) -> Iterator[Row]:
                     if shape == "sphere" and apart == "monostatic":
                         away = norm([a - b for a, b in zip(exact(tx), exact(centre), strict=True)])
                         own = max(own, abs(reference - 2 * (away - Decimal(float(axes[0])))))
-                    length = mirror(
-                        tx[None], rx[None, None], centre[None, None], frame[None, None], axes[None]
+                    length = solve_specular_points(
+                        Geometry(
+                            tx[None],
+                            rx[None, None],
+                            centre[None, None],
+                            frame[None, None],
+                            axes[None],
+                        )
                     )[0]
                     worst = max(worst, abs(float(Decimal(float(length[0, 0, 0])) - reference)))
                 claim = f"mirror, {distance:g} m, {shape}, {apart}"

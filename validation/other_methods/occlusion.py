@@ -35,7 +35,7 @@ from rtradar.kernels.jit import compiled
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import anchor_step
-from rtradar.scatter.specular_point.visibility import MirrorVisibility
+from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.validate import rows
@@ -419,7 +419,7 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
         amplitudes = [free.echoes(chirp).amplitude[0] for chirp in chirps[:, None]]
         powers = []
         for tracer in (traced, ClosedForm(body.semi_axes)):
-            visibility = MirrorVisibility(radar, body, tracer)
+            visibility = SpecularVisibility(radar, body, tracer)
             fractions = [visibility.at(chirp)[0] for chirp in chirps[:, None]]
             pairs = zip(amplitudes, fractions, strict=True)
             powers.append(np.stack([(np.abs(a) ** 2 * f**2).sum(axis=(0, 1)) for a, f in pairs]))

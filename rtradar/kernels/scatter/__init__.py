@@ -1,1 +1,1 @@
-"""Compiled loops of the echo models: lines of sight, Fresnel zones, footprints."""
+"""Compiled loops of the echo models, each with a reference in plain NumPy."""

@@ -9,13 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import semi_axis_poses
 from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
 from rtradar.scatter.multipath.multipath import Multipath
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene, Triangles
 
 MOST_STEPS = 400
@@ -215,8 +216,9 @@ def _corners(
     out = np.full((len(times), len(keys), most, 3), np.nan)
     for number in {path for path, _, _ in keys}:
         path = paths[number]
-        _, _, point = mirror(
-            images(path.out, centre), images(path.back, centre)[:, None], *poses, points=True
+        _, _, point = solve_specular_points(
+            Geometry(images(path.out, centre), images(path.back, centre)[:, None], *poses),
+            points=True,
         )
         there, back = (
             corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in (path.out, path.back)

@@ -19,12 +19,13 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.fresnel_zones import blend_fractions
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import array_nodes
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.poses import anchor_step
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
 
 TX_NODES, RX_NODES = 6, 3
@@ -149,7 +150,7 @@ class ZoneFractions:
         poses = self._body.at(times)
         radar, zones = self._radar, len(part)
         tx, rx = (np.tile(a.mean(axis=0), (len(times), 1)) for a in (radar.tx, radar.rx))
-        _, _, points = mirror(tx, rx[:, None], *poses, points=True)
+        _, _, points = solve_specular_points(Geometry(tx, rx[:, None], *poses), points=True)
         k = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
         antennas = np.broadcast_to(self._nodes.antennas, (zones, *self._nodes.antennas.shape))
         laid_for = np.full(zones, k)

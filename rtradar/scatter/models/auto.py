@@ -14,6 +14,7 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights
@@ -34,9 +35,8 @@ from rtradar.scatter.models.auto_plan import choose
 from rtradar.scatter.models.fresnel import zone_nodes
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
-from rtradar.scatter.specular_point.solver import mirror
-from rtradar.scatter.specular_point.start_points import MirrorStarts
-from rtradar.scatter.specular_point.visibility import MirrorVisibility
+from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
+from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -119,7 +119,7 @@ class Auto(BuiltInModel):
         # A decibel down is a smaller share than one up.
         self._power_share = 1 - 10 ** (-tolerance_db / 10)
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
-        self._starts = MirrorStarts(radar, body)
+        self._starts = StartPoints(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
         self._planned: FirstCome[int, Planned] = FirstCome(_KEPT_CHUNKS, _PASSING)
         # What `account` tells: parts and instants (way, part) and by reason, and as bits of a number the chunks that are in it.
@@ -269,11 +269,11 @@ class Auto(BuiltInModel):
         frequency = np.array([self._radar.centre_frequency_hz])
         values: NDArray[np.inexact]
         if way == ANALYTIC:
-            length, values = far_field_echo(*poses, spreading=self._spreading)
+            length, values = far_field_echo(Geometry(*poses), spreading=self._spreading)
         else:
             start = self._starts.at(chirps, parts)
-            length, values, _ = mirror(
-                *poses,
+            length, values, _ = solve_specular_points(
+                Geometry(*poses),
                 start=start,
                 polarization=self._radar.polarization,
                 spreading=self._spreading,
@@ -297,8 +297,8 @@ class Auto(BuiltInModel):
         return use(backend)
 
     @cached_property
-    def _specular_points(self) -> MirrorVisibility:
-        return MirrorVisibility(self._radar, self._body, self._tracer)
+    def _specular_points(self) -> SpecularVisibility:
+        return SpecularVisibility(self._radar, self._body, self._tracer)
 
     @cached_property
     def _zones(self) -> ZoneFractions:

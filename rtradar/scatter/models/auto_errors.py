@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.antenna_gain import leg_gain
@@ -30,7 +31,7 @@ from rtradar.scatter.common.array_interpolation import array_nodes
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.fresnel_zones.visible_fraction import Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
 
 WAYS = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
@@ -89,8 +90,10 @@ def forecast(radar: Radar, poses: Poses, tracer: BodyTracer, *, spreading: bool 
         np.repeat(poses.frames, pairs, axis=0),
         poses.semi_axes,
     )
-    far_length, far = far_field_echo(*at, spreading=spreading)
-    length, near, _ = mirror(*at, polarization=radar.polarization, spreading=spreading)
+    far_length, far = far_field_echo(Geometry(*at), spreading=spreading)
+    length, near, _ = solve_specular_points(
+        Geometry(*at), polarization=radar.polarization, spreading=spreading
+    )
     # What a tolerance is held against is what the antennas let through.
     gain = leg_gain(radar, ChirpPoses(np.zeros(len(tx), dtype=np.int64), *at))
     turned = (gain * far * np.exp(1j * wavenumber * (far_length - length))).reshape(
@@ -128,7 +131,7 @@ def _views(
     times, parts = poses.centres.shape[:2]
     eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
     eyes = np.tile(eye, (times, 1))
-    points = mirror(eyes, eyes[:, None], *poses, points=True)[2][:, 0]
+    points = solve_specular_points(Geometry(eyes, eyes[:, None], *poses), points=True)[2][:, 0]
     sight = np.einsum("tpji,tpj->tpi", poses.frames, eye - points)
     normal = sight / np.linalg.norm(sight, axis=-1, keepdims=True)
     angles = np.arccos(np.clip(normal[..., 2], -1, 1)), np.arctan2(normal[..., 1], normal[..., 0])

@@ -11,6 +11,7 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.nodes import sweep_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
@@ -21,8 +22,7 @@ from rtradar.scatter.fresnel_zones.visible_fraction import (
     bands_of,
     zone_fractions,
 )
-from rtradar.scatter.specular_point.solver import mirror
-from rtradar.scatter.specular_point.start_points import MirrorStarts
+from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -70,7 +70,7 @@ class Fresnel(BuiltInModel):
         backend = select(variant)
         self.variant: str | None = backend.kind
         self._frequency = zone_nodes(radar)
-        self._starts = MirrorStarts(radar, body)
+        self._starts = StartPoints(radar, body)
         tracer = BodyTracer(use(backend), body.semi_axes)
         self.fractions = ZoneFractions(
             radar, body, self._frequency, tracer, shadow_rays=shadow_rays
@@ -80,8 +80,8 @@ class Fresnel(BuiltInModel):
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         start, fractions = self._starts.at(chirps), self.fractions.at(chirps)
-        length, amplitude, _ = mirror(
-            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        length, amplitude, _ = solve_specular_points(
+            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
         parts = length.shape[2]
         return Echoes(
@@ -148,8 +148,10 @@ def fresnel_scattering(
     pairs, parts = len(tx), len(target.semi_axes)
     poses = Poses(target.centres[None], target.frames[None], target.semi_axes)
     centres, frames = (np.repeat(a, pairs, axis=0) for a in poses[:2])
-    length, amplitude, points = mirror(
-        tx, rx[:, None], centres, frames, target.semi_axes, polarization=polarization, points=True
+    length, amplitude, points = solve_specular_points(
+        Geometry(tx, rx[:, None], centres, frames, target.semi_axes),
+        polarization=polarization,
+        points=True,
     )
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     # One zone for each pair and part, pairs outermost.

@@ -14,6 +14,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
@@ -26,7 +27,7 @@ from rtradar.scatter.facets.envelope import (
     whole_echo,
 )
 from rtradar.scatter.facets.moving_body import FacetBody
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _COARSE, _FINE = (2, 1), (6, 2)
 """Tx times Rx nodes per line of the array: of parts whose echo is alike all over it, and of the others."""
@@ -167,12 +168,14 @@ class PhysicalOptics(BuiltInModel):
         centres, frames = (
             np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
         )
-        length, strength, _ = mirror(
-            antennas[pairs[:, 0]],
-            antennas[pairs[:, 1], None],
-            centres,
-            frames,
-            pose.semi_axes[parts],
+        length, strength, _ = solve_specular_points(
+            Geometry(
+                antennas[pairs[:, 0]],
+                antennas[pairs[:, 1], None],
+                centres,
+                frames,
+                pose.semi_axes[parts],
+            ),
             polarization=self._radar.polarization,
             spreading=self._spreading,
         )
@@ -195,8 +198,8 @@ class PhysicalOptics(BuiltInModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, strength, _ = mirror(
-            *at[1:], polarization=self._radar.polarization, spreading=self._spreading
+        length, strength, _ = solve_specular_points(
+            at, polarization=self._radar.polarization, spreading=self._spreading
         )
         parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)

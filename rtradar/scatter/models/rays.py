@@ -14,6 +14,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframe_cache import FirstCome
 from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
@@ -22,7 +23,7 @@ from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import BodySurfaces
 
@@ -107,7 +108,7 @@ class Rays(BuiltInModel):
                     shot = self._shot(max(place, 0) * self._step, int(tx))
                     length[index] += weight * shot.length
                     amplitude[:, index] += weight * shot.amplitude
-        length[:, :, :parts] = mirror(*at[1:])[0]
+        length[:, :, :parts] = solve_specular_points(at)[0]
         return Echoes(
             length=length,
             amplitude=amplitude,
@@ -141,7 +142,9 @@ class Rays(BuiltInModel):
             spreading=self._spreading,
         )
         place, rx = radar.tx[tx], radar.rx[radar.rx_of_tx[tx]]
-        specular = mirror(place[None], rx[None], grid.centres[None], grid.frames[None], axes)[0][0]
+        specular = solve_specular_points(
+            Geometry(place[None], rx[None], grid.centres[None], grid.frames[None], axes)
+        )[0][0]
         frequency = self._nodes(self._bounces > 1)
         lengths, amplitudes = [], []
         for order, footprints in enumerate(shooter.shoot(place)):

@@ -10,7 +10,7 @@ from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.moving_body import FacetBody
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
 """Frequencies: what is left of a part whose specular point is hidden comes from beside it, and turns over the sweep. Against
@@ -56,7 +56,7 @@ class Reference(BuiltInModel):
         """Echoes at these chirps."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
-        length, _, _ = mirror(*at[1:])
+        length, _, _ = solve_specular_points(at)
         nodes, parts = len(self._surface.frequency), np.arange(length.shape[2])
         amplitude = np.empty((nodes, *length.shape), dtype=np.complex128)
         cycles = chirps // self._radar.n_tx

@@ -10,8 +10,8 @@ from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.body_material import Surface
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
-from rtradar.scatter.specular_point.solver import mirror
-from rtradar.scatter.specular_point.visibility import MirrorVisibility
+from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -52,14 +52,14 @@ class Specular(BuiltInModel):
         self._surface = Surface(material, radar)
         backend = select(variant)
         self.variant: str | None = backend.kind
-        self.visibility = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))
+        self.visibility = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
         weight, start = self.visibility.at(chirps)
-        length, amplitude, _ = mirror(
-            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        length, amplitude, _ = solve_specular_points(
+            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
         echo = self._surface.echo(at, amplitude * weight)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)

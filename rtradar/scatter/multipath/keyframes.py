@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.array_ends import ArrayEnds
 from rtradar.scatter.common.body_material import body_reflection
 from rtradar.scatter.common.polarization import antenna_field, bisector, copolar
@@ -28,7 +29,7 @@ from rtradar.scatter.multipath.wall_interaction import (
     setting_out,
     through_walls,
 )
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
@@ -87,7 +88,7 @@ def path_anchors(
     ends : ArrayEnds
     paths : sequence of WallPath
     path, part : (echo,) int64
-        Path and part of each echo. `MirrorVisibility` decides whether other parts occlude a direct
+        Path and part of each echo. `SpecularVisibility` decides whether other parts occlude a direct
         one.
     terms : PathTerms
         Gets the columns that are met for the first time.
@@ -233,7 +234,9 @@ def _specular_points(
             for array in (poses.centres, poses.frames)
         )
         antennas = np.tile(from_tx, (anchors, 1)), np.tile(to_rx, (anchors, 1))[:, None]
-        found = mirror(*antennas, centres, frames, poses.semi_axes[own], points=True)
+        found = solve_specular_points(
+            Geometry(*antennas, centres, frames, poses.semi_axes[own]), points=True
+        )
         exists[..., chosen] = (np.abs(found[1]) > 0).reshape(*shape[:3], len(own))
         places[..., chosen, :] = found[2].reshape(*shape[:3], len(own), 3)
     away = places[:, :, 1:] - poses.centres[:, None, None, part]

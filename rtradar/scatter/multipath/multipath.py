@@ -15,6 +15,7 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_ends import ArrayEnds
 from rtradar.scatter.common.body_material import Surface, body_material
@@ -28,9 +29,8 @@ from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathAccount, accou
 from rtradar.scatter.multipath.slab_delays import PathTerms
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_echoes import WallEchoes
-from rtradar.scatter.specular_point.nearby import Nearby
-from rtradar.scatter.specular_point.solver import mirror
-from rtradar.scatter.specular_point.visibility import MirrorVisibility
+from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.scene import Scene
 
 ANCHORS_S = 20e-3
@@ -111,7 +111,7 @@ class Multipath:
         traces: bool = MODELS[fidelity].traces  # type: ignore[attr-defined]
         self._radar, self._body, self._spreading = radar, body, spreading
         self.variant: str | None = None
-        self._visibility: MirrorVisibility | None = None
+        self._visibility: SpecularVisibility | None = None
         tracers = None
         if traces:
             from rtradar.trace.backends.backend import select, use
@@ -122,7 +122,7 @@ class Multipath:
             self.variant = backend.kind
             mi = use(backend)
             tracer = BodyTracer(mi, body.semi_axes)
-            self._visibility = MirrorVisibility(radar, body, tracer)
+            self._visibility = SpecularVisibility(radar, body, tracer)
             tracers = (tracer, RoomTracer(mi, scene))
         series = room_series(
             scene.walls, radar, most_nodes=_MOST_NODES, enough=_ENOUGH, bounces=order
@@ -231,11 +231,11 @@ class Multipath:
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Direct echoes of a conductor; a start ``near (chirp, part, 3)`` the specular point saves steps."""
         if self._visibility is None:
-            return far_field_echo(*at[1:], spreading=self._spreading)
+            return far_field_echo(at, spreading=self._spreading)
         weight, met = self._visibility.at(chirps)
         start = met if near is None else near
-        length, amplitude, _ = mirror(
-            *at[1:], start=start, polarization=self._radar.polarization, spreading=self._spreading
+        length, amplitude, _ = solve_specular_points(
+            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
         return length, amplitude * weight
 

@@ -7,14 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.kernels.scatter.nearby_points import Ellipsoids, Images, Nearby, nearby_echoes
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.array_ends import ArrayEnds
-from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.multipath.image_paths import WallPath, images
-from rtradar.scatter.specular_point.nearby import Nearby, nearby_echoes
-from rtradar.scatter.specular_point.solver import mirror
 
 Array = NDArray[np.float64]
 
@@ -62,55 +61,19 @@ class WallEchoes:
             [m]; without regard to polarisation, which is a matter of the legs.
         """
         shape = (*poses.rx.shape[:2], len(path))
-        length, amplitude, known = (
-            np.empty(shape),
-            np.empty(shape),
-            np.empty((shape[0], shape[2]), dtype=bool),
-        )
-        if self._far_field:
-            for number in np.unique(path):
-                own = path == number
-                ellipsoids = (
-                    poses.centres[:, part[own]],
-                    poses.frames[:, part[own]],
-                    poses.semi_axes[part[own]],
-                )
-                length[..., own], amplitude[..., own] = far_field_echo(
-                    *self._antennas(number, poses.tx_index), *ellipsoids
-                )
+        length, amplitude = np.empty(shape), np.empty(shape)
+        out, back = self._out[path], self._back[path]
+        if not self._far_field:
+            images = Images(self._tx, self._rx_in_lanes, self._rx_middle, out, back, part)
+            nearby_echoes(images, poses.tx_index, Ellipsoids(*poses[3:]), near, length, amplitude)
             return length, amplitude
-        nearby_echoes(
-            self._tx,
-            self._rx_in_lanes,
-            self._rx_middle,
-            poses.tx_index,
-            self._out[path],
-            self._back[path],
-            part,
-            *poses[3:],
-            near,
-            length,
-            amplitude,
-            known,
-        )
-        for echo in np.flatnonzero(~known.all(axis=0)):
-            chirps, own = np.flatnonzero(~known[:, echo]), part[echo : echo + 1]
-            tx, rx = self._antennas(path[echo], poses.tx_index[chirps])
-            ellipsoids = (
-                poses.centres[chirps][:, own],
-                poses.frames[chirps][:, own],
-                poses.semi_axes[own],
+        for number in np.unique(path):
+            own = path == number
+            antennas = (
+                self._tx[self._out[number], poses.tx_index],
+                self._rx[self._back[number], poses.tx_index],
             )
-            polarization = self._radar.polarization
-            exact, strength, points = mirror(
-                tx, rx, *ellipsoids, polarization=polarization, points=True
-            )
-            share = copolar(tx[:, None, None] - points, rx[:, :, None] - points, polarization)
-            length[chirps, :, echo] = exact[..., 0]
-            returned = strength / np.where(np.abs(share) > 1e-6, share, np.inf)
-            # Where the body comes between the images, the specular point ends with no number.
-            amplitude[chirps, :, echo] = np.where(np.isfinite(returned), returned, 0.0)[..., 0]
+            parts = part[own]
+            bodies = poses.centres[:, parts], poses.frames[:, parts], poses.semi_axes[parts]
+            length[..., own], amplitude[..., own] = far_field_echo(Geometry(*antennas, *bodies))
         return length, amplitude
-
-    def _antennas(self, path: int, tx_index: NDArray[np.int64]) -> tuple[Array, Array]:
-        return self._tx[self._out[path], tx_index], self._rx[self._back[path], tx_index]

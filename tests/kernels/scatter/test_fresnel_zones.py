@@ -24,7 +24,8 @@ from rtradar.kernels.scatter.fresnel_zones import (
     zone_sums,
     zone_sums_reference,
 )
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.scatter.specular_point.solver import solve_specular_points
 
 Array = NDArray[np.float64]
 WAVENUMBER = 2 * np.pi * 14e9 / 299_792_458.0
@@ -41,7 +42,9 @@ class Zone:
         self.tx = np.array([-4.0, 0.0, 0.0]) + rng.normal(0, 0.3, 3)
         self.rx = self.tx + rng.normal(0, 0.2, 3)
         pose = self.centre[None, None], self.frame[None, None], self.axes[None]
-        length, _, point = mirror(self.tx[None], self.rx[None, None], *pose, points=True)
+        length, _, point = solve_specular_points(
+            Geometry(self.tx[None], self.rx[None, None], *pose), points=True
+        )
         self.length, self.point = length[0, 0, 0], point[0, 0, 0]
         self.given = self.tx, self.rx, self.centre, self.frame, self.axes, self.point
         self.maps = ZoneMaps.empty(1)

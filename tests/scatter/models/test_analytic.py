@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.models.analytic import Analytic, AnalyticPaper, far_field_echo, plane_wave_echo
@@ -64,7 +65,8 @@ def one(tx: ArrayLike, rx: ArrayLike, body: Any, **options: bool) -> tuple[Array
     """Length and amplitude (part,) for one Tx and one Rx."""
     transmitter, receiver = np.asarray(tx, float)[None], np.asarray(rx, float)[None, None]
     length, amplitude = far_field_echo(
-        transmitter, receiver, body.centres[None], body.frames[None], body.semi_axes, **options
+        Geometry(transmitter, receiver, body.centres[None], body.frames[None], body.semi_axes),
+        **options,
     )
     return length[0, 0], amplitude[0, 0]
 
@@ -230,7 +232,9 @@ def model(
     if not paper:
         return one(tx, rx, body, spreading=spreading)
     pose = (body.centres[None], body.frames[None], body.semi_axes)
-    length, amplitude = plane_wave_echo(FLAT, tx[None], rx[None, None], *pose, spreading=spreading)
+    length, amplitude = plane_wave_echo(
+        FLAT, Geometry(tx[None], rx[None, None], *pose), spreading=spreading
+    )
     return length[0, 0], amplitude[0, 0]
 
 

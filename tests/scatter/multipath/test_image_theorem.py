@@ -11,6 +11,7 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import copolar
@@ -18,7 +19,7 @@ from rtradar.scatter.common.poses import anchor_step, chirp_poses
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images, wall_paths
 from rtradar.scatter.multipath.multipath import ANCHORS_S, Multipath
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls
 from rtradar.trace.backends.backend import Backend
 
@@ -136,12 +137,8 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    length, amplitude, _ = mirror(
-        at.tx,
-        at.rx,
-        at.centres @ turn + shift,
-        turn @ at.frames,
-        at.semi_axes,
+    length, amplitude, _ = solve_specular_points(
+        Geometry(at.tx, at.rx, at.centres @ turn + shift, turn @ at.frames, at.semi_axes),
         polarization=polarization,
     )
     # Of third order in the distance of a receiver from the middle of its line: 4 cm.
@@ -167,8 +164,8 @@ def test_one_way_over_a_conducting_plane_by_hand(
     poses = chirp_poses(radar, body, np.arange(1))  # type: ignore[arg-type]
     length, strength, point = (
         value[0, 0, 0]
-        for value in mirror(
-            image[None], antenna[None, None], *poses[3:], polarization="v", points=True
+        for value in solve_specular_points(
+            Geometry(image[None], antenna[None, None], *poses[3:]), polarization="v", points=True
         )
     )
     bare = strength / copolar(image - point, antenna - point, "v")
@@ -200,7 +197,8 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     tx, rx = antenna * [1, 1, -1], antenna * [1, -1, 1] + [0, 5, 0]
     at = Poses(centre[None, None], np.eye(3)[None, None], np.full((1, 3), radius))
     length, strength, point = (
-        value[0, 0, 0] for value in mirror(tx[None], rx[None, None], *at, points=True)
+        value[0, 0, 0]
+        for value in solve_specular_points(Geometry(tx[None], rx[None, None], *at), points=True)
     )
     bare = strength / copolar(tx - point, rx - point, "v")
     eta = material("concrete").eta(echoes.frequency[0])
@@ -246,7 +244,9 @@ def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend)
     for number, path in enumerate(model.paths[1:], start=1):
         own = slice(21 * number, 21 * (number + 1))
         seen = np.abs(echoes.amplitude[0, ..., own]) > 0
-        length, amplitude, _ = mirror(images(path.out, at.tx), images(path.back, at.rx), *at[3:])
+        length, amplitude, _ = solve_specular_points(
+            Geometry(images(path.out, at.tx), images(path.back, at.rx), *at[3:])
+        )
         off.append(np.abs(echoes.length[..., own] - length)[seen])
         assert np.isfinite(echoes.length).all()
         strength.append(amplitude[seen].size)
@@ -335,7 +335,9 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     chirps = np.arange(0, 1000, anchor_step(radar, ANCHORS_S))
     echoes = model.echoes(chirps)
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    _, _, point = mirror(images(model.paths[1].back, at.tx), at.rx, *at[3:], points=True)
+    _, _, point = solve_specular_points(
+        Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:]), points=True
+    )
     # Both stand equally far from the wall but for the body's surface: the share of the way by similar triangles.
     tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
     meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)

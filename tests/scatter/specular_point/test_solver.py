@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from rtradar import rcs
-from rtradar.scatter.specular_point.solver import mirror
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.scatter.specular_point.solver import solve_specular_points
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -27,8 +28,8 @@ def solve(
     n = len(tx)
     frames = np.broadcast_to(np.eye(3) if frame is None else frame, (n, 1, 3, 3))
     centres = np.broadcast_to(np.zeros(3) if centre is None else centre, (n, 1, 3))
-    length, amplitude, point = mirror(
-        tx, rx[:, None], centres, frames, np.array([axes], float), points=True, **how
+    length, amplitude, point = solve_specular_points(
+        Geometry(tx, rx[:, None], centres, frames, np.array([axes], float)), points=True, **how
     )
     return length[:, 0, 0], amplitude[:, 0, 0], point[:, 0, 0]
 
@@ -57,7 +58,8 @@ def test_a_sphere_between_equally_distant_antennas(
     # By symmetry the specular point lies on the bisector.
     leg = np.sqrt(distance**2 + a**2 - 2 * distance * a * np.cos(half_angle))
     cosine = (distance * np.cos(half_angle) - a) / leg
-    # Divergence of a bundle in the plane of incidence and across it; co-polar is 1, for E_r = 2 (n.E) n - E_i there.
+    # Divergence of a bundle in the plane of incidence and across it; co-polar is 1, for E_r = 2
+    # (n.E) n - E_i there.
     divergence = (2 * cosine**2 / leg + 2 * cosine / a) * (2 / leg + 2 * cosine / a)
     np.testing.assert_allclose(point[0], [a, 0, 0], atol=1e-9 * a)
     np.testing.assert_allclose(length, 2 * leg, rtol=1e-14)
@@ -195,7 +197,8 @@ def test_spreading_is_one_over_both_legs() -> None:
 def test_where_the_search_begins_does_not_matter(
     seed: int, lengths: tuple[float, float, float]
 ) -> None:
-    # A long or flat body has a shortest way over its dark side too, where the antenna is nearer than its curvature.
+    # A long or flat body has a shortest way over its dark side too, where the antenna is nearer
+    # than its curvature.
     rng = np.random.default_rng(seed)
     tx, rx = somewhere(rng, 20)
     axes = np.array(lengths)
@@ -215,16 +218,19 @@ def test_a_capture_is_its_chirps_one_by_one() -> None:
         Rotation.random(chirps * parts, random_state=0).as_matrix().reshape(chirps, parts, 3, 3)
     )
     axes = rng.uniform(0.03, 0.2, (parts, 3))
-    whole = mirror(tx * 3, receivers * 3, centres, frames, axes, points=True)
+    whole = solve_specular_points(
+        Geometry(tx * 3, receivers * 3, centres, frames, axes), points=True
+    )
     for i in (0, 77, 199):
-        alone = mirror(
-            *(array[i : i + 1] for array in (tx * 3, receivers * 3, centres, frames)),
-            axes,
+        alone = solve_specular_points(
+            Geometry(
+                *(array[i : i + 1] for array in (tx * 3, receivers * 3, centres, frames)), axes
+            ),
             points=True,
         )
         for one, many in zip(alone, whole, strict=True):
             np.testing.assert_allclose(one[0], many[i], rtol=1e-13)
-    assert mirror(tx, receivers, centres, frames, axes)[2].size == 0
+    assert solve_specular_points(Geometry(tx, receivers, centres, frames, axes))[2].size == 0
 
 
 @pytest.mark.parametrize(
@@ -265,9 +271,12 @@ def test_grazing_rays_have_no_reflection_but_a_length() -> None:
     centres[:, 0, 1] = across
     frames = np.broadcast_to(np.eye(3), (len(across), 1, 3, 3))
     tx, rx = np.tile([-4.0, 0, 0], (len(across), 1)), np.tile([[5.0, 0, 0]], (len(across), 1, 1))
-    length, amplitude, _ = mirror(tx, rx, centres, frames, np.full((1, 3), 0.12))
+    length, amplitude, _ = solve_specular_points(
+        Geometry(tx, rx, centres, frames, np.full((1, 3), 0.12))
+    )
     assert np.isfinite(length).all()
     assert np.isfinite(amplitude).all()
-    # Where the sphere stands in the line there is no specular point, and well beside it there is one.
+    # Where the sphere stands in the line there is no specular point, and well beside it there is
+    # one.
     assert (amplitude[np.abs(across) < 0.11] == 0).all()
     assert (amplitude[np.abs(across) > 0.13] > 0).all()

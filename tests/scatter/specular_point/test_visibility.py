@@ -10,10 +10,13 @@ from rtradar.body.body import Poses
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
-from rtradar.scatter.specular_point import visibility as occlusion
-from rtradar.scatter.specular_point.solver import mirror
-from rtradar.scatter.specular_point.start_points import MirrorStarts
-from rtradar.scatter.specular_point.visibility import MirrorVisibility, trace_anchor, unobstructed
+from rtradar.scatter.specular_point import visibility
+from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
+from rtradar.scatter.specular_point.visibility import (
+    SpecularVisibility,
+    trace_keyframe,
+    unobstructed,
+)
 from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -22,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Curtain:
-    """A small sphere at the origin; 1 m before it a large one that moves from left to right and passes y = 0 at 0.1 s."""
+    """A small sphere at the origin, and 1 m before it a large one that passes y = 0 at 0.1 s."""
 
     speed: float
     duration_s: float = 1.0
@@ -56,7 +59,7 @@ def small_radar(**fields: object) -> Radar:
 
 def weights(backend: Backend, radar: Radar, body: Curtain, chirps: Array) -> Array:
     tracer = BodyTracer(use(backend), body.semi_axes)
-    return MirrorVisibility(radar, body, tracer).at(np.asarray(chirps))[0]  # type: ignore[arg-type]
+    return SpecularVisibility(radar, body, tracer).at(np.asarray(chirps))[0]  # type: ignore[arg-type]
 
 
 def test_points_behind_another_part_are_hidden_on_either_leg(backend: Backend) -> None:
@@ -73,11 +76,11 @@ def test_points_behind_another_part_are_hidden_on_either_leg(backend: Backend) -
     np.testing.assert_array_equal(seen[:, 1], [True, True, True])
 
 
-def test_an_anchor_knows_visibility_and_a_specular_point_of_each_part(backend: Backend) -> None:
+def test_a_keyframe_knows_visibility_and_a_specular_point_of_each_part(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(0.0)
     poses = body.at(np.zeros(radar.n_tx))
     at = ChirpPoses(np.arange(2), radar.tx, radar.rx[radar.rx_of_tx], *poses)
-    anchor = trace_anchor(BodyTracer(use(backend), body.semi_axes), at)
+    anchor = trace_keyframe(BodyTracer(use(backend), body.semi_axes), at)
     assert anchor.visible.shape == (2, 2, 2)
     np.testing.assert_array_equal(anchor.visible[..., 0], False)
     np.testing.assert_array_equal(anchor.visible[..., 1], True)
@@ -85,8 +88,9 @@ def test_an_anchor_knows_visibility_and_a_specular_point_of_each_part(backend: B
     np.testing.assert_allclose(anchor.start[1], [-0.3, 0, 0], atol=0.01)
 
 
-def test_a_fade_is_smooth_monotone_and_ends_at_the_anchors(backend: Backend) -> None:
-    # The curtain frees the line of sight once within the second; what changes there is one interval between anchors.
+def test_a_fade_is_smooth_monotone_and_ends_at_the_keyframes(backend: Backend) -> None:
+    # The curtain frees the line of sight once within the second; what changes there is one interval
+    # between anchors.
     radar, body = small_radar(), Curtain(3.0)
     step = anchor_step(radar)
     assert step == 10
@@ -152,20 +156,20 @@ def test_past_the_end_the_last_pose_stays(backend: Backend) -> None:
     )
 
 
-def test_anchors_are_the_same_where_only_a_few_are_remembered(
+def test_keyframes_are_the_same_where_only_a_few_are_remembered(
     backend: Backend, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     radar, body = small_radar(), Curtain(3.0)
     whole = weights(backend, radar, body, np.arange(150, 260))
-    monkeypatch.setattr(occlusion, "_KEPT_ANCHORS", 4)
+    monkeypatch.setattr(visibility, "_KEPT_KEYFRAMES", 4)
     traced = []
 
-    def counted(tracer: BodyTracer, at: ChirpPoses) -> occlusion.Anchor:
+    def counted(tracer: BodyTracer, at: ChirpPoses) -> visibility.Keyframe:
         traced.append(at.centres[0, 1, 1])
-        return trace_anchor(tracer, at)
+        return trace_keyframe(tracer, at)
 
-    monkeypatch.setattr(occlusion, "trace_anchor", counted)
-    few = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
+    monkeypatch.setattr(visibility, "trace_keyframe", counted)
+    few = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
     anchors = np.arange(150, 261, 10)
     few.at(anchors)
     assert len(traced) == len({*traced}) == 12
@@ -178,7 +182,7 @@ def test_anchors_are_the_same_where_only_a_few_are_remembered(
 
 def test_some_parts_are_as_among_all(backend: Backend) -> None:
     radar, body = small_radar(), Curtain(speed=0.5)
-    seen = MirrorVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
+    seen = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
     for chirps in (np.arange(100, 160), np.array([100])):
         weight, start = seen.at(chirps)
         for parts in ([1], [1, 0], []):
@@ -187,18 +191,18 @@ def test_some_parts_are_as_among_all(backend: Backend) -> None:
             np.testing.assert_array_equal(of_some, start[:, parts])
 
 
-def test_starts_are_specular_points_of_the_anchor_before_and_lead_to_the_same_points() -> None:
+def test_starts_are_specular_points_of_the_keyframe_before_and_lead_to_the_same_points() -> None:
     radar, body = small_radar(), Curtain(speed=0.5)
     chirps = np.array([100, 104, 109, 110, 133])
-    starts = MirrorStarts(radar, body)  # type: ignore[arg-type]
+    starts = StartPoints(radar, body)  # type: ignore[arg-type]
     found = starts.at(chirps)
     at = chirp_poses(radar, body, np.array([100, 100, 100, 110, 130]))  # type: ignore[arg-type]
-    points = mirror(*at[1:], points=True)[2][:, 0]
+    points = solve_specular_points(at, points=True)[2][:, 0]
     np.testing.assert_allclose(
         found, points - at.centres, atol=1e-9
     )  # its axes are the world's; 1e-7 of the semi-axis squared
     np.testing.assert_array_equal(starts.at(chirps, np.array([1])), found[:, [1]])
     here = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
-    cold, warm = mirror(*here[1:]), mirror(*here[1:], start=found)
+    cold, warm = solve_specular_points(here), solve_specular_points(here, start=found)
     np.testing.assert_allclose(warm[0], cold[0], rtol=1e-14)
     np.testing.assert_allclose(warm[1], cold[1], rtol=1e-7)  # where the search ends

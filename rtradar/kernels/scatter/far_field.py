@@ -1,0 +1,95 @@
+"""Echoes of ellipsoids by their far-field cross-sections, on paths over their specular points."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import prange
+
+from rtradar.kernels.jit import compiled
+from rtradar.kernels.scatter.specular_point import in_part_axes
+
+_NO_BISECTOR = 1e-24
+"""Square of the sum of two opposite unit vectors, as rounding leaves it."""
+
+_LANES = 8
+
+
+@compiled(parallel=True, fastmath={"contract"})
+def far_field(at, spreading, length, amplitude):
+    """Fill length and amplitude (chirp, rx, part) [m] for a `specular_point.Geometry`."""
+    tx, rx, centres, frames, semi_axes = at
+    chirps, receivers, parts = length.shape
+    for chirp in prange(chirps):
+        to_tx = np.empty(3)
+        # Receivers side by side: to each of them in the axes of the part, then length and
+        # amplitude. In one array of a known size: of many the compiler would have to fear that they
+        # overlap.
+        lanes = np.empty((5, _LANES))
+        for part in range(parts):
+            # The transmitter in the axes of the part.
+            centre, frame = centres[chirp, part], frames[chirp, part]
+            a, b, c = semi_axes[part, 0], semi_axes[part, 1], semi_axes[part, 2]
+            for i in range(3):
+                to_tx[i] = 0.0
+                for j in range(3):
+                    to_tx[i] += frame[j, i] * (tx[chirp, j] - centre[j])
+            norm_tx = math.sqrt(to_tx[0] ** 2 + to_tx[1] ** 2 + to_tx[2] ** 2)
+            t0, t1, t2 = to_tx[0], to_tx[1], to_tx[2]
+            u0, u1, u2 = t0 / norm_tx, t1 / norm_tx, t2 / norm_tx
+            root_volume = math.sqrt(math.pi) * a * b * c
+            for first in range(0, receivers, _LANES):
+                # The receivers in the axes of the part.
+                count = min(_LANES, receivers - first)
+                for k in range(_LANES):
+                    receiver = first + min(k, count - 1)
+                    x = rx[chirp, receiver, 0] - centre[0]
+                    y = rx[chirp, receiver, 1] - centre[1]
+                    z = rx[chirp, receiver, 2] - centre[2]
+                    for i in range(3):
+                        lanes[i, k] = frame[0, i] * x + frame[1, i] * y + frame[2, i] * z
+                for k in range(_LANES):
+                    # |A n| for the unit normal n is the support function h; the surface point with
+                    # that normal is A^2 n / h.
+                    r0, r1, r2 = lanes[0, k], lanes[1, k], lanes[2, k]
+                    norm = math.sqrt(r0 * r0 + r1 * r1 + r2 * r2)
+                    inverse = 1 / norm
+                    n0, n1, n2 = u0 + r0 * inverse, u1 + r1 * inverse, u2 + r2 * inverse
+                    squared = n0 * n0 + n1 * n1 + n2 * n2
+                    support = a * a * n0 * n0 + b * b * n1 * n1 + c * c * n2 * n2
+                    scale = 1 / math.sqrt(support)
+                    s0, s1, s2 = a * a * n0 * scale, b * b * n1 * scale, c * c * n2 * scale
+                    range_tx = math.sqrt(
+                        (t0 - s0) * (t0 - s0) + (t1 - s1) * (t1 - s1) + (t2 - s2) * (t2 - s2)
+                    )
+                    range_rx = math.sqrt(
+                        (r0 - s0) * (r0 - s0) + (r1 - s1) * (r1 - s1) + (r2 - s2) * (r2 - s2)
+                    )
+                    # Square root of the cross-section, pi (abc)^2 / h^4: that of
+                    # `rtradar.rcs.ellipsoid` without its angles.
+                    root = root_volume * squared * (scale * scale)
+                    if spreading:
+                        root /= range_tx * range_rx
+                    # Straight through there is no bisector, and no reflection.
+                    there = squared >= _NO_BISECTOR
+                    lanes[3, k] = range_tx + range_rx if there else norm_tx + norm
+                    lanes[4, k] = root if there else 0.0
+                for k in range(count):
+                    length[chirp, first + k, part] = lanes[3, k]
+                    amplitude[chirp, first + k, part] = lanes[4, k]
+
+
+def far_field_reference(at, spreading):
+    """Length and amplitude of `far_field`, in plain NumPy."""
+    to_tx, to_rx = in_part_axes(at)
+    norms = [np.linalg.norm(way, axis=-1) for way in (to_tx, to_rx)]
+    normal = to_tx / norms[0][..., None] + to_rx / norms[1][..., None]
+    square = np.sum(normal**2, axis=-1)
+    there = square >= _NO_BISECTOR
+    support = np.where(there, np.linalg.norm(at.semi_axes * normal, axis=-1), 1.0)
+    point = at.semi_axes**2 * normal / support[..., None]
+    ranges = [np.linalg.norm(way - point, axis=-1) for way in (to_tx, to_rx)]
+    root = math.sqrt(math.pi) * np.prod(at.semi_axes, axis=1) * square / support**2
+    root = root / (ranges[0] * ranges[1]) if spreading else root
+    return np.where(there, sum(ranges), sum(norms)), np.where(there, root, 0.0)

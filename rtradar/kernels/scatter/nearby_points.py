@@ -1,0 +1,264 @@
+"""Echoes over specular points that are nearly known, by one or two steps of Newton's method.
+
+Over a wall each part of the body sends an echo more, so to search for the specular point of each of
+them would cost more than all the rest of a run. Between keyframes a specular point wanders little
+on its part: the steps start where it is expected, and lead to the point for the middle of the line
+of receivers. The path is stationary there: for each receiver its second-order term, -1/2 g H^-1 g
+with the slope g on the tangent plane, leaves an error of third order, below 1 um.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.specular_point import (
+    ROOT_PI,
+    Array,
+    Geometry,
+    Options,
+    Plane,
+    dot,
+    leg,
+    look,
+    moved,
+    newton,
+    on_surface,
+    search_all,
+    solve_reference,
+)
+
+_NEARBY_STEPS = 6
+_SMALL_STEP = 0.003
+"""Step over the least semi-axis after which each receiver corrects its length itself."""
+
+_LEFT_OUT_M = 1e-6
+"""Largest error of a length after the correction by its second-order term [m]."""
+
+
+class Ellipsoids(NamedTuple):
+    """Ellipsoids chirp by chirp, as in `Geometry`."""
+
+    centres: Array
+    frames: Array
+    semi_axes: Array
+
+
+class Images(NamedTuple):
+    """Antennas as the body sees them over each leg, and what each echo goes over.
+
+    ``tx (leg, tx, 3)``, ``rx (leg, tx, 3, rx)`` of the receivers kept with a transmitter, and
+    ``middle (leg, tx, 3)`` of these [m]; ``out, back, part (echo,)`` int64 are the legs to and from
+    a part of the body.
+    """
+
+    tx: Array
+    rx: Array
+    middle: Array
+    out: NDArray[np.int64]
+    back: NDArray[np.int64]
+    part: NDArray[np.int64]
+
+
+class Nearby(NamedTuple):
+    """Expected specular points, in the axes of their parts [m]; they need not lie on the surface.
+
+    ``before, after (interval, line, 2, echo, 3)`` are those for the ends of the lines of
+    transmitters, at the ends of intervals; ``wanted (interval, line, echo)`` are the echoes to be
+    computed. Each chirp has an ``interval``, a ``line``, the ``fraction`` of the interval that is
+    over, and the weights ``tx_weight (chirp, 2)`` of both ends of the line.
+    """
+
+    before: NDArray[np.float32]
+    after: NDArray[np.float32]
+    wanted: NDArray[np.bool_]
+    interval: NDArray[np.int64]
+    line: NDArray[np.int64]
+    fraction: Array
+    tx_weight: Array
+
+    def take(self, echoes: slice) -> Nearby:
+        """Return the points of some of the echoes."""
+        return self._replace(
+            before=np.ascontiguousarray(self.before[..., echoes, :]),
+            after=np.ascontiguousarray(self.after[..., echoes, :]),
+            wanted=np.ascontiguousarray(self.wanted[..., echoes]),
+        )
+
+    def places(self) -> Array:
+        """Return the points of each chirp, (chirp, echo, 3)."""
+        before, after = (
+            np.einsum("cs,cs...->c...", self.tx_weight, at[self.interval, self.line])
+            for at in (self.before, self.after)
+        )
+        return np.asarray(before + self.fraction[:, None, None] * (after - before), np.float64)
+
+
+@inlined()
+def _to_part(vector, centre, frame):
+    """A place in the axes of a part."""
+    x, y, z = vector[0] - centre[0], vector[1] - centre[1], vector[2] - centre[2]
+    return (
+        frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z,
+        frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z,
+        frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z,
+    )
+
+
+@inlined()
+def _to_world(vector, frame):
+    """A direction of a part's axes in those of the world."""
+    x, y, z = vector
+    return (
+        frame[0, 0] * x + frame[0, 1] * y + frame[0, 2] * z,
+        frame[1, 0] * x + frame[1, 1] * y + frame[1, 2] * z,
+        frame[2, 0] * x + frame[2, 1] * y + frame[2, 2] * z,
+    )
+
+
+@inlined()
+def _settle(tx, rx, axes, start):
+    """Newton's steps from near the specular point, all in the part's axes.
+
+    Whether they settled on the side that Tx sees, the point, its tangent plane, and the leg to Tx.
+    """
+    inverse_squares = (1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2)
+    least = min(axes[0], min(axes[1], axes[2]))
+    x, y, z = on_surface(start[0], start[1], start[2], inverse_squares)
+    settled = False
+    for _ in range(_NEARBY_STEPS):
+        plane, out, back, step = look(x, y, z, tx, rx, inverse_squares)
+        size = math.sqrt(step.e * step.e + step.f * step.f)
+        if not (out.facing + back.facing > 0 and step.determinant > 0 and size < 10 * least):
+            break
+        settled = size < _SMALL_STEP * least
+        if settled:
+            break
+        x, y, z = moved(x, y, z, plane, step, inverse_squares)
+    return settled and out.facing > 0, (x, y, z), plane, out
+
+
+@inlined(fastmath={"contract"})
+def _correct(rx, point, plane, out, least, room):
+    """Lengths and returns for receivers ``rx (3, rx)`` beside the one whose specular point this is.
+
+    The path is stationary there: its second-order term, -1/2 g H^-1 g with the slope g on the
+    tangent plane, leaves an error of third order. ``room (4, rx)``: lengths and returns first.
+    Whether all receivers see the point and are near enough.
+    """
+    # Receivers in vector lanes, so without branches.
+    for i in range(rx.shape[1]):
+        back = leg(rx[0, i] - point[0], rx[1, i] - point[1], rx[2, i] - point[2], plane)
+        step = newton(plane, out, back)
+        room[0, i] = out.distance + back.distance - step.drop
+        ranges = out.distance * back.distance
+        room[1, i] = ROOT_PI * (out.facing + back.facing) / (math.sqrt(step.determinant) * ranges)
+        # What is left out is about a third of twice this drop, times the step over the radius of
+        # curvature.
+        room[2, i] = 4 * step.drop * step.drop * (step.e * step.e + step.f * step.f)
+        room[3, i] = min(back.facing, step.determinant)
+    good = True
+    for i in range(rx.shape[1]):
+        good &= room[3, i] > 0 and room[2, i] < (3 * _LEFT_OUT_M * least) ** 2
+    return good
+
+
+@compiled(parallel=True)
+def nearby_echoes(images, tx_index, ellipsoids, near, length, amplitude):
+    """Lengths and returns of echoes, by one or two steps from near their specular points.
+
+    Parameters
+    ----------
+    images : Images
+        Images of the antennas, and the legs and part of each echo.
+    tx_index : (chirp,) int64
+        Transmitter of each chirp.
+    ellipsoids : Ellipsoids
+        Parts of the body.
+    near : Nearby
+        Expected specular points. Echoes that are not wanted get the path over the part's centre and
+        no return.
+    length, amplitude : (chirp, rx, echo) float64
+        Filled: path lengths [m], and the returns of a perfect conductor over R1 R2 without regard
+        to polarisation [m].
+
+    Returns
+    -------
+    int
+        Number of echoes, over all chirps, that had to be searched for as by `solve`: where the
+        steps do not settle on the side that both antennas see, or lengths may be off by 1 um. That
+        is near forward scattering, where a small step of an antenna moves the specular point far.
+    """
+    # Unpacked here, as in `solve`.
+    images_tx, images_rx, images_middle, out_leg, back_leg, part_of = images
+    centres, frames, semi_axes = ellipsoids
+    befores, afters, wanted, intervals, lines, fractions, tx_weights = near
+    chirps, receivers, echoes = length.shape
+    searched = 0
+    for chirp in prange(chirps):
+        room, one, guess, source = np.empty((6, receivers)), np.empty(5), np.empty(3), np.empty(3)
+        local_r, up = np.empty((3, receivers)), np.zeros(3)
+        transmitter, which, line = tx_index[chirp], intervals[chirp], lines[chirp]
+        fraction, ends = fractions[chirp], tx_weights[chirp]
+        for echo in range(echoes):
+            part = part_of[echo]
+            axes, frame = semi_axes[part], frames[chirp, part]
+            centre = centres[chirp, part]
+            rx = images_rx[back_leg[echo], transmitter]
+            tx = _to_part(images_tx[out_leg[echo], transmitter], centre, frame)
+            middle = _to_part(images_middle[back_leg[echo], transmitter], centre, frame)
+            if not wanted[which, line, echo]:
+                over_centre = math.sqrt(dot(tx, tx)) + math.sqrt(dot(middle, middle))
+                for i in range(receivers):
+                    length[chirp, i, echo], amplitude[chirp, i, echo] = over_centre, 0.0
+                continue
+            # Interpolate the expected point over the interval and along the line of transmitters.
+            for k in range(3):
+                guess[k] = 0.0
+                for end in range(2):
+                    first, last = (
+                        befores[which, line, end, echo, k],
+                        afters[which, line, end, echo, k],
+                    )
+                    guess[k] += ends[end] * ((1 - fraction) * first + fraction * last)
+            # Find the point for the middle of the receivers, and correct it for each of them.
+            good, point, plane, out = _settle(tx, middle, axes, guess)
+            place = _to_world(point, frame)
+            place = (place[0] + centre[0], place[1] + centre[1], place[2] + centre[2])
+            turned = Plane(
+                _to_world(plane.normal, frame),
+                _to_world(plane.e, frame),
+                _to_world(plane.f, frame),
+                plane.curvature,
+            )
+            least = min(axes[0], min(axes[1], axes[2]))
+            good &= _correct(rx, place, turned, out, least, room)
+            if not good:
+                # Search for each receiver, from cold.
+                searched += 1
+                for k in range(3):
+                    source[k], guess[k] = tx[k], math.nan
+                for i in range(receivers):
+                    antenna = _to_part((rx[0, i], rx[1, i], rx[2, i]), centre, frame)
+                    local_r[0, i], local_r[1, i], local_r[2, i] = antenna
+                options = Options(False, False, True)
+                search_all(source, local_r, axes, up, options, guess, one, room)
+            for i in range(receivers):
+                length[chirp, i, echo], amplitude[chirp, i, echo] = room[0, i], room[1, i]
+    return searched
+
+
+def nearby_echoes_reference(images, tx_index, ellipsoids):
+    """Lengths and returns of `nearby_echoes`, all of them wanted, in plain NumPy."""
+    found = []
+    centres, frames, axes = ellipsoids
+    for out, back, part in zip(images.out, images.back, images.part, strict=True):
+        antennas = images.tx[out, tx_index], np.swapaxes(images.rx[back, tx_index], 1, 2)
+        found.append((*antennas, centres[:, [part]], frames[:, [part]], axes[[part]]))
+    results = [solve_reference(Geometry(*at)) for at in found]
+    return tuple(np.concatenate([result[i] for result in results], axis=2) for i in range(2))

@@ -1,0 +1,393 @@
+"""Specular points of ellipsoids in the near field, by Newton's method from a starting point.
+
+In the ellipsoid's own axes the specular point makes the path |T - p| + |R - p| over the surface
+stationary (least, for it faces both). Newton's method on the tangent plane finds it, for the matrix
+that it needs,
+
+    H = sum over T, R of (I - s s^T) / R + (s_T + s_R).n S,     S the shape operator,
+
+is the one whose determinant gives the return by stationary phase:
+
+    |F| = 2 sqrt(pi) cos(i) / sqrt(det H),    divided by R1 R2 for the spreading of both legs.
+
+The matrix holds the curvature of both wavefronts, so that the near field is exact to this order of
+optics. Source: Born and Wolf, *Principles of Optics*, appendix III (stationary phase of double
+integrals). Everything is float64.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined
+
+Array = NDArray[np.float64]
+
+_MAX_STEPS = 60
+_STEP_TOLERANCE = 1e-7
+"""Last step over the least semi-axis. It leaves 1e-7 in amplitude, nothing in length."""
+
+_LANES, _LANE_STEPS = 8, 3
+ROOT_PI = math.sqrt(math.pi)
+
+
+class Geometry(NamedTuple):
+    """Antennas and ellipsoids chirp by chirp, float64, world [m].
+
+    ``tx (chirp, 3)``, ``rx (chirp, rx, 3)``, ``centres (chirp, part, 3)``, ``frames (chirp, part,
+    3, 3)`` whose columns are the directions of the semi-axes, ``semi_axes (part, 3)``.
+    """
+
+    tx: Array
+    rx: Array
+    centres: Array
+    frames: Array
+    semi_axes: Array
+
+    @classmethod
+    def of(cls, at: Any) -> Geometry:
+        """Return what has these fields as arrays that `solve` takes."""
+        return cls(*(np.ascontiguousarray(getattr(at, name), np.float64) for name in cls._fields))
+
+
+class Options(NamedTuple):
+    """What an amplitude holds: co-polarisation (v, or h), and 1 / (R1 R2)."""
+
+    polarized: bool
+    horizontal: bool
+    spreading: bool
+
+
+class Plane(NamedTuple):
+    """Unit normal and two tangents at a point; ee, ff and ef of the shape operator."""
+
+    normal: tuple[float, float, float]
+    e: tuple[float, float, float]
+    f: tuple[float, float, float]
+    curvature: tuple[float, float, float]
+
+
+class Leg(NamedTuple):
+    """Way from a point to an antenna: slopes along the tangents; ee, ff, ef of (I - s s^T) / R."""
+
+    distance: float
+    direction: tuple[float, float, float]
+    slope: tuple[float, float]
+    facing: float
+    hessian: tuple[float, float, float]
+
+
+class Step(NamedTuple):
+    """Newton's step along both tangents, what it takes off the path, and det H."""
+
+    e: float
+    f: float
+    drop: float
+    determinant: float
+
+
+@inlined(fastmath={"contract"})
+def dot(a, b):
+    """Product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined(fastmath={"contract"})
+def _tangent_plane(x, y, z, inverse_squares):
+    """Tangent plane of an ellipsoid at a point, in its own axes."""
+    ia, ib, ic = inverse_squares
+    n0, n1, n2 = x * ia, y * ib, z * ic
+    flat = 1 / math.sqrt(n0 * n0 + n1 * n1 + n2 * n2)
+    n0, n1, n2 = n0 * flat, n1 * flat, n2 * flat
+    # Orthonormal tangents that never degenerate (Duff et al., 2017).
+    sign = math.copysign(1.0, n2)
+    u = -1 / (sign + n2)
+    v = n0 * n1 * u
+    e0, e1, e2 = 1 + sign * n0 * n0 * u, sign * v, -sign * n0
+    f0, f1, f2 = v, sign + n1 * n1 * u, -n1
+    ia, ib, ic = ia * flat, ib * flat, ic * flat
+    ee = e0 * e0 * ia + e1 * e1 * ib + e2 * e2 * ic
+    ff = f0 * f0 * ia + f1 * f1 * ib + f2 * f2 * ic
+    ef = e0 * f0 * ia + e1 * f1 * ib + e2 * f2 * ic
+    return Plane((n0, n1, n2), (e0, e1, e2), (f0, f1, f2), (ee, ff, ef))
+
+
+@inlined(fastmath={"contract"})
+def leg(x, y, z, plane):
+    """The leg along a vector from a point on the plane to an antenna."""
+    distance = math.sqrt(x * x + y * y + z * z)
+    near = 1 / distance
+    direction = (x * near, y * near, z * near)
+    e, f = dot(direction, plane.e), dot(direction, plane.f)
+    hessian = ((1 - e * e) * near, (1 - f * f) * near, -e * f * near)
+    return Leg(distance, direction, (e, f), dot(direction, plane.normal), hessian)
+
+
+@inlined(fastmath={"contract"})
+def newton(plane, out, back):
+    """One step toward where both slopes cancel."""
+    facing, (ee, ff, ef) = out.facing + back.facing, plane.curvature
+    h_ee = out.hessian[0] + back.hessian[0] + facing * ee
+    h_ff = out.hessian[1] + back.hessian[1] + facing * ff
+    h_ef = out.hessian[2] + back.hessian[2] + facing * ef
+    determinant = h_ee * h_ff - h_ef * h_ef
+    slope_e, slope_f = out.slope[0] + back.slope[0], out.slope[1] + back.slope[1]
+    e = (h_ff * slope_e - h_ef * slope_f) / determinant
+    f = (h_ee * slope_f - h_ef * slope_e) / determinant
+    return Step(e, f, 0.5 * (slope_e * e + slope_f * f), determinant)
+
+
+@inlined(fastmath={"contract"})
+def look(x, y, z, tx, rx, inverse_squares):
+    """Plane, both legs and the step from there at a point of the surface, all in its axes."""
+    plane = _tangent_plane(x, y, z, inverse_squares)
+    out = leg(tx[0] - x, tx[1] - y, tx[2] - z, plane)
+    back = leg(rx[0] - x, rx[1] - y, rx[2] - z, plane)
+    return plane, out, back, newton(plane, out, back)
+
+
+@inlined(fastmath={"contract"})
+def moved(x, y, z, plane, step, inverse_squares):
+    """The point after a step, brought back to the surface."""
+    x += step.e * plane.e[0] + step.f * plane.f[0]
+    y += step.e * plane.e[1] + step.f * plane.f[1]
+    z += step.e * plane.e[2] + step.f * plane.f[2]
+    return on_surface(x, y, z, inverse_squares)
+
+
+@inlined(fastmath={"contract"})
+def on_surface(x, y, z, inverse_squares):
+    """Bring a point to the surface, along the line from the centre."""
+    ia, ib, ic = inverse_squares
+    scale = 1 / math.sqrt(x * x * ia + y * y * ib + z * z * ic)
+    return x * scale, y * scale, z * scale
+
+
+@inlined(fastmath={"contract"})
+def _copolar(t, r, n, up, horizontal):
+    """Co-polar fraction of E_r = 2 (n.E) n - E_i; 1 for ``up`` of no length.
+
+    Each polarisation is across its own line of sight.
+    """
+    u0, u1, u2 = up[0], up[1], up[2]
+    along_t, along_r = dot(up, t), dot(up, r)
+    p0 = u1 * t[2] - u2 * t[1] if horizontal else u0 - along_t * t[0]
+    p1 = u2 * t[0] - u0 * t[2] if horizontal else u1 - along_t * t[1]
+    p2 = u0 * t[1] - u1 * t[0] if horizontal else u2 - along_t * t[2]
+    s0 = u1 * r[2] - u2 * r[1] if horizontal else u0 - along_r * r[0]
+    s1 = u2 * r[0] - u0 * r[2] if horizontal else u1 - along_r * r[1]
+    s2 = u0 * r[1] - u1 * r[0] if horizontal else u2 - along_r * r[2]
+    p, s = (p0, p1, p2), (s0, s1, s2)
+    size = math.sqrt(dot(p, p) * dot(s, s))
+    return (dot(p, s) - 2 * dot(p, n) * dot(s, n)) / size if size > 1e-12 else 1.0
+
+
+@inlined(fastmath={"contract"})
+def _amplitude(plane, out, back, step, up, options):
+    """Return by stationary phase."""
+    copolar = _copolar(out.direction, back.direction, plane.normal, up, options.horizontal)
+    facing, ranges = out.facing + back.facing, out.distance * back.distance
+    # A ray that only grazes has no reflection of this order; the matrix is singular there, or
+    # worse.
+    there = facing > 0 and step.determinant > 0
+    value = ROOT_PI * facing / math.sqrt(step.determinant) * copolar if there else 0.0
+    return value / ranges if options.spreading else value
+
+
+@inlined()
+def _search(tx, rx, axes, up, options, start, out):
+    """Find the specular point of one Tx, one Rx and one ellipsoid, all in the ellipsoid's axes.
+
+    ``start`` is a first guess on the surface, or NaN for none; one that faces away is not used.
+    ``out``: length, amplitude, and the point's x, y, z.
+    """
+    inverse_squares = (1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2)
+    ia, ib, ic = inverse_squares
+    x, y, z = start[0], start[1], start[2]
+    lit = min(
+        x * ia * (tx[0] - x) + y * ib * (tx[1] - y) + z * ic * (tx[2] - z),
+        x * ia * (rx[0] - x) + y * ib * (rx[1] - y) + z * ic * (rx[2] - z),
+    )
+    if not lit > 0:  # NaN too
+        # From cold: stretched to the unit sphere, the point below where the line from Tx to Rx
+        # comes nearest. Both see it, and so they see a specular point; where the line goes through
+        # the body there is none.
+        t0, t1, t2 = tx[0] / axes[0], tx[1] / axes[1], tx[2] / axes[2]
+        r0, r1, r2 = rx[0] / axes[0] - t0, rx[1] / axes[1] - t1, rx[2] / axes[2] - t2
+        span = r0 * r0 + r1 * r1 + r2 * r2
+        along = min(1.0, max(0.0, -(t0 * r0 + t1 * r1 + t2 * r2) / span)) if span > 0 else 0.0
+        x, y, z = t0 + along * r0, t1 + along * r1, t2 + along * r2
+        inside = x * x + y * y + z * z <= 1
+        x, y, z = x * axes[0], y * axes[1], z * axes[2]
+        if inside:
+            out[0] = math.sqrt((rx[0] - tx[0]) ** 2 + (rx[1] - tx[1]) ** 2 + (rx[2] - tx[2]) ** 2)
+            out[1], out[2], out[3], out[4] = 0.0, x, y, z
+            return
+    x, y, z = on_surface(x, y, z, inverse_squares)
+    old_x, old_y, old_z, best = x, y, z, math.inf
+    tolerance = (_STEP_TOLERANCE * min(axes[0], min(axes[1], axes[2]))) ** 2
+    for _ in range(_MAX_STEPS):
+        plane, there, back, step = look(x, y, z, tx, rx, inverse_squares)
+        length = there.distance + back.distance
+        if length > best * (1 + 4e-16) or not there.facing + back.facing > 0:
+            # The step went past the minimum (a needle's tip seen from near) or round to the dark
+            # side, where a flat body seen from near has a minimum too: half of it does not.
+            x, y, z = 0.5 * (x + old_x), 0.5 * (y + old_y), 0.5 * (z + old_z)
+            x, y, z = on_surface(x, y, z, inverse_squares)
+        else:
+            best = length
+            if step.e * step.e + step.f * step.f < tolerance:
+                break
+            old_x, old_y, old_z = x, y, z
+            x, y, z = moved(x, y, z, plane, step, inverse_squares)
+    out[0] = length - step.drop
+    out[1] = _amplitude(plane, there, back, step, up, options)
+    out[2], out[3], out[4] = x, y, z
+
+
+@inlined(fastmath={"contract"})
+def _in_lanes(tx, rx, axes, up, options, start, out):
+    """Search for up to `_LANES` receivers ``rx (3, rx)`` side by side, from near all their points.
+
+    ``out (6, rx)``: length, amplitude, the point's x, y, z, and a number that is positive where the
+    search has settled on the side that both antennas see. In so few steps it may not have.
+    """
+    inverse_squares = (1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2)
+    tolerance = (_STEP_TOLERANCE * min(axes[0], min(axes[1], axes[2]))) ** 2
+    source, above = (tx[0], tx[1], tx[2]), (up[0], up[1], up[2])
+    # In one array of a known size: of many the compiler would have to fear that they overlap.
+    lanes = np.empty((9, _LANES))
+    for i in range(_LANES):
+        receiver = min(i, rx.shape[1] - 1)
+        for k in range(3):
+            lanes[k, i], lanes[3 + k, i] = start[k], rx[k, receiver]
+    for _ in range(_LANE_STEPS):
+        for i in range(_LANES):
+            x, y, z = lanes[0, i], lanes[1, i], lanes[2, i]
+            antenna = (lanes[3, i], lanes[4, i], lanes[5, i])
+            plane, _, _, step = look(x, y, z, source, antenna, inverse_squares)
+            x, y, z = moved(x, y, z, plane, step, inverse_squares)
+            lanes[0, i], lanes[1, i], lanes[2, i] = x, y, z
+    for i in range(_LANES):
+        x, y, z = lanes[0, i], lanes[1, i], lanes[2, i]
+        antenna = (lanes[3, i], lanes[4, i], lanes[5, i])
+        plane, there, back, step = look(x, y, z, source, antenna, inverse_squares)
+        lanes[6, i] = there.distance + back.distance - step.drop
+        lanes[7, i] = _amplitude(plane, there, back, step, above, options)
+        settled = tolerance - (step.e * step.e + step.f * step.f)
+        lanes[8, i] = min(min(min(there.facing, back.facing), step.determinant), settled)
+    for i in range(rx.shape[1]):
+        out[0, i], out[1, i], out[5, i] = lanes[6, i], lanes[7, i], lanes[8, i]
+        out[2, i], out[3, i], out[4, i] = lanes[0, i], lanes[1, i], lanes[2, i]
+
+
+@inlined()
+def search_all(tx, rx, axes, up, options, guess, one, out):
+    """Search for all receivers ``rx (3, rx)`` from one guess, or NaN; ``out`` as in `_in_lanes`."""
+    receivers = rx.shape[1]
+    if math.isnan(guess[0]):
+        # From cold: the others begin where the first has it.
+        _search(tx, rx[:, 0], axes, up, options, guess, one)
+        # One by one: to assign a slice takes seconds to compile, for the text of an error.
+        for i in range(3):
+            guess[i] = one[2 + i]
+    for first in range(0, receivers, _LANES):
+        some = slice(first, min(first + _LANES, receivers))
+        _in_lanes(tx, rx[:, some], axes, up, options, guess, out[:, some])
+    for receiver in range(receivers):
+        if not out[5, receiver] > 0:
+            _search(tx, rx[:, receiver], axes, up, options, guess, one)
+            for i in range(5):
+                out[i, receiver] = one[i]
+        # Neighbouring receivers have neighbouring specular points.
+        guess[0], guess[1], guess[2] = out[2, receiver], out[3, receiver], out[4, receiver]
+
+
+@compiled()
+def solve(begin, end, at, start, options, length, amplitude, point):
+    """Fill length, amplitude (chirp, rx, part) and, unless empty, point (chirp, rx, part, 3).
+
+    Parameters
+    ----------
+    begin, end : int
+        Chirps to compute.
+    at : Geometry
+        Antennas and ellipsoids.
+    start : (chirp, part, 3) float64
+        Where the search begins, in the ellipsoid's axes [m]; NaN where nothing is known.
+    options : Options
+        What amplitudes hold.
+    length, amplitude, point : float64
+        Path lengths [m], scattering lengths [m] and specular points, world [m].
+    """
+    # Unpacked here: to take an array out of a tuple counts a reference, which takes time in loops.
+    tx, rx, centres, frames, semi_axes = at
+    receivers, parts = rx.shape[1], centres.shape[1]
+    one, out, guess = np.empty(5), np.empty((6, receivers)), np.empty(3)
+    local_t, local_r, up = np.empty(3), np.empty((3, receivers)), np.empty(3)
+    for chirp in range(begin, end):
+        for part in range(parts):
+            # Antennas, and the vertical, in the axes of the part.
+            frame, centre = frames[chirp, part], centres[chirp, part]
+            for i in range(3):
+                local_t[i] = 0.0
+                local_r[i] = 0.0
+                for j in range(3):
+                    local_t[i] += frame[j, i] * (tx[chirp, j] - centre[j])
+                    for receiver in range(receivers):
+                        away = rx[chirp, receiver, j] - centre[j]
+                        local_r[i, receiver] += frame[j, i] * away
+                up[i] = frame[2, i] if options.polarized else 0.0
+                guess[i] = start[chirp, part, i]
+            search_all(local_t, local_r, semi_axes[part], up, options, guess, one, out)
+            for receiver in range(receivers):
+                length[chirp, receiver, part] = out[0, receiver]
+                amplitude[chirp, receiver, part] = out[1, receiver]
+                if point.shape[0] > 0:
+                    x, y, z = out[2, receiver], out[3, receiver], out[4, receiver]
+                    for j in range(3):
+                        point[chirp, receiver, part, j] = (
+                            centre[j] + frame[j, 0] * x + frame[j, 1] * y + frame[j, 2] * z
+                        )
+
+
+def in_part_axes(at: Geometry) -> tuple[Array, Array]:
+    """Tx and Rx in the axes of the parts, (chirp, rx, part, 3) each, in plain NumPy."""
+    away = (a - at.centres[:, None] for a in (at.tx[:, None, None], at.rx[:, :, None]))
+    tx, rx = (np.einsum("cpji,crpj->crpi", at.frames, a) for a in np.broadcast_arrays(*away))
+    return tx, rx
+
+
+def bisected(at: Geometry) -> tuple[Array, list[Array], list[Array]]:
+    """Points whose normals bisect both ways, these as unit vectors, and their lengths.
+
+    All in the axes of the parts, by iteration, for antennas far beside the radii of curvature.
+    """
+    antennas, point = in_part_axes(at), np.zeros(3)
+    for _ in range(60):
+        ranges = [np.linalg.norm(a - point, axis=-1)[..., None] for a in antennas]
+        ways = [(a - point) / size for a, size in zip(antennas, ranges, strict=True)]
+        scale = np.linalg.norm(at.semi_axes * sum(ways), axis=-1, keepdims=True)
+        point = at.semi_axes**2 * sum(ways) / scale
+    return point, ways, ranges
+
+
+def solve_reference(at: Geometry) -> tuple[Array, Array, Array]:
+    """Length, return over R1 R2 without polarisation, and point of `solve`, in plain NumPy."""
+    point, ways, ranges = bisected(at)
+    gradient = point / at.semi_axes**2
+    size = np.linalg.norm(gradient, axis=-1, keepdims=True)
+    n, eye = gradient / size, np.eye(3)
+    facing = np.sum(sum(ways) * n, axis=-1)
+    h = (facing / size[..., 0])[..., None, None] * eye / at.semi_axes[:, None] ** 2
+    for way, distance in zip(ways, ranges, strict=True):
+        h = h + (eye - way[..., None] * way[..., None, :]) / distance[..., None]
+    # On the plane across n the determinant is that of the whole, times n.H^-1 n.
+    plane = np.linalg.det(h) * np.sum(n * np.linalg.solve(h, n[..., None])[..., 0], axis=-1)
+    value = ROOT_PI * facing / np.sqrt(plane) / (ranges[0] * ranges[1])[..., 0]
+    world = at.centres[:, None] + np.einsum("cpij,crpj->crpi", at.frames, point)
+    return (ranges[0] + ranges[1])[..., 0], value, world
