@@ -1,5 +1,6 @@
 """The radar and every limit that follows from its fields (the paper's Tables 1 and 2)."""
 
-from rtradar.radar.radar import PRESETS, Radar, register_radar
+from rtradar.radar.presets import PRESETS, register_radar
+from rtradar.radar.radar import Radar
 
 __all__ = ["PRESETS", "Radar", "register_radar"]

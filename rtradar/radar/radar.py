@@ -1,9 +1,4 @@
-"""The radar: its fields, how it is loaded, and every quantity that follows from the fields.
-
-A new radar with a name is a function that returns a `Radar`, registered by `register_radar`, by an
-entry point of the group ``rtradar.radars``, or in `PRESETS`; a TOML file with the fields of `Radar`
-as its keys needs no code.
-"""
+"""The radar: its fields, and every quantity that follows from them."""
 
 from __future__ import annotations
 
@@ -21,21 +16,6 @@ from rtradar.antenna import Antenna
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_rules, checked_fields
-from rtradar.system.checks import printable
-from rtradar.system.registry import Registry
-from rtradar.system.toml_tables import check_keys, read_toml
-
-PRESETS = Registry(
-    "rtradar.radars",
-    "radar",
-    {
-        "paper-12ghz": "rtradar.radar.radar:paper_12ghz",
-        "paper-77ghz": "rtradar.radar.radar:paper_77ghz",
-    },
-)
-"""Radars that have a name: each is made by a function without arguments."""
-
-register_radar = PRESETS.register
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,10 +51,9 @@ class Radar:
         Length of one frame, the coherent processing interval, and the step between frames [s].
     multiplexing : {"tdm", "fdm", "ddm"}
         What tells the Tx apart: their time (TDM), their carrier (FDM: the sweep of Tx k lies
-        ``tx_offset_hz[k]`` higher, and the receiver separates the bands), or their Doppler (DDM,
-        Doppler division: the IF of Tx k is multiplied by exp(j 2 pi k p / D) at chirp p, which
-        shifts it up by k of the D bands of the Doppler axis; some bands stay empty and show where
-        the axis begins).
+        ``tx_offset_hz[k]`` higher), or their Doppler (DDM: the IF of Tx k is multiplied by exp(j 2
+        pi k p / D) at chirp p, which shifts it up by k of the D bands of the Doppler axis; some
+        bands stay empty and show where the axis begins).
     carrier_step_hz : float, optional
         Spacing of the carriers of FDM [Hz]; by default the sample rate, the least that keeps the
         bands apart.
@@ -85,23 +64,21 @@ class Radar:
     transmit_power_dbm : float, optional
         Power of one Tx at its antenna [dBm]. With it powers are known in watts.
     noise_figure_db : float, optional
-        Noise figure of the receiver, from the antenna to the IF samples [dB]. With the transmit
-        power it says how strong the noise is.
+        Noise figure of the receiver, from the antenna to the IF samples [dB].
     noise_temperature_k : float
-        Noise temperature of the scene that the antennas see [K]. The noise of the receiver itself
-        follows from its noise figure, which is defined for a source at 290 K, and does not change
-        with it.
+        Noise temperature of the scene that the antennas see [K]; that of the receiver itself
+        follows from its noise figure.
     tx_antenna, rx_antenna : Antenna, optional
         Elements of each Tx and Rx, a table in TOML; isotropic by default.
 
     Raises
     ------
     InputError
-        Where a value has no physical meaning; the message names the field and what is allowed.
+        Where a value has no physical meaning.
 
     Notes
     -----
-    Derived quantities; each is a property of the radar, documented below.
+    Derived quantities, which are properties; units are in their names.
 
     - waveform: `centre_frequency_hz`, `wavelength_m`, `start_wavelength_m`, `slope_hz_per_s`,
       `sample_rate_hz`, `occupied_bandwidth_hz`, `receiver_rate_hz`
@@ -111,7 +88,7 @@ class Radar:
     - limits: `range_bin_m`, `max_range_m`, `velocity_bin_mps`, `max_velocity_mps`,
       `angle_resolution_deg`, `max_angle_deg`
     - axes: `range_m`; `velocity_mps`, `chirp_times` [s] and `window_times` [s] are methods
-    - powers: `watts_per_m2` [W/m^2] and `noise_power_w`
+    - powers: `watts_per_m2` and `noise_power_w`
     """
 
     name: str = "custom"
@@ -147,12 +124,12 @@ class Radar:
 
     @classmethod
     def preset(cls, name: str) -> Radar:
-        """Make the preset of a name; `PRESETS` lists the names.
+        """Make the preset of a name.
 
         Parameters
         ----------
         name : str
-            One of `PRESETS`.
+            Name among `rtradar.radar.PRESETS`.
 
         Returns
         -------
@@ -165,12 +142,9 @@ class Radar:
         ExtensionError
             Where the preset comes from another package, and fails.
         """
-        make = PRESETS.find(name, instead=", or the path of a TOML file")
-        with PRESETS.guarded(name):
-            radar = make()
-        if not isinstance(radar, cls):
-            raise PRESETS.refuse(name, f"gave a {type(radar).__name__}, not a Radar")
-        return dataclasses.replace(radar, name=name)
+        from rtradar.radar.presets import make_preset  # which needs this class
+
+        return make_preset(name)
 
     @classmethod
     def load(cls, source: str | Path) -> Radar:
@@ -190,16 +164,9 @@ class Radar:
         InputError
             Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
-        path = Path(source)
-        if str(source) in PRESETS or path.suffix != ".toml":
-            return cls.preset(str(source))
-        table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
-        keys = tuple(sorted(field.name for field in dataclasses.fields(cls)))
-        try:
-            check_keys("", table, (), keys)
-            return cls(**{"name": printable(path.stem), **table})
-        except InputError as error:
-            raise InputError(f"radar file '{path}': {error}") from None
+        from rtradar.radar.presets import load_radar  # which needs this class
+
+        return load_radar(source)
 
     # -- waveform and range (derived) --------------------------------------------------------------
 
@@ -505,10 +472,9 @@ class Radar:
     def noise_power_w(self) -> float:
         """Noise power of one complex IF sample, K (T + 290 K (F - 1)) B [W].
 
-        T is the `noise_temperature_k` of what the antennas see, F the noise factor and B the sample
-        rate. Noise factors are defined for a source at 290 K, so the receiver itself adds the noise
-        of 290 K (F - 1), whatever the antennas see. An `InputError` is raised where the radar does
-        not state its noise figure.
+        T is the `noise_temperature_k` of what the antennas see, F the noise factor, which is
+        defined for a source at 290 K, and B the sample rate. An `InputError` is raised where the
+        radar does not state its noise figure.
         """
         if self.noise_figure_db is None:
             raise InputError(
@@ -518,13 +484,3 @@ class Radar:
         receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
         noise_k = self.noise_temperature_k + receiver_k
         return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
-
-
-def paper_12ghz() -> Radar:
-    """Make the radar of the paper's Table 1."""
-    return Radar(start_frequency_hz=12e9, chirp_duration_s=62.5e-6)
-
-
-def paper_77ghz() -> Radar:
-    """Make the paper's radar at 77 GHz, whose chirps are five times shorter."""
-    return Radar(start_frequency_hz=77e9, chirp_duration_s=12.5e-6)
