@@ -97,6 +97,8 @@ def test_the_summary_says_what_was_done(walked: Path) -> None:
         summary["stages"]
     )
     assert summary["variant"] in ("llvm", "scalar", "cuda")
+    assert summary["occlusion"] == "mitsuba"
+    assert summary["rays_traced"] > 0
     for key in ("warmup_s", "peak_memory_mb", "limits", "versions"):
         assert key in summary
 

@@ -189,6 +189,117 @@ def _interpolated() -> tuple[Call, Call]:
 # -- tracing ---------------------------------------------------------------------------------------
 
 
+@kernel_case("scatter.near_rays.near_rays", "rays of 3000 lines near 21 parts, counted by line", 0)
+def _near_rays() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.near_rays import near_lines_reference, near_rays
+
+    rng, parts = np.random.default_rng(0), 21
+    origins = np.array([-4.0, 0, 0]) + rng.uniform(-0.2, 0.2, (3000, 3))
+    lines = origins, rng.uniform(-0.9, 0.9, (3000, 3)), rng.integers(0, parts, 3000)
+    frames = np.linalg.qr(rng.normal(size=(parts, 3, 3)))[0]
+    body = rng.uniform(-0.9, 0.9, (parts, 3)), frames, rng.uniform(0.05, 0.3, (parts, 3))
+    whose = np.arange(parts), np.zeros(parts, dtype=np.int64), body[0][None], body[1][None]
+
+    def count() -> Any:
+        return np.bincount(near_rays(*lines, *whose, body[2])[1], minlength=3000)
+
+    return count, lambda: near_lines_reference(*lines, *body).sum(axis=1)
+
+
+_WAVENUMBER = 300.0
+
+
+def _zones(zones: int) -> Any:
+    """Zones of a monostatic radar 4 m from ellipsoids: maps, and the arguments of `lay_zones`."""
+    from rtradar.kernels.scatter.fresnel_zones import ZoneMaps, lay_zones
+
+    rng = np.random.default_rng(0)
+    axes, centres = rng.uniform(0.05, 0.2, (zones, 3)), rng.uniform(-0.5, 0.5, (zones, 3))
+    frames = np.linalg.qr(rng.normal(size=(zones, 3, 3)))[0]
+    u = rng.normal(size=(zones, 3))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    points = centres + np.einsum("zij,zj->zi", frames, axes * u)
+    normals = np.einsum("zij,zj->zi", frames, u / axes)
+    radars = points + 4 * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    given, maps = (radars, radars, centres, frames, axes, points), ZoneMaps.empty(zones)
+    lay_zones(*given, np.full(zones, _WAVENUMBER), maps)
+    return maps, given
+
+
+@kernel_case("scatter.fresnel_zones.lay_zones", "tangents of 200 Fresnel zones", 1e-9)
+def _lay_zones() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.fresnel_zones import lay_zones, lay_zones_reference
+
+    maps, given = _zones(200)
+
+    def tangents() -> Any:
+        lay_zones(*given, np.full(200, _WAVENUMBER), maps)
+        return np.einsum("zkj,zij->zki", maps.along, maps.stretch)
+
+    def reference() -> Any:
+        lay: Any = lay_zones_reference
+        return np.stack([lay(*zone, _WAVENUMBER) for zone in zip(*given, strict=True)])
+
+    return tangents, reference
+
+
+@kernel_case(
+    "scatter.fresnel_zones.zone_points", "10 000 points on ellipsoids, along great circles"
+)
+def _zone_points() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.fresnel_zones import zone_points, zone_points_reference
+
+    rng, (maps, _) = np.random.default_rng(0), _zones(200)
+    given = maps, rng.integers(0, 200, 10_000), *rng.uniform(-7, 7, (2, 10_000))
+    call = filled(zone_points, *given, out=(np.empty((10_000, 3)),))
+    return call, lambda: zone_points_reference(*given)
+
+
+@kernel_case(
+    "scatter.fresnel_zones.open_fractions", "cells of a zone cut by an edge, counted", 0.06
+)
+def _open_fractions() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.fresnel_zones import (
+        CELLS,
+        MERIDIANS,
+        open_fractions,
+        straight_edge,
+    )
+    from rtradar.kernels.scatter.fresnel_zones import open_fractions_reference as reference
+
+    (maps, _), line = _zones(1), (np.cos(0.4), np.sin(0.4), 1.7)
+    given = maps, straight_edge(maps, line, 12)
+    call = filled(open_fractions, *given, out=(np.empty((1, 1, MERIDIANS, CELLS)),))
+    return call, lambda: reference(maps.rim[0], line)
+
+
+@kernel_case("scatter.fresnel_zones.zone_sums", "V of a zone, 3 antennas", 1e-9)
+def _zone_sums() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, zone_sums
+    from rtradar.kernels.scatter.fresnel_zones import zone_sums_reference as reference
+
+    rng, (maps, given) = np.random.default_rng(0), _zones(1)
+    antennas, pairs = given[0] + rng.normal(0, 0.1, (3, 3)), np.array([[0, 1], [2, 1]])
+    fractions = np.clip(rng.uniform(-0.5, 1.5, (3, MERIDIANS, CELLS)), 0, 1)
+    wavenumber, out = np.array([[_WAVENUMBER]]), np.empty((1, 1, 2), dtype=np.complex128)
+    rest = given[5], antennas[None], pairs, wavenumber, fractions[None]
+    call = filled(zone_sums, 0, 1, maps, *rest, out=(out,))
+    return call, lambda: reference(maps, 0, antennas, pairs, _WAVENUMBER, fractions)
+
+
+@kernel_case("scatter.fresnel_zones.blend_fractions", "fractions of 21 parts at 100 chirps, 8 Rx")
+def _blend_fractions() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.fresnel_zones import blend_fractions, blend_fractions_reference
+
+    rng = np.random.default_rng(0)
+    nodes, slopes = rng.normal(size=(2, 9, 3, 18, 21, 2)) @ [1, 1j]
+    fine, where = rng.uniform(size=21) < 0.3, np.sort(rng.uniform(0, 8, 100))
+    given = nodes, slopes, fine, where, rng.normal(size=(100, 8, 18))
+    out = np.empty((3, 100, 8, 21), dtype=np.complex128)
+    call = filled(blend_fractions, *given, np.arange(100), out=(out,))
+    return call, lambda: blend_fractions_reference(*given)
+
+
 # -- specular points and facets --------------------------------------------------------------------
 
 

@@ -35,6 +35,7 @@ from rtradar.report.view.snapshots import save_moments
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
+from rtradar.trace.rays import rays_traced
 
 
 @dataclass(frozen=True)
@@ -112,7 +113,7 @@ def simulate(
     overwrite: bool = False,
 ) -> Result:
     """Run these settings; see `run`."""
-    began = time.perf_counter()
+    began, rays_before = time.perf_counter(), rays_traced()
     keep_memory_low()
     forget_peak_memory()
     # The person is placed, and its echoes, the noise and the room's clutter are settled.
@@ -150,6 +151,7 @@ def simulate(
         summary = summary_of(
             capture, clouds, parameters, settings.seed, cost(capture, time.perf_counter() - began)
         )
+        summary["rays_traced"] = rays_traced() - rays_before
         # After the model's account, for looking at it once more is no part of the capture.
         with stages.time("view"):
             save_moments(

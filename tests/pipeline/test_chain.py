@@ -134,7 +134,9 @@ def test_noise_alone_leaves_an_empty_cloud_and_says_so(tmp_path: Path) -> None:
 def test_the_summary_is_json_that_anyone_reads(tmp_path: Path) -> None:
     result, _ = run(tmp_path / "out", snr_db=math.inf)
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == result.summary
-    assert result.summary["variant"] is None  # nothing is traced in the closed form
+    # Nothing is traced in the closed form.
+    assert result.summary["variant"] is None
+    assert (result.summary["occlusion"], result.summary["rays_traced"]) == ("none", 0)
     assert sum(result.summary["stages"].values()) < result.summary["wall_s"]
 
 

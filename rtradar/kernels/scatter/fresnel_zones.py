@@ -341,6 +341,21 @@ def open_fractions_reference(rim, line, samples=64):
     return out
 
 
+def straight_edge(maps, line, bands):
+    """Make the `Edges` of one zone and antenna along a x + b y + c = 0, blocked where negative."""
+    angle = 2j * np.pi * np.arange(MERIDIANS)[:, None] / MERIDIANS
+    corners = maps.rim[0, :, None] * np.arange(bands + 1) / bands * np.exp(angle)
+    value = line[0] * corners.real + line[1] * corners.imag + line[2]
+    found = [value < 0]
+    # Sides along meridians, and from each meridian to the next.
+    pairs = [((a[:, :-1], a[:, 1:]), (a, np.roll(a, -1, axis=0))) for a in (corners, value)]
+    for (first, last), (low, high) in zip(*pairs, strict=True):
+        rise = np.where(low == high, 1.0, low - high)
+        place = first + (last - first) * low / rise
+        found.append(np.stack([place.real, place.imag], axis=-1))
+    return Edges._make(array[None, None] for array in found)
+
+
 @inlined(fastmath={"reassoc", "contract", "nsz"})
 def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):
     """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
@@ -469,17 +484,22 @@ def zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, 
                     out[zone, f, pair] = left / max(1.0, abs(left) / _MOST)
 
 
-def zone_sums_reference(maps, zone, antennas, pairs, wavenumber, fractions):
-    """V (pair,) of one zone at one wavenumber, for ``fractions (antenna, meridian, cell)``."""
+def meridians_reference(maps, zone):
+    """Directions (meridian, 3) between the corners, and paces and rims (meridian, 1) of `_meridian`."""
     angle = (np.arange(MERIDIANS)[:, None] + 0.5) * 2 * np.pi / MERIDIANS
     step = np.cos(angle) * maps.along[zone, 0] + np.sin(angle) * maps.along[zone, 1]
     pace = np.linalg.norm(step, axis=1, keepdims=True)
     ahead, aside = maps.caps[zone] @ maps.pole[zone], step / pace @ maps.caps[zone].T
     ends = np.arctan2(aside, ahead) + np.arccos(np.minimum(1, 1 / np.hypot(ahead, aside)))
-    rim = np.minimum(RIM, ends.min(axis=1, keepdims=True) / pace)
+    return step / pace, pace, np.minimum(RIM, ends.min(axis=1, keepdims=True) / pace)
+
+
+def zone_sums_reference(maps, zone, antennas, pairs, wavenumber, fractions):
+    """V (pair,) of one zone at one wavenumber, for ``fractions (antenna, meridian, cell)``."""
+    step, pace, rim = meridians_reference(maps, zone)
     part = (np.arange(CELLS) + 0.5) / CELLS
     turn = (part * rim * pace)[..., None]
-    u = np.cos(turn) * maps.pole[zone] + np.sin(turn) * (step / pace)[:, None]
+    u = np.cos(turn) * maps.pole[zone] + np.sin(turn) * step[:, None]
     window = np.cos(np.pi / 2 * np.maximum(part - _TAPER, 0) / (1 - _TAPER)) ** 2
     legs = antennas[:, None, None] - maps.centre[zone] - u @ maps.stretch[zone].T
     length = np.linalg.norm(legs, axis=-1)

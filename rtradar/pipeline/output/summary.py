@@ -58,6 +58,7 @@ def summary_of(
         "versions": {"python": platform.python_version(), **_versions()},
         "fidelity": parameters["fidelity"],
         "variant": capture.model.variant,
+        "occlusion": "mitsuba" if _traces(capture) else "none",
         **spent,
         "windows": len(capture.windows),
         "chirps": capture.n_chirps,
@@ -74,6 +75,11 @@ def summary_of(
         **({"modelled": capture.model.account()} if isinstance(capture.model, Accountable) else {}),
         **({"room": capture.inside.account} if capture.inside else {}),
     }
+
+
+def _traces(capture: Capture) -> bool:
+    """Whether the model asks Mitsuba, or would if a part came near a line of sight."""
+    return capture.model.variant is not None or getattr(capture.model, "traces", False)
 
 
 def plain(value: object) -> Any:
