@@ -92,13 +92,8 @@ class PointwiseLayer(_NormedLinear):
 class PooledLayer(_NormedLinear):
     """Pointwise layer and maximum over points: ``(cloud, point, input)`` to ``(cloud, output)``.
 
-    Parameters
-    ----------
-    inputs, outputs : int
-        Number of features of a point and of a cloud.
-    search : torch.dtype
-        Type in which the point of the maximum is searched during training. Predictions search in
-        the type of the points.
+    During training the point of the maximum is searched in the type ``search``; predictions search
+    in the type of the points.
     """
 
     def __init__(self, inputs: int, outputs: int, search: torch.dtype) -> None:
@@ -128,25 +123,18 @@ def _dense(inputs: int, outputs: int) -> nn.Sequential:
     return nn.Sequential(nn.Linear(inputs, outputs, bias=False), _BatchNorm(outputs), nn.ReLU())
 
 
-class TransformNet(nn.Module):
-    """T-Net: a square matrix for each cloud, initially the identity, that transforms its features.
+def _point_layers(inputs: int, search: torch.dtype) -> nn.Sequential:
+    pointwise = PointwiseLayer(inputs, 64), PointwiseLayer(64, 128)
+    return nn.Sequential(*pointwise, PooledLayer(128, _GLOBAL_FEATURES, search))
 
-    Parameters
-    ----------
-    size : int
-        Number of rows of the matrix.
-    search : torch.dtype
-        Type of the search for the maximum, see `PooledLayer`.
-    """
+
+class TransformNet(nn.Module):
+    """T-Net: a square matrix for each cloud, initially the identity, to transform its features."""
 
     def __init__(self, size: int, search: torch.dtype) -> None:
         super().__init__()
         self._size = size
-        self.points = nn.Sequential(
-            PointwiseLayer(size, 64),
-            PointwiseLayer(64, 128),
-            PooledLayer(128, _GLOBAL_FEATURES, search),
-        )
+        self.points = _point_layers(size, search)
         self.cloud = nn.Sequential(_dense(_GLOBAL_FEATURES, 512), _dense(512, 256))
         self.matrix = nn.Linear(256, size * size)
         nn.init.zeros_(self.matrix.weight)
@@ -176,11 +164,7 @@ class PointNet(nn.Module):
         self.input_transform = TransformNet(3, search) if recipe.input_transform else None
         self.feature_transform = TransformNet(64, search) if recipe.feature_transform else None
         self.low = nn.Sequential(PointwiseLayer(3, 64), PointwiseLayer(64, 64))
-        self.high = nn.Sequential(
-            PointwiseLayer(64, 64),
-            PointwiseLayer(64, 128),
-            PooledLayer(128, _GLOBAL_FEATURES, search),
-        )
+        self.high = _point_layers(64, search)
         self.classifier = nn.Sequential(
             _dense(_GLOBAL_FEATURES, 512),
             _dense(512, 256),

@@ -36,18 +36,11 @@ _ROTATION_JITTER, _ROTATION_JITTER_LIMIT = 0.02, 0.05  # those of PointNet on un
 class Variation:
     """Ranges of the physical augmentation, drawn uniformly, and of its normally distributed jitter.
 
-    Parameters
-    ----------
-    time_shift_s, range_shift_m : float
-        Largest shift in either direction [s], [m].
-    tempo : float
-        Largest relative change of tempo. Velocity is multiplied and time divided by it.
-    aspect : float
-        Largest relative loss of radial motion, as of a person who faces another direction. Range
-        and velocity shrink by the same factor.
-    jitter : (3,) float
-        Standard deviation of time [s], range [m] and velocity [m/s] of each point, about a third of
-        a cell of the maps.
+    The shifts are the largest in either direction. ``tempo`` is the largest relative change of
+    tempo; velocity is multiplied and time divided by it. ``aspect`` is the largest relative loss of
+    radial motion, as of a person who faces another direction; range and velocity shrink alike.
+    ``jitter`` is the standard deviation of time [s], range [m] and velocity [m/s] of each point,
+    about a third of a cell of the maps.
     """
 
     time_shift_s: float = 0.1
@@ -93,10 +86,9 @@ def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
         if len(points):
             random = np.random.default_rng(stream(seed, index))
             order = random.permutation(len(points))
-            filled = np.concatenate(
-                [order, random.integers(len(points), size=n_points - len(points))]
-            )
-            stacked[index] = (points - [points[:, 0].mean(), 0, 0])[filled]
+            again = random.integers(len(points), size=n_points - len(points))
+            centred = points - [points[:, 0].mean(), 0, 0]
+            stacked[index] = centred[np.concatenate([order, again])]
     return torch.from_numpy(stacked)
 
 
@@ -139,20 +131,15 @@ def _stretched(points: Tensor) -> Tensor:
     aspect = 1 - VARIATION.aspect * torch.rand(len(points))
     factor = torch.stack([1 / tempo, aspect, tempo * aspect], dim=1)[:, None]
     middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
-    return (
-        middle
-        + (points - middle) * factor
-        + torch.randn(points.shape) * torch.tensor(VARIATION.jitter)
-    )
+    jitter = torch.randn(points.shape) * torch.tensor(VARIATION.jitter)
+    return middle + (points - middle) * factor + jitter
 
 
 def _rotated(points: Tensor) -> Tensor:
     angle = math.pi * _uniform(len(points))
     cosine, sine = angle.cos()[:, None], angle.sin()[:, None]
     time, distance, velocity = points.unbind(dim=2)
-    rotated = torch.stack(
-        [cosine * time + sine * velocity, distance, cosine * velocity - sine * time], dim=2
-    )
-    return rotated + (_ROTATION_JITTER * torch.randn(points.shape)).clamp(
-        -_ROTATION_JITTER_LIMIT, _ROTATION_JITTER_LIMIT
-    )
+    time, velocity = cosine * time + sine * velocity, cosine * velocity - sine * time
+    jitter = _ROTATION_JITTER * torch.randn(points.shape)
+    limited = jitter.clamp(-_ROTATION_JITTER_LIMIT, _ROTATION_JITTER_LIMIT)
+    return torch.stack([time, distance, velocity], dim=2) + limited

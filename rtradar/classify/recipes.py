@@ -172,9 +172,8 @@ class Recipe:
         -------
         Recipe
         """
-        return dataclasses.replace(
-            self, **{name: value for name, value in fields.items() if value is not None}
-        )
+        given = {name: value for name, value in fields.items() if value is not None}
+        return dataclasses.replace(self, **given)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the fields as plain values, with the names and words of the files of studies."""

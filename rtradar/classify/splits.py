@@ -77,32 +77,28 @@ def make_splits(
     InputError
         If the scheme is unknown, there are too few groups, or a test class has no training cloud.
     """
-    moments, recordings = moments_of(clouds), recordings_of(clouds)
+    intervals, recordings = intervals_of(clouds), recordings_of(clouds)
     if scheme == "recorded":
-        splits = _synthetic_to_recorded(clouds)
+        splits = [_synthetic_to_recorded(clouds)]
     elif scheme.startswith(_ACROSS):
         values = values_of(clouds, scheme)
         parts = _folds(clouds, "recording", recordings, folds, _MAX_FOLDS[_ACROSS], seed)
         splits = [
             Split(
-                f"{value}, fold {number}", part.train[values[part.train] == value], part.test, value
+                f"{value}, {part.name}", part.train[values[part.train] == value], part.test, value
             )
             for value in np.unique(values).tolist()
-            for number, part in enumerate(parts, start=1)
+            for part in parts
         ]
     elif scheme in _MAX_FOLDS:
-        groups = (
-            moments
-            if scheme == "folds"
-            else recordings
-            if scheme == "recording"
-            else _numbered(clouds.column(scheme))
-        )
+        groups = {"folds": intervals, "recording": recordings}.get(scheme)
+        if groups is None:
+            groups = _numbered(clouds.column(scheme))
         splits = _folds(clouds, scheme, groups, folds, _MAX_FOLDS[scheme], seed)
     else:
         raise InputError(f"split '{scheme}' is unknown; give one of {', '.join(SCHEMES)}")
     for split in splits:
-        check(split, moments, clouds.labels)
+        check(split, intervals, clouds.labels)
     return splits
 
 
@@ -115,20 +111,20 @@ def values_of(clouds: Collection, scheme: str) -> NDArray[np.str_]:
     return np.array([" / ".join(str(value) for value in row) for row in zip(*columns, strict=True)])
 
 
-def moments_of(clouds: Collection) -> NDArray[np.int64]:
+def intervals_of(clouds: Collection) -> NDArray[np.int64]:
     """Number the groups of clouds of equal or overlapping intervals of a recording, (cloud,)."""
     recording = recordings_of(clouds)
     start = clouds.column("start_s").astype(np.float64)
     end = start + clouds.column("duration_s").astype(np.float64)
-    moments = np.zeros(len(clouds), dtype=np.int64)
+    intervals = np.zeros(len(clouds), dtype=np.int64)
     number, last, begun, until = -1, -1, -np.inf, -np.inf
     for index in np.lexsort((start, recording)):
         # Intervals with the same start are the same even if they have no length.
         if recording[index] != last or not (start[index] < until or start[index] == begun):
             number, last, until = number + 1, recording[index], -np.inf
         begun, until = start[index], max(until, end[index])
-        moments[index] = number
-    return moments
+        intervals[index] = number
+    return intervals
 
 
 def recordings_of(clouds: Collection) -> NDArray[np.int64]:
@@ -149,16 +145,16 @@ def recordings_of(clouds: Collection) -> NDArray[np.int64]:
     return np.asarray(connected_components(links, directed=False)[1][names], dtype=np.int64)
 
 
-def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) -> None:
+def check(split: Split, intervals: NDArray[np.int64], labels: NDArray[np.str_]) -> None:
     """Raise InputError if a side is empty, an interval is on both, or a test class is new."""
     if not len(split.train) or not len(split.test):
         side = "training" if not len(split.train) else "test"
         raise InputError(
             f"split '{split.name}' has no {side} clouds; give fewer folds, or another split"
         )
-    both = np.intersect1d(moments[split.train], moments[split.test])
+    both = np.intersect1d(intervals[split.train], intervals[split.test])
     if both.size:
-        index = split.train[np.isin(moments[split.train], both)][0]
+        index = split.train[np.isin(intervals[split.train], both)][0]
         raise InputError(
             f"split '{split.name}': {both.size} intervals are on both sides, "
             f"the first is that of cloud {index}; "
@@ -171,7 +167,7 @@ def check(split: Split, moments: NDArray[np.int64], labels: NDArray[np.str_]) ->
         )
 
 
-def _synthetic_to_recorded(clouds: Collection) -> list[Split]:
+def _synthetic_to_recorded(clouds: Collection) -> Split:
     source = _column(clouds, "source").astype(str)
     known = {name: np.flatnonzero(source == name) for name in ("synthetic", "recorded")}
     if lacking := [name for name, those in known.items() if not len(those)]:
@@ -179,7 +175,7 @@ def _synthetic_to_recorded(clouds: Collection) -> list[Split]:
             f"split 'recorded': no cloud has source '{lacking[0]}'; "
             "build a data set of synthetic and recorded motion"
         )
-    return [Split("synthetic to recorded", known["synthetic"], known["recorded"])]
+    return Split("synthetic to recorded", known["synthetic"], known["recorded"])
 
 
 def _folds(
@@ -193,10 +189,9 @@ def _folds(
     from sklearn.model_selection import StratifiedGroupKFold
 
     labels = clouds.labels
-    largest = min(len(np.unique(groups)), int(np.unique(labels, return_counts=True)[1].max()))
-    fewest = min(
-        (len(np.unique(groups[labels == label])), label) for label in np.unique(labels).tolist()
-    )
+    names, counts = np.unique(labels, return_counts=True)
+    largest = min(len(np.unique(groups)), int(counts.max()))
+    fewest = min((len(np.unique(groups[labels == name])), name) for name in names.tolist())
     if folds is not None and not 2 <= folds <= max(2, largest):
         raise InputError(
             f"--folds {folds}: split '{what}' of these clouds can have 2 to {max(2, largest)}"
@@ -210,14 +205,11 @@ def _folds(
     # scikit-learn warns about the number of clouds, but groups count, which are checked above.
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="The least populated class", category=UserWarning)
-        parts = list(
-            StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed)).split(
-                labels, labels, groups
-            )
-        )
+        maker = StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed))
+        parts = list(maker.split(labels, labels, groups))
     return [
-        Split(f"fold {number}", np.sort(train).astype(np.int64), np.sort(test).astype(np.int64))
-        for number, (train, test) in enumerate(parts, start=1)
+        Split(f"fold {number}", *(np.sort(side).astype(np.int64) for side in sides))
+        for number, sides in enumerate(parts, start=1)
     ]
 
 

@@ -96,17 +96,14 @@ def check_plan(out: Path, plan: dict[str, Any]) -> None:
     try:
         there = read_json(path)
         free = {"data"} | ({"made"} - there.keys())
-        other = next(
-            (name for name, value in plan.items() if name not in free and there.get(name) != value),
-            None,
-        )
+        others = [name for name in plan if name not in free and there.get(name) != plan[name]]
     except (OSError, ValueError, AttributeError):
         raise InputError(f"'{path}' is damaged; give another folder (--out)") from None
-    if other is not None:
-        was, now = _difference(there.get(other), plan[other])
+    if others:
+        name = others[0]
+        was, now = _difference(there.get(name), plan[name])
         raise InputError(
-            f"'{out}' holds other trainings ({other}: {was}, not {now}); "
-            "give another folder (--out)"
+            f"'{out}' holds other trainings ({name}: {was}, not {now}); give another folder (--out)"
         )
 
 
@@ -126,10 +123,9 @@ def read_plan(folder: Path) -> dict[str, Any]:
         plan = read_json(folder / PLAN)
         Recipe.from_dict(plan["recipe"])
         for name in ("data", "classes", "trainings"):
-            known = len(plan[name]) <= _MAX_NAMES and all(
-                isinstance(one, str) for one in plan[name]
-            )
-            if not known or (name != "data" and not plan[name]):
+            names = plan[name]
+            strings = len(names) <= _MAX_NAMES and all(isinstance(one, str) for one in names)
+            if not strings or (name != "data" and not names):
                 raise ValueError
         return {name: plan[name] for name in _PLAN_KEYS} | {"made": plan.get("made")}
     except OSError as error:
@@ -343,12 +339,8 @@ def classes_of(clouds: Collection) -> tuple[tuple[str, ...], NDArray[np.int64]]:
 
 def fingerprint(clouds: Collection) -> str:
     """Hash of the order, labels and intervals of the clouds."""
-    return _digest(
-        [
-            clouds.labels,
-            *(clouds.column(name) for name in ("recording", "start_s", "duration_s", "seed")),
-        ]
-    )
+    names = ("recording", "start_s", "duration_s", "seed")
+    return _digest([clouds.labels, *map(clouds.column, names)])
 
 
 def made(clouds: Collection) -> str:
@@ -362,17 +354,14 @@ def made(clouds: Collection) -> str:
 
 def learnt_from(plan: dict[str, Any], clouds: Collection) -> bool:
     """Return whether these are the clouds of the plan."""
-    return bool(
-        plan["fingerprint"] == fingerprint(clouds) and plan.get("made") in (None, made(clouds))
-    )
+    same = plan["fingerprint"] == fingerprint(clouds)
+    return bool(same and plan.get("made") in (None, made(clouds)))
 
 
 def _digest(columns: Sequence[NDArray[Any]]) -> str:
-    rows = "\n".join(
-        "\t".join(map(str, row))
-        for row in zip(*(column.tolist() for column in columns), strict=True)
-    )
-    return hashlib.sha256(rows.encode()).hexdigest()[:16]
+    rows = zip(*(column.tolist() for column in columns), strict=True)
+    text = "\n".join("\t".join(map(str, row)) for row in rows)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def training_folder(out: Path, number: int) -> Path:

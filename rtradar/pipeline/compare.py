@@ -20,13 +20,13 @@ from rtradar.pipeline.output.output_files import comparison_files
 from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
-from rtradar.report.figures.side_by_side import (
+from rtradar.report.pages.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
     draw_rdt_clouds,
+    write_comparison,
 )
-from rtradar.report.pages.comparison import write_comparison
 from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings

@@ -136,7 +136,8 @@ def test_bad_input_gets_one_clear_line_and_leaves_nothing(
 def test_without_dask_it_says_what_to_install(tmp_path: Path) -> None:
     (tmp_path / "set.toml").write_text(SPEC)
     words = ["dataset", "build", str(tmp_path / "set.toml"), "--out", str(tmp_path / "out")]
-    code = f"import sys; sys.modules['dask'] = None; from rtradar.cli import main; sys.exit(main({words}))"
+    code = "import sys; sys.modules['dask'] = None; from rtradar.cli import main; "
+    code += f"sys.exit(main({words}))"
     found = subprocess.run(
         [sys.executable, "-c", code], capture_output=True, text=True, check=False
     )

@@ -54,7 +54,8 @@ def actors(count: int, *labels: str) -> str:
 def recording(folder: Path, *, moved: int = 0, **keys: object) -> str:
     (folder / "walk.bvh").write_text(BVH.replace("0 90 0 0 0 0\n", f"{moved} 90 0 0 0 0\n", 1))
     own = "".join(f"{key} = {value}\n" for key, value in keys.items())
-    return f'[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\nsubject = "her"\nlicence = "CC0"\n{own}'
+    head = '[[recordings]]\nfile = "walk.bvh"\nlabel = "walk"\nsubject = "her"\nlicence = "CC0"\n'
+    return head + own
 
 
 def test_every_take_meets_every_setting(tmp_path: Path) -> None:
@@ -145,7 +146,8 @@ def test_what_is_drawn_is_added_to_the_place_and_what_each_gives_is_not_drawn(
     tmp_path: Path,
 ) -> None:
     drawn = "[drawn]\nheading_deg = [7, 7]\noffset_x_m = [0.25, 0.25]\noffset_y_m = [-0.5, -0.5]\n"
-    each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\nradar_position_m = [[-3, 0, 1.5]]\n"
+    each = "[each]\nsnr_db = [3]\nperson_position_m = [[1.0, 2.0]]\n"
+    each += "radar_position_m = [[-3, 0, 1.5]]\n"
     (recipe,) = planned(
         tmp_path, "[windows]\nduration_s = 1.0\n" + drawn + each + actors(1, "walk")
     )
@@ -203,7 +205,8 @@ def test_a_range_that_changes_moves_no_other(tmp_path: Path) -> None:
 def test_parameters_are_plain_json_and_tell_what_a_reader_needs(tmp_path: Path) -> None:
     for recipe in planned(tmp_path, HEAD + actors(1, "walk") + recording(tmp_path)):
         assert json.loads(json.dumps(dict(recipe.parameters))) == recipe.parameters
-        needed = "recording subject source start_s duration_s radar scene fidelity snr_db heading_deg seed licence version"
+        needed = "recording subject source start_s duration_s radar scene fidelity "
+        needed += "snr_db heading_deg seed licence version"
         assert set(needed.split()) <= set(recipe.parameters)
 
 

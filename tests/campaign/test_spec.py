@@ -56,7 +56,7 @@ LISTS = {
     "snr_db": [number / 100 for number in range(10_000)],
     "person_position_m": [[number / 1000, 0] for number in range(10_000)],
 }
-"""1e11 combinations; to compare each value with each other, let alone to make them, takes minutes."""
+"""1e11 combinations: to compare all values with each other takes minutes, to make them hours."""
 
 
 @pytest.mark.parametrize(

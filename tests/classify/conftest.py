@@ -1,4 +1,4 @@
-"""Made-up clouds with what a data set's collection offers: classes differ in how velocity goes with time."""
+"""Made-up clouds with the methods of a collection; classes differ in the course of velocity."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ LABELS = ("kick", "punch", "walk")
 
 
 class MadeUpClouds:
-    """Each motion is seen ``views`` times, by one model after the other; a recording shows one motion."""
+    """Each motion is seen ``views`` times, by the models in turn; a recording shows one motion."""
 
     def __init__(
         self,

@@ -49,7 +49,8 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
     mean = {name: summary(outcomes)["mean"] for name, outcomes in found.items()}
     assert mean["nearest centroid, RDT cloud"] > 0.9
     assert mean["random forest, RDT cloud"] == 1
-    # Three classes: chance is a third, and 36 answers are off by 0.16 in two of three standard deviations.
+    # Three classes: chance is a third, and 36 answers are off by 0.16 in two of three standard
+    # deviations.
     assert mean["random forest, metadata alone"] < 0.6
     assert mean["random forest, spatial cloud"] < 0.6
 
@@ -127,7 +128,8 @@ def test_a_coordinate_that_is_not_measured_has_no_features(made_up: Callable[...
     clouds.spatial = lambda index: flat
     found = spatial_features(clouds)
     assert np.isfinite(found).all()
-    # Spread, ends and five percentiles are of x, y and z in turn; then the correlations xy, xz and yz, and the number of points.
+    # Spread, ends and five percentiles are of x, y and z in turn; then the correlations xy, xz and
+    # yz, and the number of points.
     of_z = np.array([*([False, False, True] * 8), False, True, True, False])
     np.testing.assert_array_equal(found[:, of_z], 0)
     np.testing.assert_array_equal(found[:, ~of_z], whole[:, ~of_z])
@@ -145,7 +147,8 @@ def test_metadata_are_numbers_as_they_are_and_names_a_column_each(
             "person_position_m": place,
             "fidelity": fidelity,
         }
-    # Duration, heading, SNR, both of the place, radar, scene, two fidelities; what is infinite or unknown stands far outside.
+    # Duration, heading, SNR, both of the place, radar, scene, two fidelities; what is infinite or
+    # unknown stands far outside.
     np.testing.assert_array_equal(
         metadata_features(clouds),
         [

@@ -79,7 +79,7 @@ class Plain(nn.Module):
 @pytest.mark.parametrize("pooled", [False, True])
 @pytest.mark.parametrize("training", [False, True])
 def test_layers_are_those_of_a_plain_pointnet(pooled: bool, training: bool) -> None:
-    """Outputs, gradients and, as long as they are plain means, running statistics, in float64; gains of both signs."""
+    """Outputs, gradients and running statistics while they are plain means; gains of both signs."""
     layer = (PooledLayer(5, 40, torch.float64) if pooled else PointwiseLayer(5, 40)).double()
     with torch.no_grad():
         layer.gain.normal_()
@@ -110,7 +110,8 @@ def test_a_search_in_bfloat16_is_off_by_its_rounding_alone() -> None:
     with torch.no_grad():
         found, best = coarse(x), exact(x)
     assert (found <= best + 1e-6).all()
-    # A product of bfloat16 values is off by 2^-8 of the sum of its terms' sizes; two of them are compared.
+    # A product of bfloat16 values is off by 2^-8 of the sum of its terms' sizes; two of them are
+    # compared.
     with torch.no_grad():
         weight, _ = exact.folded(x.flatten(0, 1))
         size = (x[:, :, None] * weight.abs()).sum(dim=3).amax(dim=1)

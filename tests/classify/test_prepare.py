@@ -86,7 +86,8 @@ def test_physical_variations_are_those_of_another_recording(points: torch.Tensor
     varied[..., :2] -= shift[:, None]
     factor = (varied * plain).sum(dim=1) / (plain**2).sum(dim=1)
     time, distance, velocity = factor.unbind(dim=1)
-    # Jitter leaves the factors 0.001, 0.003 and 0.001 uncertain; the largest of 400 draws are half a percent short of the limits.
+    # Jitter leaves the factors 0.001, 0.003 and 0.001 uncertain; the largest of 400 draws are half
+    # a percent short of the limits.
     assert (1 / time).amin().item() == pytest.approx(0.85, abs=0.01)
     assert (1 / time).amax().item() == pytest.approx(1.15, abs=0.01)
     assert distance.amin().item() == pytest.approx(0.85, abs=0.02)

@@ -18,7 +18,8 @@ def test_one_cycle_rises_to_the_rate_and_ends_at_nothing() -> None:
     top = rates.index(max(rates))
     assert rates[top] == pytest.approx(LEAN.rate)
     assert top == len(rates) // 10
-    # Half of it half-way up, along a line, and half-way down, along a cosine, which is at 3/4 after a third.
+    # Half of it half-way up, along a line, and half-way down, along a cosine, which is at 3/4 after
+    # a third.
     halves = [LEAN.rate_at(epoch, part) for epoch, part in ((1, 0.5), (16, 0.5), (12, 0.0))]
     assert halves == pytest.approx([LEAN.rate / 2, LEAN.rate / 2, LEAN.rate * 3 / 4])
     assert rates[: top + 1] == sorted(rates[: top + 1])
@@ -31,8 +32,9 @@ def test_one_cycle_rises_to_the_rate_and_ends_at_nothing() -> None:
 @pytest.mark.parametrize(
     ("field", "value"),
     [
-        ("points", 0), ("batch", 1), ("epochs", 0), ("rate", 0.0), ("rate", float("nan")), ("dropout", 1.0),
-        ("schedule", "none"), ("scaling", "none"), ("augmentation", "some"), ("precision", "float16"), ("stop_below", -1.0),
+        ("points", 0), ("batch", 1), ("epochs", 0), ("rate", 0.0), ("rate", float("nan")),
+        ("dropout", 1.0), ("schedule", "none"), ("scaling", "none"), ("augmentation", "some"),
+        ("precision", "float16"), ("stop_below", -1.0), ("step_epochs", 0),
     ],
 )  # fmt: skip
 def test_a_recipe_that_cannot_be_is_refused(field: str, value: object) -> None:

@@ -14,8 +14,8 @@ from rtradar.classify.splits import (
     Split,
     check,
     chosen,
+    intervals_of,
     make_splits,
-    moments_of,
     recordings_of,
     values_of,
 )
@@ -46,7 +46,7 @@ class Table:
 
 @st.composite
 def tables(draw: st.DrawFn) -> Table:
-    """Recordings of one subject, label and source each; intervals may be the same or overlap, and several models see them."""
+    """Recordings of one subject, label and source each; intervals may be equal or overlap."""
     rows = []
     for number in range(draw(st.integers(4, 14))):
         recording = {
@@ -81,7 +81,8 @@ def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
     rows = []
     for label in ("kick", "walk"):
         for number in range(4):
-            # The same file in two data sets, of which each names it from a folder of its own, and once with another skeleton.
+            # The same file in two data sets, of which each names it from a folder of its own, and
+            # once with another skeleton.
             one, other = f"{label}/{number}.amc", f"{number}-{label}.amc"
             content = f"{label}{number}"
             rows += [
@@ -107,7 +108,8 @@ def test_a_recording_of_several_names_is_one_recording(scheme: str) -> None:
 
 
 def test_recordings_of_one_name_each_are_numbered_by_their_names() -> None:
-    # Folds follow from the numbers: trainings that are gone on with shall find those that they began with.
+    # Folds follow from the numbers: trainings that are gone on with shall find those that they
+    # began with.
     names = np.random.default_rng(0).permutation([f"{number}.amc" for number in range(40)] * 3)
     rows = [
         {"recording": name, "recording_digest": f"{name[::-1]}", "label": "walk"}
@@ -188,7 +190,7 @@ def test_intervals_that_overlap_are_one_moment() -> None:
         {"recording": name, "start_s": start, "duration_s": 1.0, "label": "walk"}
         for name, start in [("a", 0.0), ("b", 0.0), ("a", 0.9), ("a", 1.8), ("a", 2.8), ("a", 0.0)]
     ]
-    moments = moments_of(Table(rows))
+    moments = intervals_of(Table(rows))
     assert moments[0] == moments[2] == moments[3] == moments[5]
     assert len({moments[0], moments[1], moments[4]}) == 3
 
@@ -210,7 +212,8 @@ def test_a_leak_is_never_handed_out() -> None:
 @pytest.mark.parametrize(
     ("scheme", "folds", "said"),
     [
-        ("folds", 1, "--folds 1"), ("folds", 999, "--folds 999"), ("people", None, "split 'people' is unknown"),
+        ("folds", 1, "--folds 1"), ("folds", 999, "--folds 999"),
+        ("people", None, "split 'people' is unknown"),
         ("across:colour", None, "no column 'colour'"),
     ],
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Files of strangers: what they claim is checked before it is believed, and only one line of our own comes out."""
+"""Files of strangers: what they claim is checked first, and errors are one line of our own."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ RADAR = Radar(
 )
 TOLD = dataclasses.asdict(RADAR)
 SHAPE = (2, 1, 2, 4)
-PLY = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\nproperty double x\nproperty double y\nproperty double z\n"
+PLY = b"ply\nformat binary_little_endian 1.0\nelement vertex 1\n"
+PLY += b"property double x\nproperty double y\nproperty double z\n"
 PCD = b"FIELDS x y z\nSIZE 8 8 8\nTYPE F F F\nCOUNT 1 1 1\nPOINTS 1\n"
 
 
@@ -73,7 +74,7 @@ def test_a_signalling_nan_is_told_as_any_other(
 
 
 def archive(path: Path, shape: tuple[int, ...], kind: str = "<f8", data_bytes: int = 24) -> Path:
-    """A packed NumPy archive whose ``points`` claim to be of this shape, with so many zeros behind it."""
+    """A packed NumPy archive whose ``points`` claim this shape, with that many zeros behind it."""
     with (
         zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as file,
         file.open("points.npy", "w", force_zip64=True) as member,

@@ -57,7 +57,7 @@ def make_run(folder: Path, chirps: int, seed: int = 0, chunk: int = 12) -> np.nd
 
 @pytest.fixture
 def run(tmp_path: Path) -> tuple[Path, np.ndarray]:
-    """A run of 31 chirps, so 10 whole TDM cycles: its folder, and its samples as (chirp, tx, rx, sample)."""
+    """Folder and samples (chirp, tx, rx, sample) of a run of 31 chirps, 10 whole TDM cycles."""
     samples = make_run(tmp_path / "walk", 31)
     # Written out by the schedule: chirp m is from Tx m mod 3.
     cube = np.stack([np.stack([samples[3 * cycle + tx] for tx in range(3)]) for cycle in range(10)])
@@ -158,9 +158,11 @@ def test_octave_opens_mat(run: tuple[Path, np.ndarray], tmp_path: Path) -> None:
     folder, cube = run
     export(folder, tmp_path / "cube.mat")
     script = (
-        "s = load('cube.mat'); x = s.if_samples; printf('%d ', size(x)); printf('\\n%s\\n', char(s.radar.name));"
-        "printf('%.17g %.17g %.17g\\n', s.radar.start_frequency_hz, s.chirp_time(2, 3), s.tx_position(3, 1));"
-        "y = permute(x, [4 3 2 1]); f = fopen('back.bin', 'w'); fwrite(f, [real(y(:))'; imag(y(:))'], 'single'); fclose(f);"
+        "s = load('cube.mat'); x = s.if_samples; printf('%d ', size(x)); "
+        "printf('\\n%s\\n', char(s.radar.name)); f = s.radar.start_frequency_hz; "
+        "printf('%.17g %.17g %.17g\\n', f, s.chirp_time(2, 3), s.tx_position(3, 1));"
+        "y = permute(x, [4 3 2 1]); f = fopen('back.bin', 'w'); "
+        "fwrite(f, [real(y(:))'; imag(y(:))'], 'single'); fclose(f);"
     )
     # Without a display it complains on leaving; what it printed counts.
     found = subprocess.run(
@@ -196,7 +198,8 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(
 ) -> None:
     make_run(tmp_path / "short", 3000, chunk=600)
     make_run(tmp_path / "long", 90_000, chunk=600)  # 46 MB
-    # In a process of its own: what other tests have left in the heap decides where arrays find room.
+    # In a process of its own: what other tests have left in the heap decides where arrays find
+    # room.
     code = (
         "import sys; from pathlib import Path\n"
         "from rtradar.exchange import export\n"
@@ -225,7 +228,8 @@ def test_what_cannot_be_exported_is_refused_and_leaves_nothing(
         (
             folder,
             "cube.xyz",
-            "no format has the suffix '.xyz'; allowed: .mat, .nc, .bin for IF samples, .npz, .ply, .pcd",
+            "no format has the suffix '.xyz'; "
+            "allowed: .mat, .nc, .bin for IF samples, .npz, .ply, .pcd",
         ),
         (folder, "cube.ply", "is a folder; name the cloud in it"),
         (tmp_path, "cube.mat", "holds no IF samples"),

@@ -18,7 +18,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 import rtradar as rt
 from rtradar.cli import main
 from rtradar.pipeline.pictures.run_view import load_linked, view
-from rtradar.report.view.page import COLOURS
+from rtradar.report.view.run_view import COLOURS
 
 
 @pytest.fixture(scope="module")

@@ -1,4 +1,4 @@
-"""A page in a real browser, headless: driven over the pipe that Chromium itself offers, so nothing else is needed."""
+"""A page in a real browser, headless, driven over the pipe that Chromium itself offers."""
 
 from __future__ import annotations
 
@@ -33,13 +33,16 @@ class Browser:
     """One page in a headless Chromium, with all that it logged and asked for."""
 
     def __init__(self, profile: Path) -> None:
-        # Chromium reads commands from its file 3 and writes answers to its file 4, each ended by a zero byte.
+        # Chromium reads commands from its file 3 and writes answers to its file 4, each ended by a
+        # zero byte.
         read_commands, self._commands = os.pipe()
         self._answers, write_answers = os.pipe()
-        move = "import os, sys; os.dup2(int(sys.argv[1]), 3); os.dup2(int(sys.argv[2]), 4); os.execv(sys.argv[3], sys.argv[3:])"
+        move = "import os, sys; os.dup2(int(sys.argv[1]), 3); os.dup2(int(sys.argv[2]), 4); "
+        move += "os.execv(sys.argv[3], sys.argv[3:])"
         flags = [
-            "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run", "--disable-extensions",
-            "--disable-background-networking", "--disable-component-update", "--use-angle=swiftshader",
+            "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run",
+            "--disable-extensions", "--disable-background-networking",
+            "--disable-component-update", "--use-angle=swiftshader",
             "--enable-unsafe-swiftshader", "--remote-debugging-pipe", f"--user-data-dir={profile}",
         ]  # fmt: skip
         self._process = subprocess.Popen(
@@ -135,9 +138,11 @@ class Browser:
 
     def place(self, element: str) -> tuple[float, float, float, float]:
         """Scroll to an element; its left, top, width and height in the window."""
-        script = f"(() => {{ const e = document.getElementById('{element}'); e.scrollIntoView({{ block: 'center' }});"
+        script = f"(() => {{ const e = document.getElementById('{element}');"
+        script += " e.scrollIntoView({ block: 'center' });"
         x, y, width, height = self.evaluate(
-            f"{script} const b = e.getBoundingClientRect(); return [b.x, b.y, b.width, b.height]; }})()"
+            f"{script} const b = e.getBoundingClientRect();"
+            " return [b.x, b.y, b.width, b.height]; })()"
         )
         return x, y, width, height
 
@@ -177,7 +182,8 @@ class Browser:
 
     def set(self, element: str, value: object, event: str = "input") -> None:
         """Choose a value of a slider or a menu, as a hand would."""
-        script = f"const e = document.getElementById('{element}'); e.value = '{value}'; e.dispatchEvent(new Event('{event}'));"
+        script = f"const e = document.getElementById('{element}'); e.value = '{value}';"
+        script += f" e.dispatchEvent(new Event('{event}'));"
         self.evaluate(f"(() => {{ {script} }})()")
 
     def faults(self) -> list[dict[str, Any]]:

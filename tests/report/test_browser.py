@@ -79,7 +79,8 @@ def test_the_3d_views_are_drawn(browser: Any, report: str, scheme: str) -> None:
     assert (shade > 0.9) == (scheme == "light")
     for view in ("scene-figure", "scene-rdt", "scene-spatial"):
         assert browser.evaluate(f"document.getElementById('{view}').dataset.drawn") == "true"
-        # A colour bar alone, without anything in 3D, has up to 5000: so only the left of the picture counts.
+        # A colour bar alone, without anything in 3D, has up to 5000: so only the left of the
+        # picture counts.
         picture = browser.picture(view)
         assert coloured(picture[:, : int(0.75 * picture.shape[1])]) > 500, view
 
@@ -143,7 +144,8 @@ def test_turns_under_the_mouse(browser: Any, report: str, view: str, moment: str
 
 def test_the_wheel_brings_nearer_while_playing(browser: Any, report: str) -> None:
     browser.open(report)
-    eye = "Math.hypot(...Object.values(document.getElementById('scene-figure')._fullLayout.scene._scene.getCamera().eye))"
+    scene = "document.getElementById('scene-figure')._fullLayout.scene._scene"
+    eye = f"Math.hypot(...Object.values({scene}.getCamera().eye))"
     before = browser.evaluate(eye)
     x, y, width, height = browser.place("scene-figure")
     for _ in range(3):

@@ -28,7 +28,7 @@ from rtradar.report import (
     draw_spectrogram,
 )
 from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
-from rtradar.report.figures.side_by_side import (
+from rtradar.report.pages.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
@@ -168,13 +168,14 @@ def test_levels_by_hand(drawn: list[Figure], watts: bool, loss: bool, expected: 
 def test_a_sphere_reads_its_own_cross_section(
     drawn: list[Figure], preset: str, offset: float
 ) -> None:
-    """A conducting sphere of radius a, large against the wavelength, has pi a^2: 0.2 m are -9.01 dBsm, in every picture."""
+    """A large conducting sphere of radius a has pi a^2: 0.2 m are -9.01 dBsm, in every picture."""
     radar, radius = rt.Radar.preset(preset), 0.2
     row = round(4.0 / radar.range_bin_m)
     radar = dataclasses.replace(radar, frame_duration_s=0.02)
     distance = (row + offset) * radar.range_bin_m
     middle = np.asarray(radar.position_m) + np.array([distance + radius, 0, 0])
-    # To the nearest point of the sphere and back, from the closed form of its specular point for antennas close to each other.
+    # To the nearest point of the sphere and back, from the closed form of its specular point for
+    # antennas close to each other.
     legs = [np.linalg.norm(antennas - middle, axis=1) - radius for antennas in (radar.tx, radar.rx)]
     chirps = np.arange(radar.chirps_per_frame)
     tx = radar.tx_of_chirp(chirps)
@@ -201,9 +202,10 @@ def test_a_sphere_reads_its_own_cross_section(
     draw_range_angle(FILE, azimuth, radar, "run")
     peaks = [float(np.asarray(figure.axes[0].images[0].get_array()).max()) for figure in drawn]
     closed_form = 10 * math.log10(math.pi * radius**2)
-    # In the middle of a bin nothing is lost but for channels some millimetres farther, 0.1 dB; between two bins a Hann window
-    # loses 1.42 dB, and the loss over distance is that of the bin, half of which is 40 log10(1 + 1 / 2 / 107), 0.08 dB at most.
-    # At 12 GHz the ends of the lines are a quarter of a bin farther, and so nearer to the middle of one: up to 0.3 dB less lost.
+    # In the middle of a bin nothing is lost but for channels some millimetres farther, 0.1 dB;
+    # between two bins a Hann window loses 1.42 dB, and the loss over distance is that of the bin,
+    # half of which is 40 log10(1 + 1 / 2 / 107), 0.08 dB at most. At 12 GHz the ends of the lines
+    # are a quarter of a bin farther, and so nearer to the middle of one: up to 0.3 dB less lost.
     lost, tolerance = (0.0, 0.1) if offset == 0 else (1.42, 0.4)
     assert peaks == pytest.approx([closed_form - lost] * 3, abs=tolerance)
 

@@ -1,4 +1,4 @@
-"""The report as a file: whole, escaped, closed to the network, and with the numbers that it was given."""
+"""The report as a file: whole, escaped, closed to the network, with the numbers of the run."""
 
 from __future__ import annotations
 
@@ -186,7 +186,8 @@ def test_poses_give_back_the_ellipsoids(body: Body) -> None:
     for part in (0, 7, 20):
         vertices = poses[5, part, 0] + sphere @ poses[5, part, 1:]
         local = (vertices - now.centres[part]) @ now.frames[part] / now.semi_axes[part]
-        # On the unit sphere of the mesh, whose corners lie up to 2 % outside; float32 of some metres is 1e-6 of some centimetres.
+        # On the unit sphere of the mesh, whose corners lie up to 2 % outside; float32 of some
+        # metres is 1e-6 of some centimetres.
         np.testing.assert_allclose(local, sphere, atol=2e-5)
     assert np.linalg.norm(sphere, axis=1).max() < 1.02
     ends = poses[5, :, 0] + poses[5, :, 3]
@@ -270,8 +271,8 @@ def test_quantities_read_as_people_write_them(
 
 
 def test_limits_are_those_of_the_sweep_centre() -> None:
-    # By hand for 14 GHz: c / 2B = 3.747 cm, x 256 = 9.593 m; lambda = 21.414 mm; lambda / 4 / 0.75 ms = 7.138 m/s;
-    # lambda / 2 / (133 x 0.75 ms) = 0.1073 m/s.
+    # By hand for 14 GHz: c / 2B = 3.747 cm, x 256 = 9.593 m; lambda = 21.414 mm; lambda / 4 / 0.75
+    # ms = 7.138 m/s; lambda / 2 / (133 x 0.75 ms) = 0.1073 m/s.
     html = limits_table(RADAR)
     for value in (
         "9.593 m",

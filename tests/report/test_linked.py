@@ -1,4 +1,4 @@
-"""What the linked views show: levels that unpack, groups of parts, velocities where the map has them, points and their parts."""
+"""Data of the linked views: levels, groups of parts, velocities on the map, parts of points."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
-from rtradar.report.view.page import view_data
-from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
+from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts, view_data
 from rtradar.report.view.snapshots import Moments
 from rtradar.report.view.three_d import semi_axis_poses
 
@@ -24,7 +23,7 @@ LOW_DB = -60.0
 def linked(
     points: list[tuple[float, float, float]], power_db: tuple[float, float] = (-40.0, -50.0)
 ) -> RunView:
-    """Two moments; a head at 4 m, -1 m/s, and a left foot at 5 m, +8 m/s, beyond what is unambiguous."""
+    """Two snapshots: a head at 4 m, -1 m/s, and a left foot at 5 m, +8 m/s, which is ambiguous."""
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.3))
     times = np.array([0.1, 0.2])
     moments = Moments(

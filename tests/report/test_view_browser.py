@@ -1,4 +1,4 @@
-"""`rtradar view` in a real browser, headless: it opens, the slider moves all views, colours change, and a picture is saved."""
+"""`rtradar view` in a real browser, headless: the slider, the colours and the saved picture."""
 
 from __future__ import annotations
 
@@ -43,7 +43,8 @@ def go(browser: Any, step: int) -> None:
 
 def values(browser: Any, view: str, trace: int, name: str) -> Any:
     """An attribute of a trace as Plotly holds it; NaN in place of gaps."""
-    script = f"Array.from(document.getElementById('scene-{view}').data[{trace}].{name}, (v) => v === null ? 'NaN' : v)"
+    values = f"document.getElementById('scene-{view}').data[{trace}].{name}"
+    script = f"Array.from({values}, (v) => v === null ? 'NaN' : v)"
     found = browser.evaluate(script)
     return found if name == "text" else np.array(found, dtype=float)
 
@@ -77,7 +78,8 @@ def test_the_slider_moves_every_view(
     pictures = []
     for step in (2, len(moments.times) - 2):
         go(browser, step)
-        # The body where the run had it: vertices of a sphere sum up to its centre, in float32 of some metres.
+        # The body where the run had it: vertices of a sphere sum up to its centre, in float32 of
+        # some metres.
         np.testing.assert_allclose(centres(browser), moments.poses[step, :, 0], atol=1e-5)
         time = moments.times[step]
         assert browser.evaluate("document.getElementById('clock').textContent").startswith(
@@ -154,7 +156,8 @@ def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, Ru
     for paths, counts in {"none": (0, 0), "direct": (3 * len(own), 0)}.items():
         browser.set("paths", paths, "change")
         browser.wait(
-            f"{FIGURE}.data[5].x.length === {counts[0]} && {FIGURE}.data[6].x.length === {counts[1]}"
+            f"{FIGURE}.data[5].x.length === {counts[0]}"
+            f" && {FIGURE}.data[6].x.length === {counts[1]}"
         )
     assert not browser.faults()
 

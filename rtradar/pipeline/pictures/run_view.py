@@ -16,8 +16,7 @@ from rtradar.errors import InputError
 from rtradar.pipeline.pictures.run_pictures import thinned
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import HANN_BINS, FieldUnit, field_unit
-from rtradar.report.view.page import COLOURS, write_view
-from rtradar.report.view.run_view import MOST_LEVEL, Levels, RunView
+from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import Moments, load_moments
 from rtradar.report.view.still import draw_still
 from rtradar.system.checks import printable

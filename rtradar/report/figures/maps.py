@@ -63,18 +63,14 @@ def draw_range_doppler(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     power : (range, velocity)
         Power, summed over all channels [m^2].
     mask : (range, velocity) bool
         True where a cell is detected.
     radar : Radar
         Radar whose ranges and velocities are the axes.
-    title : str
-        Heading of the picture.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
+    path, title, spreading
+        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
     """
     figure = canvas.new_figure(11, 4.5)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -109,8 +105,6 @@ def draw_spectrogram(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     power : (time, velocity)
         Power of one channel, summed over range [m^2]; at least one row.
     time : (time,)
@@ -119,10 +113,8 @@ def draw_spectrogram(
         Ascending velocities [m/s].
     radar : Radar
         Radar that received the power, which decides its unit.
-    title : str
-        Heading of the picture.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
+    path, title, spreading
+        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
     """
     figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
@@ -146,16 +138,12 @@ def draw_range_angle(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     maps : mapping of str to ((range, angle) float, (angle,) float64)
         Power summed over detected cells [m^2] and the angles [rad], by the name of the angle.
     radar : Radar
         Radar whose ranges are the axis.
-    title : str
-        Heading of the picture.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
+    path, title, spreading
+        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
     """
     figure = canvas.new_figure(1 + 5 * len(maps), 4.5)
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
@@ -184,12 +172,10 @@ def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
 
     Parameters
     ----------
-    path : path
-        PNG file.
     points : (point, 3) float64
         Time [s], range [m] and velocity [m/s] of each point.
-    title : str
-        Heading of the picture.
+    path, title
+        Output file and heading: see `draw_range_time`.
     """
     figure = canvas.new_figure(8, 6.5)
     axes = figure.add_subplot(projection="3d")
@@ -219,16 +205,14 @@ def draw_spatial_cloud(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     points : (point, 3) float64
         World coordinates [m]; NaN in a coordinate that is not measured.
     velocity : (point,) float64
         Velocity of each point [m/s].
     radar : Radar
         Radar, drawn at its position.
-    title : str
-        Heading of the picture.
+    path, title
+        Output file and heading: see `draw_range_time`.
     """
     names = measured_angles(radar)
     views = [axis for axis, name in ((2, "elevation"), (1, "azimuth")) if name in names]

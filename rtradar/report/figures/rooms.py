@@ -38,8 +38,6 @@ def draw_plan(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     scene : Scene
         Scene whose walls and furniture are drawn.
     radar : Radar
@@ -48,8 +46,8 @@ def draw_plan(
         Positions of the person's root [m].
     paths : mapping of str to (point, 3) float64
         Corners of each path from Tx to Rx [m], by its name.
-    title : str
-        Heading of the picture.
+    path, title
+        Output file and heading: see `draw_range_time`.
     """
     figure = canvas.new_figure(10, 6)
     axes = figure.subplots()
@@ -111,16 +109,14 @@ def draw_before_after(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     maps : mapping of str to ((range, velocity) float, (range, velocity) bool)
         Power summed over all channels [m^2], and detections, by the title of the panel.
     ghosts : sequence of (str, float, float)
         Path over walls, range [m] and velocity [m/s] of each ghost.
     radar : Radar
         Radar whose ranges and velocities are the axes.
-    title : str
-        Heading of the picture.
+    path, title
+        Output file and heading: see `draw_range_time`.
     """
     figure = canvas.new_figure(1 + 5.5 * len(maps), 5)
     panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
@@ -185,8 +181,6 @@ def draw_range_azimuth_with_walls(
 
     Parameters
     ----------
-    path : path
-        PNG file.
     power : (range, azimuth) float
         Power summed over detected cells [m^2].
     azimuth : (azimuth,) float64
@@ -197,8 +191,8 @@ def draw_range_azimuth_with_walls(
         Radar whose ranges are the axis, at its position in the scene.
     ghosts : sequence of (str, float, float)
         Path over walls, range [m] and azimuth [rad] of each ghost.
-    title : str
-        Heading of the picture.
+    path, title
+        Output file and heading: see `draw_range_time`.
     """
     figure = canvas.new_figure(8, 5.5)
     axes = figure.subplots()

@@ -40,11 +40,9 @@ _FIELDS: Mapping[str, tuple[str, tuple[str | int, ...]]] = {
 }
 _MAY_BE_NAN = ("corners",)
 _POINTS_INTO = {
-    "echo_path": "path",
-    "echo_part": "part",
-    "furniture_faces": "vertex",
-    "furniture_piece": "piece",
-}
+    "echo_path": "path", "echo_part": "part",
+    "furniture_faces": "vertex", "furniture_piece": "piece",
+}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -115,36 +113,8 @@ class Moments:
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
-        for name, (kind, axes) in _FIELDS.items():
-            array = np.asarray(getattr(self, name))
-            if kind == "U" and array.size == 0:
-                array = array.astype("U")  # an empty list has no string type
-            if array.dtype.kind != np.dtype(kind).kind or array.dtype in (
-                np.float16,
-                np.longdouble,
-            ):
-                raise InputError(
-                    f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}"
-                )
-            if array.ndim != len(axes):
-                raise InputError(
-                    f"view: {name} has shape {array.shape}; "
-                    f"its axes must be ({', '.join(map(str, axes))})"
-                )
-            for axis, length in zip(axes, array.shape, strict=True):
-                wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
-                if length != wanted:
-                    raise InputError(
-                        f"view: {name} has shape {array.shape}; "
-                        f"its axis {axis} must have length {wanted}"
-                    )
-            if kind != "U" and name not in _MAY_BE_NAN and not np.isfinite(array).all():
-                raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
-            if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
-                raise InputError(f"view: {name} holds a value above {_LARGEST:g}; none is so large")
-            if kind == "U" and not all(word.isprintable() for word in array.ravel().tolist()):
-                raise InputError(f"view: {name} holds what is no line of text")
-            object.__setattr__(self, name, array if kind == "U" else array.astype(kind))
+        for name in _FIELDS:
+            object.__setattr__(self, name, _checked(name, getattr(self, name), sizes))
         if not sizes["step"] or not sizes["part"]:
             raise InputError(
                 "view: there is no moment or no body part; at least one of each is needed"
@@ -169,27 +139,45 @@ class Moments:
         return int(np.abs(self.times - time_s).argmin())
 
 
-def save_moments(path: str | Path, moments: Moments) -> None:
-    """Write snapshots as a NumPy archive.
+def _checked(name: str, values: Any, sizes: dict[str, int]) -> NDArray[Any]:
+    """Return a field as an array of its type; ``sizes`` collects the lengths of named axes."""
+    kind, axes = _FIELDS[name]
+    array = np.asarray(values)
+    if kind == "U" and array.size == 0:
+        array = array.astype("U")  # an empty list has no string type
+    odd = array.dtype in (np.float16, np.longdouble)
+    if odd or array.dtype.kind != np.dtype(kind).kind:
+        raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
+    if array.ndim != len(axes):
+        raise InputError(
+            f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})"
+        )
+    for axis, length in zip(axes, array.shape, strict=True):
+        wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
+        if length != wanted:
+            raise InputError(
+                f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}"
+            )
+    if kind == "U":
+        if not all(word.isprintable() for word in array.ravel().tolist()):
+            raise InputError(f"view: {name} holds what is no line of text")
+        return array
+    if name not in _MAY_BE_NAN and not np.isfinite(array).all():
+        raise InputError(f"view: {name} holds NaN or infinity; every value must be finite")
+    if kind[0] == "f" and (np.abs(array) > _LARGEST).any():
+        raise InputError(f"view: {name} holds a value above {_LARGEST:g}; none is so large")
+    return array.astype(kind)
 
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
-    """
+
+def save_moments(path: str | Path, moments: Moments) -> None:
+    """Write snapshots as a NumPy archive; InputError if the file cannot be written."""
     arrays = {name: getattr(moments, name) for name in _FIELDS}
     with atomic_file(path) as file:
         np.savez_compressed(file, format=np.array(_FORMAT), **arrays)
 
 
 def load_moments(path: str | Path) -> Moments:
-    """Read snapshots.
-
-    Raises
-    ------
-    InputError
-        If the file is missing, damaged or of another kind.
-    """
+    """Read snapshots; InputError if the file is missing, damaged or of another kind."""
     mend = "make it anew with: rtradar run"
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
 from rtradar.report.figures.canvas import VELOCITY_LABEL, new_figure, save_figure
-from rtradar.report.view.page import VELOCITY_COLOURS
-from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
+from rtradar.report.view.run_view import GROUPS, VELOCITY_COLOURS, Levels, RunView, group_of_parts
 from rtradar.system.files import atomic_file
 
 _HIDDEN = "#8c8c94"
@@ -19,29 +18,15 @@ _NOW = "#e0389a"
 
 
 def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = "part") -> None:
-    """Draw body and paths, range-Doppler map, cloud and spectrogram of one snapshot.
+    """Draw body and paths, range-Doppler map, cloud and spectrogram of the snapshot ``step``.
 
-    Parameters
-    ----------
-    path : path
-        PNG file, which is replaced if it exists.
-    run_view : RunView
-        Data of the run.
-    step : int
-        Index of the snapshot.
-    colour : {"part", "power", "velocity"}
-        Quantity that colours show.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
+    ``colour`` is the quantity that colours show, one of `COLOURS`. InputError if the PNG file
+    cannot be written.
     """
     figure = new_figure(15, 9.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
-    figure.suptitle(
-        f"{run_view.heading}, {run_view.subtitle}: {run_view.moments.times[step]:.2f} s", wrap=True
-    )
+    time = f"{run_view.moments.times[step]:.2f} s"
+    figure.suptitle(f"{run_view.heading}, {run_view.subtitle}: {time}", wrap=True)
     paint = _Paint(run_view, colour)
     views = [
         figure.add_subplot(grid[row, column], projection=None if column else "3d")
@@ -52,13 +37,12 @@ def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = 
     _draw_cloud(views[2], run_view, step, paint)
     _draw_spectrogram(figure, views[3], run_view, step)
     paint.legend(figure, views)
-    for artist in (
-        one for view in (views[0], views[2]) for one in (*view.collections, *view.lines)
-    ):
-        # A long 3D box is wider than its axes, whose edge would cut the body. The layout already
-        # accounts for the box.
-        artist.set_clip_on(False)
-        artist.set_in_layout(False)
+    for view in (views[0], views[2]):
+        for artist in (*view.collections, *view.lines):
+            # A long 3D box is wider than its axes, whose edge would cut the body. The layout
+            # already accounts for the box.
+            artist.set_clip_on(False)
+            artist.set_in_layout(False)
     with atomic_file(path) as file:
         save_figure(figure, file)
 
@@ -71,24 +55,17 @@ class _Paint:
         from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 
         self.colour, self._run_view = colour, run_view
-        tints = ListedColormap(list(GROUPS.values()))
-        low, high = run_view.power_range_db
+        moments = run_view.moments
+        self._groups = np.array(group_of_parts(moments.part_names.tolist()))
+        fastest = run_view.fastest_mps
+        of_echo = np.broadcast_to(self._groups[moments.echo_part], moments.range_m.shape)
         rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
-        self.map = {"part": tints, "power": colormaps["viridis"], "velocity": rates}[colour]
-        self.norm = {
-            "part": Normalize(-0.5, len(GROUPS) - 0.5),
-            "power": Normalize(low, high),
-            "velocity": Normalize(-run_view.fastest_mps, run_view.fastest_mps),
+        self.map, limits, self._echo = {
+            "part": (ListedColormap(list(GROUPS.values())), (-0.5, len(GROUPS) - 0.5), of_echo),
+            "power": (colormaps["viridis"], run_view.power_range_db, run_view.power_db),
+            "velocity": (rates, (-fastest, fastest), moments.velocity_mps),
         }[colour]
-        groups = np.array(group_of_parts(run_view.moments.part_names.tolist()))
-        self._echo = {
-            "part": np.broadcast_to(
-                groups[run_view.moments.echo_part], run_view.moments.range_m.shape
-            ),
-            "power": run_view.power_db,
-            "velocity": run_view.moments.velocity_mps,
-        }[colour]
-        self._groups = groups
+        self.norm = Normalize(*limits)
 
     def echoes(self, step: int) -> NDArray[np.float64]:
         """Colour of each echo (echo, rgba); grey if it is occluded."""
@@ -111,9 +88,8 @@ class _Paint:
         run_view = self._run_view
         if self.colour == "part":
             return self._rgba(run_view.rdt_group().astype(np.float64))
-        return self._rgba(
-            run_view.rdt_power_db if self.colour == "power" else run_view.rdt_points[:, 2]
-        )
+        by_power = self.colour == "power"
+        return self._rgba(run_view.rdt_power_db if by_power else run_view.rdt_points[:, 2])
 
     def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
         from matplotlib.colors import to_rgba
@@ -131,19 +107,11 @@ class _Paint:
             patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
             figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
             return
-        label = {
-            "power": self._run_view.power_unit.label("of an echo"),
-            "velocity": VELOCITY_LABEL,
-        }[self.colour]
-        bar = figure.colorbar(
-            ScalarMappable(self.norm, self.map),
-            ax=views,
-            location="bottom",
-            shrink=0.4,
-            aspect=50,
-            pad=0.02,
-            label=label,
-        )
+        label = VELOCITY_LABEL
+        if self.colour == "power":
+            label = self._run_view.power_unit.label("of an echo")
+        place = {"location": "bottom", "shrink": 0.4, "aspect": 50, "pad": 0.02}
+        bar = figure.colorbar(ScalarMappable(self.norm, self.map), ax=views, label=label, **place)
         bar.ax.tick_params(labelsize=8)
 
 
@@ -156,17 +124,15 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     poses = moments.poses[step].astype(np.float64)
     for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
         corners = (centre + vertices @ np.array(semi_axes))[faces]
-        axes.add_collection3d(
-            Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0)
-        )
+        part = Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0)
+        axes.add_collection3d(part)
     outlines = [np.concatenate([corners, corners[:1]]) for corners in moments.walls]
     if outlines:
         axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
     if len(moments.furniture_faces):
         triangles = moments.furniture_vertices[moments.furniture_faces].astype(np.float64)
-        axes.add_collection3d(
-            Poly3DCollection(triangles, facecolors="#b08d57", alpha=0.18, linewidth=0)
-        )
+        style = {"facecolors": "#b08d57", "alpha": 0.18, "linewidth": 0}
+        axes.add_collection3d(Poly3DCollection(triangles, **style))
     place = np.array(radar.position_m)
     rgba = paint.echoes(step)
     for echo in np.flatnonzero(run_view.seen[step]):
@@ -174,24 +140,13 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
         corners = corners[np.isfinite(corners).all(axis=1)]
         if len(corners):
             line = np.concatenate([[place], corners, [place]])
-            direct = moments.direct[echo]
-            axes.plot(
-                *line.T,
-                color=rgba[echo],
-                linewidth=1.2 if direct else 0.6,
-                alpha=0.8 if direct else 0.35,
-            )
+            width, alpha = (1.2, 0.8) if moments.direct[echo] else (0.6, 0.35)
+            axes.plot(*line.T, color=rgba[echo], linewidth=width, alpha=alpha)
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
-    everything = np.concatenate(
-        [
-            moments.poses[:, :, 0].reshape(-1, 3),
-            moments.walls.reshape(-1, 3),
-            moments.furniture_vertices,
-            radar.tx,
-            radar.rx,
-        ]
-    )
+    centres, walls = moments.poses[:, :, 0].reshape(-1, 3), moments.walls.reshape(-1, 3)
+    things = [centres, walls, moments.furniture_vertices, radar.tx, radar.rx]
+    everything = np.concatenate(things)
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
@@ -221,16 +176,17 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
     moments = run_view.moments
     image = _image(axes, run_view.range_doppler, step, "Greys")
     rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
-    for direct, style in (
-        (False, {"marker": "D", "s": 14, "facecolors": "none"}),
-        (True, {"marker": "o", "s": 40}),
-    ):
+    for direct in (False, True):
         own = np.flatnonzero(run_view.seen[step] & (moments.direct == direct))
-        edges = "white" if direct else rgba[own]
-        given = style | ({"color": rgba[own]} if direct else {})
-        axes.scatter(
-            velocity[own], moments.range_m[step, own], edgecolors=edges, linewidths=0.7, **given
-        )
+        style: dict[str, Any] = {
+            "marker": "D",
+            "s": 14,
+            "facecolors": "none",
+            "edgecolors": rgba[own],
+        }
+        if direct:
+            style = {"marker": "o", "s": 40, "color": rgba[own], "edgecolors": "white"}
+        axes.scatter(velocity[own], moments.range_m[step, own], linewidths=0.7, **style)
     across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
     axes.set_title("Range-Doppler map of this window, and where echoes are")
@@ -239,12 +195,8 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
 
 def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     points, time = run_view.rdt_points, run_view.moments.times[step]
-    axes.set(
-        xlabel="Time [s]",
-        ylabel="Range [m]",
-        zlabel=VELOCITY_LABEL,
-        title=f"Range-Doppler-time cloud: {len(points)} points",
-    )
+    axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
+    axes.set_title(f"Range-Doppler-time cloud: {len(points)} points")
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
     if not len(points):
         return
@@ -259,14 +211,8 @@ def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
 def _draw_spectrogram(figure: Any, axes: Any, run_view: RunView, step: int) -> None:
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title="Spectrogram")
     if not run_view.spectrogram.level.size:
-        axes.text(
-            0.5,
-            0.5,
-            "The capture is too short for one.",
-            ha="center",
-            va="center",
-            transform=axes.transAxes,
-        )
+        style = {"ha": "center", "va": "center", "transform": axes.transAxes}
+        axes.text(0.5, 0.5, "The capture is too short for one.", **style)
         return
     image = _image(axes, run_view.spectrogram, 0, "viridis")
     axes.axvline(run_view.moments.times[step], color=_NOW, linewidth=1.5)
