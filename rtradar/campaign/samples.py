@@ -148,7 +148,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
         if identities[plan.identity] > 1:
             raise InputError(
                 f"recording '{plan.parameters['recording']}' from {plan.parameters['start_s']:g} s "
-                "stands there twice; leave one out"
+                "is given twice; leave one out"
             )
     return sorted(planned, key=lambda plan: plan.identity)
 

@@ -217,7 +217,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     check_keys("[each] ", each, (), tuple(_EACH))
     for key in drawn_table:
         if key in each:
-            raise InputError(f"{key} stands under [each] and under [drawn]; give it once")
+            raise InputError(f"{key} is under [each] and under [drawn]; give it once")
     interval_table = table_at("windows", table)
     check_keys("[windows] ", interval_table, (), INTERVAL_KEYS)
     intervals = Intervals.read("[windows]", interval_table)
@@ -329,7 +329,7 @@ def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
         for value in values
     }
     if len(different) < len(values):
-        raise InputError(f"[each] {key} = {shown(values)}; a value stands there twice")
+        raise InputError(f"[each] {key} = {shown(values)}; a value is given twice")
     return values
 
 
@@ -366,7 +366,7 @@ def _actors(table: Table) -> tuple[Actor, ...]:
         subjects = _numbers(where, "subjects", {"subjects": 10, **one})
         if label in found:
             raise InputError(
-                f"[[synthetic]] label = '{label}' stands there twice; give its takes together"
+                f"[[synthetic]] label = '{label}' is given twice; give its takes together"
             )
         found[label] = Actor(label, seeds, subjects)
     return tuple(found.values())

@@ -22,7 +22,7 @@ if missing := [
     )
 
 if TYPE_CHECKING:
-    from rtradar.classify.baselines import judge_baselines
+    from rtradar.classify.baselines import evaluate_baselines
     from rtradar.classify.outcomes import Outcome
     from rtradar.classify.pointnet import PointNet
     from rtradar.classify.prepare import stack_clouds
@@ -40,7 +40,7 @@ __all__ = [
     "Recipe",
     "Split",
     "Study",
-    "judge_baselines",
+    "evaluate_baselines",
     "load_network",
     "load_study",
     "make_splits",
@@ -50,7 +50,7 @@ __all__ = [
     "train_study",
 ]
 _NAMES = {
-    "baselines": ("judge_baselines",),
+    "baselines": ("evaluate_baselines",),
     "outcomes": ("Outcome",),
     "pointnet": ("PointNet",),
     "prepare": ("stack_clouds",),

@@ -136,7 +136,7 @@ BASELINES: dict[str, tuple[_Features, Callable[[int], BaseEstimator]]] = {
 reveal the class."""
 
 
-def judge_baselines(clouds: Collection, study: Study) -> dict[str, list[Outcome]]:
+def evaluate_baselines(clouds: Collection, study: Study) -> dict[str, list[Outcome]]:
     """Evaluate every baseline on those splits of a study that are trained.
 
     Parameters

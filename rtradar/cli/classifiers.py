@@ -176,10 +176,10 @@ def _evaluate(options: argparse.Namespace) -> int:
     studies = [load_study(folder) for folder in options.trained]
     baselines = {}
     if options.baselines:
-        from rtradar.classify.baselines import judge_baselines
+        from rtradar.classify.baselines import evaluate_baselines
         from rtradar.clouds.dataset_store import Collection
 
-        baselines = judge_baselines(
+        baselines = evaluate_baselines(
             Collection(*(options.data or studies[0].plan["data"])), studies[0]
         )
     elif options.data is not None:

@@ -31,7 +31,7 @@ from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
 from rtradar.radar import Radar
 from rtradar.report import write_report
-from rtradar.report.view.snapshots import save_moments
+from rtradar.report.view.snapshots import save_snapshots
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
@@ -154,7 +154,7 @@ def simulate(
         summary["rays_traced"] = rays_traced() - rays_before
         # After the model's account, for looking at it once more is no part of the capture.
         with stages.time("view"):
-            save_moments(
+            save_snapshots(
                 folder / "view.npz",
                 moments(
                     capture.model,

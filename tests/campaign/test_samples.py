@@ -238,7 +238,7 @@ def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
 
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
-        InputError, match=r"recording 'walk.bvh' from 0 s stands there twice; leave one out"
+        InputError, match=r"recording 'walk.bvh' from 0 s is given twice; leave one out"
     ):
         planned(tmp_path, HEAD + recording(tmp_path) * 2)
 

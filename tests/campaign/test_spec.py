@@ -179,7 +179,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             SMALL.replace("walk", "dance"),
             "label = 'dance' is unknown; allowed: walk, kick, punch, jumping_jack",
         ),
-        (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' stands there twice"),
+        (SMALL + SMALL[SMALL.index("[[") :], "label = 'walk' is given twice"),
         (
             SMALL.replace("duration_s = 2.0", ""),
             "duration_s is missing; synthetic actors have no end",
@@ -211,7 +211,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
             SMALL + "[each]\nfidelity = ['perfect']",
             "fidelity = 'perfect' is unknown; allowed: analytic-paper",
         ),
-        (SMALL + "[each]\nsnr_db = [1, 1]", "a value stands there twice"),
+        (SMALL + "[each]\nsnr_db = [1, 1]", "a value is given twice"),
         (SMALL + "[each]\nsnr_db = ['loud']", "snr_db = 'loud'; it must be a number"),
         (
             SMALL + "[each]\nperson_position_m = [[0]]",
@@ -219,7 +219,7 @@ def test_a_recording_has_windows_of_its_own_where_it_says_so(tmp_path: Path) -> 
         ),
         (
             SMALL + "[each]\nsnr_db = [1]\n[drawn]\nsnr_db = [1, 2]",
-            "snr_db stands under [each] and under [drawn]",
+            "snr_db is under [each] and under [drawn]",
         ),
         (SMALL + "[drawn]\ncolour = [1, 2]", "[drawn] unknown key 'colour'"),
         (SMALL + "[drawn]\ntempo = 1", "[drawn] tempo = 1; it must be a range: [least, most]"),

@@ -11,7 +11,7 @@ import pytest
 
 from rtradar.classify.baselines import (
     BASELINES,
-    judge_baselines,
+    evaluate_baselines,
     metadata_features,
     rdt_features,
     spatial_features,
@@ -44,7 +44,7 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
     made_up: Callable[..., Any],
 ) -> None:
     clouds = made_up(per_class=12)
-    found = judge_baselines(clouds, study_of(clouds))
+    found = evaluate_baselines(clouds, study_of(clouds))
     assert list(found) == list(BASELINES)
     mean = {name: summary(outcomes)["mean"] for name, outcomes in found.items()}
     assert mean["nearest centroid, RDT cloud"] > 0.9
@@ -57,7 +57,7 @@ def test_simple_features_tell_made_up_motions_apart_and_metadata_do_not(
 
 def test_other_clouds_are_refused(made_up: Callable[..., Any]) -> None:
     with pytest.raises(InputError, match="not those that 'study' learnt from"):
-        judge_baselines(made_up(per_class=4), study_of(made_up(per_class=5)))
+        evaluate_baselines(made_up(per_class=4), study_of(made_up(per_class=5)))
 
 
 def test_clouds_of_the_same_intervals_by_another_model_are_refused(
@@ -67,7 +67,7 @@ def test_clouds_of_the_same_intervals_by_another_model_are_refused(
     for row in others.rows:
         row["fidelity"] = "specular"
     with pytest.raises(InputError, match="not those that 'study' learnt from"):
-        judge_baselines(others, study_of(clouds))
+        evaluate_baselines(others, study_of(clouds))
 
 
 def test_empty_clouds_and_single_points_have_features(made_up: Callable[..., Any]) -> None:

@@ -14,7 +14,7 @@ import pytest
 from rtradar.errors import InputError
 from rtradar.pipeline.pictures.run_view import load_linked, view
 from rtradar.radar import Radar
-from rtradar.report.view.snapshots import Moments, save_moments
+from rtradar.report.view.snapshots import Snapshots, save_snapshots
 
 RADAR = Radar(
     tx_y=1,
@@ -38,7 +38,7 @@ CLOUD = {"points": np.array([[0.002, 0.4, 0.1], [0.004, 0.8, -0.1]])}
 COLUMNS = {name: np.array([0.1, 0.2]) for name in ("velocity", "power", "time")}
 
 
-def moments(**changes: Any) -> Moments:
+def moments(**changes: Any) -> Snapshots:
     none = np.zeros(0, dtype=np.int64)
     fields = {
         "times": MAPS["time"],
@@ -58,7 +58,7 @@ def moments(**changes: Any) -> Moments:
         "furniture_faces": none.reshape(0, 3),
         "furniture_piece": none,
     }
-    return Moments(**fields | changes)
+    return Snapshots(**fields | changes)
 
 
 @pytest.fixture
@@ -70,7 +70,7 @@ def folder(tmp_path: Path) -> Path:
     (out / "summary.json").write_text(
         json.dumps({"parameters": parameters, "fidelity": "analytic"})
     )
-    save_moments(out / "view.npz", moments())
+    save_snapshots(out / "view.npz", moments())
     with h5py.File(out / "maps.h5", "w") as file:
         for name, values in MAPS.items():
             file[name] = values

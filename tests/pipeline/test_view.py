@@ -38,8 +38,10 @@ def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
         + linked.range_doppler.step_db * linked.range_doppler.level.astype(float)
     )
     with h5py.File(made / "maps.h5") as maps:
-        assert linked.moments.times.tolist() == pytest.approx(maps["time"][linked.moments.window])
-        power, velocity = maps["range_doppler"][:][linked.moments.window], maps["velocity"][:]
+        assert linked.snapshots.times.tolist() == pytest.approx(
+            maps["time"][linked.snapshots.window]
+        )
+        power, velocity = maps["range_doppler"][:][linked.snapshots.window], maps["velocity"][:]
         distance = maps["range"][:]
     # Mean of 8 channels, with R^4 for the loss over distance; the first bin's centre is at 0 m, its end at half a bin.
     loss_db = 40 * np.log10(np.maximum(distance, distance[1] / 2))[:, None]
@@ -50,21 +52,21 @@ def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
 
 def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
     linked = load_linked(made)
-    moments, levels = linked.moments, linked.range_doppler
+    snapshots, levels = linked.snapshots, linked.range_doppler
     near = 0
-    for step in range(len(moments.times)):
+    for step in range(len(snapshots.times)):
         row, column = np.unravel_index(levels.level[step].argmax(), levels.level.shape[1:])
         distance, velocity = (
             levels.up[0] + row * levels.up[1],
             levels.across[0] + column * levels.across[1],
         )
         bins = np.hypot(
-            (moments.range_m[step] - distance) / levels.up[1],
+            (snapshots.range_m[step] - distance) / levels.up[1],
             (linked.shown_velocity()[step] - velocity) / levels.across[1],
         )
         near += bins[linked.seen[step]].min() <= 1.5
     # One of them is within its cell or next to it, but for the odd window in which parts interfere.
-    assert near >= len(moments.times) - 1
+    assert near >= len(snapshots.times) - 1
 
 
 def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:

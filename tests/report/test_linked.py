@@ -13,7 +13,7 @@ from rtradar.body import Body
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts, view_data
-from rtradar.report.view.snapshots import Moments
+from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 
 RADAR = rt.Radar.preset("paper-12ghz")
@@ -26,7 +26,7 @@ def linked(
     """Two snapshots: a head at 4 m, -1 m/s, and a left foot at 5 m, +8 m/s, which is ambiguous."""
     body = Body.from_motion(place(rt.synthetic_motion("walk", seed=0), duration_s=0.3))
     times = np.array([0.1, 0.2])
-    moments = Moments(
+    snapshots = Snapshots(
         times=times,
         window=np.array([0, 1]),
         part_names=np.array(body.part_names),
@@ -50,7 +50,7 @@ def linked(
     return RunView(
         heading="walk",
         subtitle="",
-        moments=moments,
+        snapshots=snapshots,
         radar=RADAR,
         range_doppler=Levels(
             level=level,

@@ -73,33 +73,33 @@ def test_the_slider_moves_every_view(
     browser: Any, seen: tuple[str, RunView], beside_a_wall: tuple[rt.Radar, rt.Scene]
 ) -> None:
     (address, linked), (radar, _) = seen, beside_a_wall
-    moments = linked.moments
+    snapshots = linked.snapshots
     browser.open(f"{address}#t=0.1")
     pictures = []
-    for step in (2, len(moments.times) - 2):
+    for step in (2, len(snapshots.times) - 2):
         go(browser, step)
         # The body where the run had it: vertices of a sphere sum up to its centre, in float32 of
         # some metres.
-        np.testing.assert_allclose(centres(browser), moments.poses[step, :, 0], atol=1e-5)
-        time = moments.times[step]
+        np.testing.assert_allclose(centres(browser), snapshots.poses[step, :, 0], atol=1e-5)
+        time = snapshots.times[step]
         assert browser.evaluate("document.getElementById('clock').textContent").startswith(
             f"{time:.2f} / "
         )
         # Direct paths: antenna, specular point, gap, for each echo above the floor.
-        own = np.flatnonzero(linked.seen[step] & moments.direct)
+        own = np.flatnonzero(linked.seen[step] & snapshots.direct)
         lines = np.stack([values(browser, "figure", 5, axis) for axis in "xyz"], axis=1).reshape(
             len(own), 3, 3
         )
         np.testing.assert_allclose(
             lines[:, 0], np.broadcast_to(radar.position_m, (len(own), 3)), atol=1e-6
         )
-        np.testing.assert_allclose(lines[:, 1], moments.corners[step, own, 0], atol=1e-6)
+        np.testing.assert_allclose(lines[:, 1], snapshots.corners[step, own, 0], atol=1e-6)
         # Over the wall: antenna, wall and body or body and wall, antenna, gap.
-        ghosts = np.flatnonzero(linked.seen[step] & ~moments.direct)
+        ghosts = np.flatnonzero(linked.seen[step] & ~snapshots.direct)
         lines = np.stack([values(browser, "figure", 6, axis) for axis in "xyz"], axis=1).reshape(
             len(ghosts), 5, 3
         )
-        np.testing.assert_allclose(lines[:, 1:3], moments.corners[step, ghosts], atol=1e-6)
+        np.testing.assert_allclose(lines[:, 1:3], snapshots.corners[step, ghosts], atol=1e-6)
         # The map of this window, and its echoes where they show.
         shown = browser.evaluate(
             "document.getElementById('scene-map').data[0].z.map((row) => Array.from(row))"
@@ -112,7 +112,7 @@ def test_the_slider_moves_every_view(
             values(browser, "map", 1, "x"), linked.shown_velocity()[step, own], atol=1e-5
         )
         np.testing.assert_allclose(
-            values(browser, "map", 1, "y"), moments.range_m[step, own], atol=1e-5
+            values(browser, "map", 1, "y"), snapshots.range_m[step, own], atol=1e-5
         )
         # The cursor on the spectrogram, and the points of this window in the cloud.
         cursor = browser.evaluate(
@@ -134,17 +134,17 @@ def test_the_slider_moves_every_view(
 
 def test_colours_are_of_part_power_or_velocity(browser: Any, seen: tuple[str, RunView]) -> None:
     address, linked = seen
-    moments, step = linked.moments, 3
+    snapshots, step = linked.snapshots, 3
     browser.open(f"{address}#t=0.1")
     go(browser, step)
-    own = np.flatnonzero(linked.seen[step] & moments.direct)
-    expected = {"power": linked.power_db[step, own], "velocity": moments.velocity_mps[step, own]}
+    own = np.flatnonzero(linked.seen[step] & snapshots.direct)
+    expected = {"power": linked.power_db[step, own], "velocity": snapshots.velocity_mps[step, own]}
     for mode, wanted in expected.items():
         browser.set("colour", mode, "change")
         browser.wait(f"document.documentElement.dataset.colour === '{mode}'")
         np.testing.assert_allclose(values(browser, "map", 1, "marker.color"), wanted, atol=1e-4)
         painted = values(browser, "figure", 0, "intensity").reshape(21, -1)[
-            moments.echo_part[own], 0
+            snapshots.echo_part[own], 0
         ]
         np.testing.assert_allclose(painted, wanted, atol=1e-4)
         assert browser.evaluate("document.getElementById('groups').hidden")

@@ -17,7 +17,7 @@ from rtradar.pipeline.pictures.run_pictures import thinned
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import HANN_BINS, FieldUnit, field_unit
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
-from rtradar.report.view.snapshots import Moments, load_moments
+from rtradar.report.view.snapshots import Snapshots, load_snapshots
 from rtradar.report.view.still import draw_still
 from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json, stored
@@ -86,7 +86,7 @@ def view(
         raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
     check_whole(Path(folder))
     linked = load_linked(Path(folder))
-    times = linked.moments.times
+    times = linked.snapshots.times
     if (
         time_s is not None
         and not times[0] - linked.radar.frame_duration_s
@@ -98,7 +98,7 @@ def view(
         )
     told: dict[str, Any] = {
         "windows": len(times),
-        "echoes": len(linked.moments.echo_part),
+        "echoes": len(linked.snapshots.echo_part),
         "first_s": float(times[0]),
         "last_s": float(times[-1]),
     }
@@ -106,7 +106,7 @@ def view(
         write_view(page, linked, name=printable(Path(folder).resolve().name), colour=colour)
         told["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
     if still is not None:
-        step = linked.moments.nearest(float(times.mean()) if time_s is None else time_s)
+        step = linked.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
         draw_still(still, linked, step, colour=colour)
         told["still"] = {
             "path": str(still),
@@ -131,7 +131,7 @@ def load_linked(folder: Path) -> RunView:
     summary, radar = _summary(folder / "summary.json")
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
-    moments = load_moments(folder / "view.npz")
+    snapshots = load_snapshots(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
     spatial = _archive(
         folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",)
@@ -140,9 +140,9 @@ def load_linked(folder: Path) -> RunView:
     try:
         with open_regular(path) as raw, h5py.File(raw) as file:
             maps = _maps(file)
-            if moments.window.min() < 0 or moments.window.max() >= len(maps["time"]):
+            if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
-            range_doppler = _range_doppler(maps, moments, radar, spreading)
+            range_doppler = _range_doppler(maps, snapshots, radar, spreading)
             spectrogram = _spectrogram(maps, radar, spreading)
             points = rdt["points"].reshape(-1, 3)
             rdt_power_db = _at_points(maps, points, radar, spreading)
@@ -168,7 +168,7 @@ def load_linked(folder: Path) -> RunView:
     return RunView(
         heading=_line(parameters.get("motion", "Recording")),
         subtitle=", ".join([f"radar {radar.name}", f"fidelity {fidelity}", scene]) + cleaned,
-        moments=moments,
+        snapshots=snapshots,
         radar=radar,
         range_doppler=range_doppler,
         spectrogram=spectrogram,
@@ -247,12 +247,12 @@ def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
     return low, (top_db - low) / MOST_LEVEL
 
 
-def _range_doppler(maps: Any, moments: Moments, radar: Radar, spreading: bool) -> Levels:
-    """Maps of the moments' windows, mean of the channels."""
+def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
+    """Maps of the snapshots' windows, mean of the channels."""
     power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
     unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
     scale = np.asarray(unit.scale) / radar.n_channels
-    windows = moments.window.tolist()
+    windows = snapshots.window.tolist()
     top = max(float((power[window] * scale).max()) for window in windows)
     noise = [
         float(np.median(power[window] * scale))

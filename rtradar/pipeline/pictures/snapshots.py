@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.report.view.snapshots import Moments
+from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
@@ -54,7 +54,7 @@ def moments(
     scene: Scene,
     windows: NDArray[np.int64],
     n_chirps: int,
-) -> Moments:
+) -> Snapshots:
     """Look at the middle of windows.
 
     Parameters
@@ -72,7 +72,7 @@ def moments(
 
     Returns
     -------
-    Moments
+    Snapshots
         Of evenly chosen windows; as large for any length of the capture.
     """
     hop_s = (
@@ -91,7 +91,7 @@ def moments(
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
     vertices, faces, piece = _furniture(scene)
-    return Moments(
+    return Snapshots(
         times=times,
         window=window,
         part_names=np.array(body.part_names),

@@ -19,7 +19,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.pages.html import Titles, player, write_page
-from rtradar.report.view.snapshots import Moments
+from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import packed_floats, posed_figure, rdt_data, spatial_data
 
 COLOURS = ("part", "power", "velocity")
@@ -123,7 +123,7 @@ _NEAREST_BINS = 4.0  # a point of the cloud farther from any echo belongs to non
 class RunView:
     """Data of a run that the view page and its still pictures show.
 
-    ``moments`` are snapshots of body and echoes, and ``radar`` is at its position in the scene.
+    ``snapshots`` are snapshots of body and echoes, and ``radar`` is at its position in the scene.
     ``range_doppler`` has one map, the mean of the channels, for each snapshot; ``spectrogram`` one
     map, time across and velocity up, without columns if the capture is too short. ``rdt_points``
     (point, 3) are time [s], range [m] and velocity [m/s], and ``rdt_power_db`` (point,) the power
@@ -132,7 +132,7 @@ class RunView:
 
     heading: str
     subtitle: str
-    moments: Moments
+    snapshots: Snapshots
     radar: Radar
     range_doppler: Levels
     spectrogram: Levels
@@ -144,12 +144,12 @@ class RunView:
     @property
     def power_unit(self) -> FieldUnit:
         """Unit of the power of each echo (step, echo), the same as of the range-Doppler map."""
-        return field_unit(self.radar, spreading=self.spreading, range_m=self.moments.range_m)
+        return field_unit(self.radar, spreading=self.spreading, range_m=self.snapshots.range_m)
 
     @property
     def power_db(self) -> NDArray[np.float64]:
         """Power of each echo (step, echo) in `power_unit` [dB]; NaN if it is occluded."""
-        power = self.moments.power_m2
+        power = self.snapshots.power_m2
         return np.where(power > 0, self.power_unit.level(power), np.nan)
 
     @property
@@ -166,12 +166,16 @@ class RunView:
     @property
     def fastest_mps(self) -> float:
         """Largest range rate of the colour scale [m/s]."""
-        rates = [*np.abs(self.moments.velocity_mps[self.seen]), *np.abs(self.rdt_points[:, 2]), 0.1]
+        rates = [
+            *np.abs(self.snapshots.velocity_mps[self.seen]),
+            *np.abs(self.rdt_points[:, 2]),
+            0.1,
+        ]
         return float(max(rates))
 
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
-        moments, levels = self.moments, self.range_doppler
+        snapshots, levels = self.snapshots, self.range_doppler
 
         def box(
             values: NDArray[np.float64], column: int, margin: float, axis: tuple[float, float]
@@ -186,25 +190,25 @@ class RunView:
             return max(least, low), min(most, high)
 
         velocity = box(self.shown_velocity(), 2, 1.0, levels.across)
-        return velocity, box(moments.range_m, 1, 0.5, levels.up)
+        return velocity, box(snapshots.range_m, 1, 0.5, levels.up)
 
     def shown_velocity(self) -> NDArray[np.float64]:
         """Return the aliased velocity of each echo (step, echo) [m/s], as on the velocity axis."""
         most = self.radar.max_velocity_mps
-        return np.asarray((self.moments.velocity_mps + most) % (2 * most) - most)
+        return np.asarray((self.snapshots.velocity_mps + most) % (2 * most) - most)
 
     def rdt_group(self) -> NDArray[np.int64]:
         """Return the group of body parts of each point (point,), that of the nearest echo."""
-        moments, radar = self.moments, self.radar
-        steps = np.abs(self.rdt_points[:, :1] - moments.times).argmin(axis=1)
-        groups = np.array(group_of_parts(moments.part_names.tolist()))[moments.echo_part]
+        snapshots, radar = self.snapshots, self.radar
+        steps = np.abs(self.rdt_points[:, :1] - snapshots.times).argmin(axis=1)
+        groups = np.array(group_of_parts(snapshots.part_names.tolist()))[snapshots.echo_part]
         seen, velocity = self.seen, self.shown_velocity()
         found = np.full(len(steps), len(GROUPS) - 1)
         for point, step in enumerate(steps):
             own = np.flatnonzero(seen[step])
             if len(own):
                 bins = np.hypot(
-                    (moments.range_m[step, own] - self.rdt_points[point, 1]) / radar.range_bin_m,
+                    (snapshots.range_m[step, own] - self.rdt_points[point, 1]) / radar.range_bin_m,
                     (velocity[step, own] - self.rdt_points[point, 2]) / radar.velocity_bin_mps,
                 )
                 if bins.min() <= _NEAREST_BINS:
@@ -255,36 +259,36 @@ def write_view(
 
 def view_data(run_view: RunView) -> dict[str, Any]:
     """Return the data of the page's script as plain values for JSON."""
-    moments, radar = run_view.moments, run_view.radar
-    figure = posed_figure(moments.part_names.tolist(), moments.times, moments.poses, radar)
-    figure["ranges"] = _with_room(figure["ranges"], moments)
+    snapshots, radar = run_view.snapshots, run_view.radar
+    figure = posed_figure(snapshots.part_names.tolist(), snapshots.times, snapshots.poses, radar)
+    figure["ranges"] = _with_room(figure["ranges"], snapshots)
     group = run_view.rdt_group()
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
     return {
         "figure": figure,
         "echoes": {
-            "paths": moments.path_names.tolist(),
-            "path": moments.echo_path.tolist(),
-            "part": moments.echo_part.tolist(),
-            "bounces": moments.echo_bounces.tolist(),
-            "range_m": packed_floats(moments.range_m),
-            "velocity_mps": packed_floats(moments.velocity_mps),
+            "paths": snapshots.path_names.tolist(),
+            "path": snapshots.echo_path.tolist(),
+            "part": snapshots.echo_part.tolist(),
+            "bounces": snapshots.echo_bounces.tolist(),
+            "range_m": packed_floats(snapshots.range_m),
+            "velocity_mps": packed_floats(snapshots.velocity_mps),
             "power_db": packed_floats(run_view.power_db),
-            "corners": packed_floats(moments.corners),
+            "corners": packed_floats(snapshots.corners),
             "radar_m": list(radar.position_m),
         },
         "room": {
-            "walls": np.round(moments.walls, 4).tolist(),
-            "furniture": moments.furniture_names.tolist(),
-            "vertices": packed_floats(moments.furniture_vertices),
-            "faces": moments.furniture_faces.ravel().tolist(),
-            "piece": moments.furniture_piece.tolist(),
+            "walls": np.round(snapshots.walls, 4).tolist(),
+            "furniture": snapshots.furniture_names.tolist(),
+            "vertices": packed_floats(snapshots.furniture_vertices),
+            "faces": snapshots.furniture_faces.ravel().tolist(),
+            "piece": snapshots.furniture_piece.tolist(),
         },
         "groups": {
             "names": list(GROUPS),
             "colours": list(GROUPS.values()),
-            "of_part": group_of_parts(moments.part_names.tolist()),
+            "of_part": group_of_parts(snapshots.part_names.tolist()),
         },
         "velocity_colours": VELOCITY_COLOURS,
         "power_label": run_view.power_unit.label("of an echo"),
@@ -303,10 +307,10 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     }
 
 
-def _with_room(ranges: list[list[float]], moments: Moments) -> list[list[float]]:
+def _with_room(ranges: list[list[float]], snapshots: Snapshots) -> list[list[float]]:
     """Extend the limits of the axes to walls and furniture, rounded to half metres."""
     places = np.concatenate(
-        [moments.walls.reshape(-1, 3), moments.furniture_vertices, np.array(ranges).T]
+        [snapshots.walls.reshape(-1, 3), snapshots.furniture_vertices, np.array(ranges).T]
     )
     low = np.floor(2 * places.min(axis=0) - 1e-6) / 2
     high = np.ceil(2 * places.max(axis=0) + 1e-6) / 2

@@ -46,7 +46,7 @@ _POINTS_INTO = {
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Moments:
+class Snapshots:
     """Snapshots of a capture at the centres of some frames, stored by field in ``view.npz``.
 
     Parameters
@@ -117,7 +117,7 @@ class Moments:
             object.__setattr__(self, name, _checked(name, getattr(self, name), sizes))
         if not sizes["step"] or not sizes["part"]:
             raise InputError(
-                "view: there is no moment or no body part; at least one of each is needed"
+                "view: there is no snapshot or no body part; at least one of each is needed"
             )
         for name, axis in _POINTS_INTO.items():
             index = getattr(self, name)
@@ -169,14 +169,14 @@ def _checked(name: str, values: Any, sizes: dict[str, int]) -> NDArray[Any]:
     return array.astype(kind)
 
 
-def save_moments(path: str | Path, moments: Moments) -> None:
+def save_snapshots(path: str | Path, snapshots: Snapshots) -> None:
     """Write snapshots as a NumPy archive; InputError if the file cannot be written."""
-    arrays = {name: getattr(moments, name) for name in _FIELDS}
+    arrays = {name: getattr(snapshots, name) for name in _FIELDS}
     with atomic_file(path) as file:
         np.savez_compressed(file, format=np.array(_FORMAT), **arrays)
 
 
-def load_moments(path: str | Path) -> Moments:
+def load_snapshots(path: str | Path) -> Snapshots:
     """Read snapshots; InputError if the file is missing, damaged or of another kind."""
     mend = "make it anew with: rtradar run"
     try:
@@ -186,11 +186,11 @@ def load_moments(path: str | Path) -> Moments:
         raise InputError(f"'{path}' is not there; {mend}") from None
     except (OSError, ValueError, KeyError) as error:
         raise InputError(
-            f"'{path}' is damaged or no file of moments ({' '.join(str(error).split())}); {mend}"
+            f"'{path}' is damaged or no file of snapshots ({' '.join(str(error).split())}); {mend}"
         ) from None
     if found.pop("format").tolist() != _FORMAT:
         raise InputError(f"'{path}' is of another version of rtradar; {mend}")
     try:
-        return Moments(**found)
+        return Snapshots(**found)
     except InputError as error:
         raise InputError(f"'{path}': {error}; {mend}") from None

@@ -25,7 +25,7 @@ def draw_still(path: str | Path, run_view: RunView, step: int, *, colour: str = 
     """
     figure = new_figure(15, 9.5)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.25, 1), height_ratios=(1.25, 1))
-    time = f"{run_view.moments.times[step]:.2f} s"
+    time = f"{run_view.snapshots.times[step]:.2f} s"
     figure.suptitle(f"{run_view.heading}, {run_view.subtitle}: {time}", wrap=True)
     paint = _Paint(run_view, colour)
     views = [
@@ -55,15 +55,15 @@ class _Paint:
         from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 
         self.colour, self._run_view = colour, run_view
-        moments = run_view.moments
-        self._groups = np.array(group_of_parts(moments.part_names.tolist()))
+        snapshots = run_view.snapshots
+        self._groups = np.array(group_of_parts(snapshots.part_names.tolist()))
         fastest = run_view.fastest_mps
-        of_echo = np.broadcast_to(self._groups[moments.echo_part], moments.range_m.shape)
+        of_echo = np.broadcast_to(self._groups[snapshots.echo_part], snapshots.range_m.shape)
         rates = LinearSegmentedColormap.from_list("rates", list(VELOCITY_COLOURS))
         self.map, limits, self._echo = {
             "part": (ListedColormap(list(GROUPS.values())), (-0.5, len(GROUPS) - 0.5), of_echo),
             "power": (colormaps["viridis"], run_view.power_range_db, run_view.power_db),
-            "velocity": (rates, (-fastest, fastest), moments.velocity_mps),
+            "velocity": (rates, (-fastest, fastest), snapshots.velocity_mps),
         }[colour]
         self.norm = Normalize(*limits)
 
@@ -73,14 +73,14 @@ class _Paint:
 
     def parts(self, step: int) -> NDArray[np.float64]:
         """Colour of each part (part, rgba), by its strongest direct echo."""
-        moments = self._run_view.moments
+        snapshots = self._run_view.snapshots
         if self.colour == "part":
             return self._rgba(self._groups.astype(np.float64))
-        out = np.full(len(moments.part_names), np.nan)
-        power = moments.power_m2[step]
+        out = np.full(len(snapshots.part_names), np.nan)
+        power = snapshots.power_m2[step]
         for echo in np.argsort(power, kind="stable"):
-            if moments.direct[echo]:
-                out[moments.echo_part[echo]] = self._echo[step, echo]
+            if snapshots.direct[echo]:
+                out[snapshots.echo_part[echo]] = self._echo[step, echo]
         return self._rgba(out)
 
     def cloud(self) -> NDArray[np.float64]:
@@ -119,33 +119,33 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     from matplotlib.ticker import MultipleLocator
     from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 
-    moments, radar = run_view.moments, run_view.radar
+    snapshots, radar = run_view.snapshots, run_view.radar
     vertices, faces = unit_sphere(2)
-    poses = moments.poses[step].astype(np.float64)
+    poses = snapshots.poses[step].astype(np.float64)
     for rgba, (centre, *semi_axes) in zip(paint.parts(step), poses, strict=True):
         corners = (centre + vertices @ np.array(semi_axes))[faces]
         part = Poly3DCollection(corners, facecolors=rgba[:3], shade=True, linewidth=0)
         axes.add_collection3d(part)
-    outlines = [np.concatenate([corners, corners[:1]]) for corners in moments.walls]
+    outlines = [np.concatenate([corners, corners[:1]]) for corners in snapshots.walls]
     if outlines:
         axes.add_collection3d(Line3DCollection(outlines, colors="dimgrey", linewidths=1.2))
-    if len(moments.furniture_faces):
-        triangles = moments.furniture_vertices[moments.furniture_faces].astype(np.float64)
+    if len(snapshots.furniture_faces):
+        triangles = snapshots.furniture_vertices[snapshots.furniture_faces].astype(np.float64)
         style = {"facecolors": "#b08d57", "alpha": 0.18, "linewidth": 0}
         axes.add_collection3d(Poly3DCollection(triangles, **style))
     place = np.array(radar.position_m)
     rgba = paint.echoes(step)
     for echo in np.flatnonzero(run_view.seen[step]):
-        corners = moments.corners[step, echo].astype(np.float64)
+        corners = snapshots.corners[step, echo].astype(np.float64)
         corners = corners[np.isfinite(corners).all(axis=1)]
         if len(corners):
             line = np.concatenate([[place], corners, [place]])
-            width, alpha = (1.2, 0.8) if moments.direct[echo] else (0.6, 0.35)
+            width, alpha = (1.2, 0.8) if snapshots.direct[echo] else (0.6, 0.35)
             axes.plot(*line.T, color=rgba[echo], linewidth=width, alpha=alpha)
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
-    centres, walls = moments.poses[:, :, 0].reshape(-1, 3), moments.walls.reshape(-1, 3)
-    things = [centres, walls, moments.furniture_vertices, radar.tx, radar.rx]
+    centres, walls = snapshots.poses[:, :, 0].reshape(-1, 3), snapshots.walls.reshape(-1, 3)
+    things = [centres, walls, snapshots.furniture_vertices, radar.tx, radar.rx]
     everything = np.concatenate(things)
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
@@ -173,11 +173,11 @@ def _image(axes: Any, levels: Levels, number: int, colours: str) -> Any:
 
 
 def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
-    moments = run_view.moments
+    snapshots = run_view.snapshots
     image = _image(axes, run_view.range_doppler, step, "Greys")
     rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
     for direct in (False, True):
-        own = np.flatnonzero(run_view.seen[step] & (moments.direct == direct))
+        own = np.flatnonzero(run_view.seen[step] & (snapshots.direct == direct))
         style: dict[str, Any] = {
             "marker": "D",
             "s": 14,
@@ -186,7 +186,7 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
         }
         if direct:
             style = {"marker": "o", "s": 40, "color": rgba[own], "edgecolors": "white"}
-        axes.scatter(velocity[own], moments.range_m[step, own], linewidths=0.7, **style)
+        axes.scatter(velocity[own], snapshots.range_m[step, own], linewidths=0.7, **style)
     across, up = run_view.shown_box()
     axes.set(xlim=across, ylim=up, xlabel=VELOCITY_LABEL, ylabel="Range [m]")
     axes.set_title("Range-Doppler map of this window, and where echoes are")
@@ -194,7 +194,7 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
 
 
 def _draw_cloud(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
-    points, time = run_view.rdt_points, run_view.moments.times[step]
+    points, time = run_view.rdt_points, run_view.snapshots.times[step]
     axes.set(xlabel="Time [s]", ylabel="Range [m]", zlabel=VELOCITY_LABEL)
     axes.set_title(f"Range-Doppler-time cloud: {len(points)} points")
     axes.set_box_aspect((1.7, 1, 0.9), zoom=1.15)
@@ -215,5 +215,5 @@ def _draw_spectrogram(figure: Any, axes: Any, run_view: RunView, step: int) -> N
         axes.text(0.5, 0.5, "The capture is too short for one.", **style)
         return
     image = _image(axes, run_view.spectrogram, 0, "viridis")
-    axes.axvline(run_view.moments.times[step], color=_NOW, linewidth=1.5)
+    axes.axvline(run_view.snapshots.times[step], color=_NOW, linewidth=1.5)
     figure.colorbar(image, ax=axes, label=run_view.spectrogram.label)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.report.view.snapshots import Moments, load_moments, save_moments
+from rtradar.report.view.snapshots import Snapshots, load_snapshots, save_snapshots
 
 
-def example() -> Moments:
+def example() -> Snapshots:
     rng = np.random.default_rng(0)
-    return Moments(
+    return Snapshots(
         times=np.array([0.1, 0.2]),
         window=np.array([0, 4]),
         part_names=np.array(["head", "left foot", "neck"]),
@@ -38,9 +38,9 @@ def example() -> Moments:
 
 
 def test_what_is_written_is_read_again(tmp_path: Path) -> None:
-    save_moments(tmp_path / "view.npz", example())
-    found = load_moments(tmp_path / "view.npz")
-    for field in fields(Moments):
+    save_snapshots(tmp_path / "view.npz", example())
+    found = load_snapshots(tmp_path / "view.npz")
+    for field in fields(Snapshots):
         ours, read = getattr(example(), field.name), getattr(found, field.name)
         assert ours.dtype.kind == read.dtype.kind
         np.testing.assert_array_equal(ours, read)
@@ -105,9 +105,9 @@ def damage(path: Path, how: str) -> None:
 )
 def test_refuses_what_is_no_such_file(tmp_path: Path, how: str, said: str) -> None:
     path = tmp_path / "view.npz"
-    save_moments(path, example())
+    save_snapshots(path, example())
     damage(path, how)
     with pytest.raises(rt.InputError, match=said) as caught:
-        load_moments(path)
+        load_snapshots(path)
     assert "rtradar run" in str(caught.value)
     assert "\n" not in str(caught.value)
