@@ -172,10 +172,7 @@ class Combination(NamedTuple):
 
 
 class Spec(NamedTuple):
-    """Specification of a data set, see the keys in this module's docstring.
-
-    ``run`` has the seed and what the file gives of `RUN_KEYS`; each sample completes it.
-    """
+    """Specification of a data set; ``run`` has the seed and what the file gives of `RUN_KEYS`."""
 
     run: RunSettings
     intervals: Intervals

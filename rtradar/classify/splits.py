@@ -208,8 +208,8 @@ def _folds(
         maker = StratifiedGroupKFold(n_folds, shuffle=True, random_state=word(seed))
         parts = list(maker.split(labels, labels, groups))
     return [
-        Split(f"fold {number}", *(np.sort(side).astype(np.int64) for side in sides))
-        for number, sides in enumerate(parts, start=1)
+        Split(f"fold {number}", np.sort(train).astype(np.int64), np.sort(test).astype(np.int64))
+        for number, (train, test) in enumerate(parts, start=1)
     ]
 
 

@@ -236,6 +236,22 @@ def test_an_interval_to_the_end_may_be_rounded_up(tmp_path: Path) -> None:
     assert later.packed().motion is not None
 
 
+def test_settings_of_a_run_reach_the_sample_and_change_ids_where_they_are_not_the_usual_ones(
+    tmp_path: Path,
+) -> None:
+    text = HEAD + actors(1, "walk")
+    other = 'range_window = ["chebwin", 80]\ndetector = "ca-cfar"\nkeep_all = true\n'
+    (plain,), (same,), (changed,) = (
+        planned(tmp_path, more + text) for more in ("", 'range_window = "hann"\norder = 1\n', other)
+    )
+    assert plain.identity == same.identity != changed.identity
+    settings = changed.run_settings()
+    assert (settings.range_window, settings.doppler_window) == (["chebwin", 80.0], "hann")
+    assert (settings.detector, settings.keep_all, settings.variant) == ("ca-cfar", True, "cpu")
+    assert settings.snr_db == changed.parameters["snr_db"]
+    assert settings.seed == changed.parameters["seed"]
+
+
 def test_one_interval_twice_is_refused(tmp_path: Path) -> None:
     with pytest.raises(
         InputError, match=r"recording 'walk.bvh' from 0 s is given twice; leave one out"

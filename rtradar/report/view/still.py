@@ -145,8 +145,8 @@ def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
     axes.scatter(*radar.tx.T, color="crimson", marker="s", s=6, label="Tx", depthshade=False)
     axes.scatter(*radar.rx.T, color="royalblue", s=3, label="Rx", depthshade=False)
     centres, walls = snapshots.poses[:, :, 0].reshape(-1, 3), snapshots.walls.reshape(-1, 3)
-    things = [centres, walls, snapshots.furniture_vertices, radar.tx, radar.rx]
-    everything = np.concatenate(things)
+    furniture = snapshots.furniture_vertices
+    everything = np.concatenate([centres, walls, furniture, radar.tx, radar.rx])
     low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
     low[2] = min(low[2], 0.0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
