@@ -15,7 +15,7 @@ from docutils.parsers.rst import Directive
 from docutils.statemachine import StringList
 
 from rtradar.antenna import Antenna
-from rtradar.campaign.spec import DRAWN
+from rtradar.campaign.spec import DRAWN, EACH, RUN_KEYS, RUN_LIMITS, Intervals
 from rtradar.radar import Radar
 from rtradar.scene import (
     MATERIALS,
@@ -30,6 +30,7 @@ from rtradar.scene import (
 from rtradar.scene.materials import OWN_LIMITS
 from rtradar.scene.objects import FURNITURE_LIMITS, ROOM_LIMITS, SURFACE_LIMITS
 from rtradar.scene.scene import KEYS, PERSON_LIMITS
+from rtradar.settings import RunSettings
 
 SCENES = Path(__file__).parents[1] / "scenes"
 MESHES = Path(__file__).parents[1] / "meshes"
@@ -59,6 +60,52 @@ SCENE_TABLES: dict[str, tuple[Callable[..., object], str, Mapping[str, tuple[flo
     "[materials.NAME]": (own_material, "", OWN_LIMITS),
 }
 """What makes a table of a scene file: the code, a prefix of its parameters, limits of numbers."""
+
+DATA_SET_KEYS = {
+    "top": {"folder": ("folder of the recordings, from the folder of this file", "`.`")},
+    "[windows]": {
+        "start_s": ("start of the first interval [s]", None),
+        "duration_s": (
+            "length of each interval [s]; synthetic actors and `hop_s` need it",
+            "to the end",
+        ),
+        "hop_s": ("step from one interval to the next [s]", "one interval"),
+        "end_s": ("time by which the last interval must end [s]", "the end of the recording"),
+    },
+    "[each]": {
+        "radar": ("list of presets or TOML files", None),
+        "scene": ("list of names or TOML files", None),
+        "fidelity": ("list of fidelity levels", None),
+        "heading_deg": ("list of headings [deg]", "drawn"),
+        "snr_db": ("list of signal-to-noise ratios [dB]", "drawn"),
+        "person_position_m": ("list of places [x, y] [m]", "as the scene says"),
+        "radar_position_m": ("list of places [x, y, z] [m]", "as the scene or the radar says"),
+    },
+    "[drawn]": {"": ("range [least, most] from which each interval draws one value", "as below")},
+    "[[synthetic]]": {
+        "label": ("`walk`, `kick`, `punch` or `jumping_jack`; each at most once", "must be given"),
+        "count": ("number of takes; `count` or `seeds` is needed", ""),
+        "seeds": ("list of the seeds of the takes", ""),
+        "subjects": (
+            "number of subjects, or a list of their numbers; take k is of subject k modulo their "
+            "number",
+            "10",
+        ),
+    },
+    "[[recordings]]": {
+        "file": ("the recording, in `folder` or below", "must be given"),
+        "skeleton": ("the `.asf` of an `.amc`", ""),
+        **dict.fromkeys(
+            ("label", "subject", "licence"),
+            ("text that goes into the provenance", "must be given"),
+        ),
+        **dict.fromkeys(
+            ("start_s", "duration_s", "hop_s", "end_s"),
+            ("in place of that of `[windows]`", "that of `[windows]`"),
+        ),
+    },
+}
+"""Meanings of the keys of a data set; defaults of None follow from the code."""
 
 
 def pipe_table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> str:
@@ -101,9 +148,11 @@ def toml(value: object) -> str:
         return f'`"{value}"`'
     if isinstance(value, bool):
         return f"`{str(value).lower()}`"
-    if isinstance(value, tuple):
-        return f"`{list(value)}`"
+    if isinstance(value, tuple | list):
+        return f"`{list(value)}`".replace("'", '"')
     number = float(str(value))
+    if 0 < number < 1e-6:
+        return f"`{number:g}`"
     power = 3 * int(np.floor(np.log10(number) / 3 + 1e-9)) if number > 0 else 0
     return f"`{number:g}`" if "e" not in f"{number:g}" else f"`{number / 10.0**power:g}e{power}`"
 
@@ -126,6 +175,28 @@ def scene_keys() -> str:
             least, most = (toml(limit).strip("`") for limit in limits.get(key, (0, 0)))
             allowed = f"{least} to {most}" if key in limits else ""
             rows.append([f"`{table}`", f"`{key}`", texts[name], allowed, usual])
+    return pipe_table(["table", "key", "meaning", "allowed", "default"], rows)
+
+
+def data_set_keys() -> str:
+    """Keys of all tables of a data set; those of a run come from its settings."""
+    usual: dict[str, object] = {key: values[0] for key, values in EACH.items()}
+    for thing in (RunSettings, Intervals):
+        usual |= {one.name: one.default for one in dataclasses.fields(thing)}
+    rows = []
+    for names, kind, meaning in described(inspect.getdoc(RunSettings) or ""):
+        for key in names:
+            limits = " to ".join(toml(limit).strip("`") for limit in RUN_LIMITS.get(key, ()))
+            allowed = kind.strip("{}") if kind.startswith("{") else limits
+            if key in ("seed", *RUN_KEYS):
+                rows.append(["`top`", f"`{key}`", meaning, allowed, toml(usual[key])])
+    for table, own in DATA_SET_KEYS.items():
+        for key, (meaning, default) in own.items():
+            shown = (
+                toml([usual[key]] if key in EACH else usual[key]) if default is None else default
+            )
+            name = f"`{key}`" if key else "a name of the table below"
+            rows.append([f"`{table}`", name, meaning, "", shown])
     return pipe_table(["table", "key", "meaning", "allowed", "default"], rows)
 
 
@@ -214,6 +285,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "meshes": meshes,
     "scenes": scenes,
     "drawn": drawn,
+    "data-set-keys": data_set_keys,
 }
 
 

@@ -79,11 +79,11 @@ def allowed(read, text: str, path: Path) -> set[str]:  # type: ignore[no-untyped
 
 
 def rows(name: str) -> dict[str, set[str]]:
-    """Keys by table, of the page's table of keys; an empty cell is that of the row before."""
+    """Keys by table, of the page's table of keys."""
     found: dict[str, set[str]] = {}
     table = ""
-    text = TABLES["scene-keys"]() if name == "scenes.md" else page(name)
-    for line in text.split("| table | key |")[1].split("\n\n")[0].splitlines()[2:]:
+    text = TABLES["scene-keys" if name == "scenes.md" else "data-set-keys"]()
+    for line in text.splitlines()[2:]:
         cells = line.split(" | ")
         table = cells[0].strip("| `") or table
         found.setdefault(table.replace("`", ""), set()).update(re.findall(r"`([^`]+)`", cells[1]))

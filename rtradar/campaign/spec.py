@@ -55,8 +55,11 @@ _SWITCHES = ("keep_all", "spreading")
 RUN_KEYS = ("pfa", *_NAMED, *_WINDOWS, "order", *_SWITCHES)
 """Settings of a run that a file may give for all samples."""
 
+RUN_LIMITS: Mapping[str, tuple[float, float]] = {"pfa": (1e-15, 0.5), "order": (0, 3)}
+"""Limits of those that are numbers."""
+
 _TOP = ("seed", *RUN_KEYS, "folder", "windows", "each", "drawn", "synthetic", "recordings")
-_EACH: Mapping[str, list[Any]] = {
+EACH: Mapping[str, list[Any]] = {
     "radar": ["paper-12ghz"],
     "scene": ["free-space"],
     "fidelity": ["specular"],
@@ -70,7 +73,6 @@ _EACH: Mapping[str, list[Any]] = {
 _SYNTHETIC = ("label",), ("count", "seeds", "subjects")
 _RECORDING = ("file", "label", "subject", "licence"), ("skeleton", *INTERVAL_KEYS)
 _MOST = 1_000_000
-_MOST_ORDER = 3
 _VARIABLE = re.compile(r"\$\{(\w+)\}(?=/|$)")
 _SLACK_S = 1e-6  # by which rounding may shorten a recording
 
@@ -211,7 +213,7 @@ def _spec(table: Table, folder: Path) -> Spec:
     check_keys("", table, (), _TOP)
     drawn_table, each = table_at("drawn", table), table_at("each", table)
     check_keys("[drawn] ", drawn_table, (), tuple(DRAWN))
-    check_keys("[each] ", each, (), tuple(_EACH))
+    check_keys("[each] ", each, (), tuple(EACH))
     for key in drawn_table:
         if key in each:
             raise InputError(f"{key} is under [each] and under [drawn]; give it once")
@@ -230,7 +232,7 @@ def _spec(table: Table, folder: Path) -> Spec:
         raise InputError(
             "[windows] duration_s is missing; synthetic actors have no end of their own"
         )
-    lists = {key: _several(each, key, usual) for key, usual in _EACH.items()}
+    lists = {key: _several(each, key, usual) for key, usual in EACH.items()}
     takes = sum(len(actor.seeds) for actor in actors)
     count = takes * intervals.count(intervals.needed_s)
     count += sum(recorded.intervals.count() for recorded in recordings)
@@ -259,9 +261,9 @@ def _run_settings(table: Table) -> RunSettings:
                 f"{key} = {shown(value)}; it must be a name, or a list of a name and a number"
             )
     if "pfa" in given:
-        given["pfa"] = check_number("data set", "pfa", given["pfa"], 1e-15, 0.5)
+        given["pfa"] = check_number("data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
     if "order" in given:
-        _whole("", "order", given["order"], _MOST_ORDER)
+        _whole("", "order", given["order"], int(RUN_LIMITS["order"][1]))
     run = RunSettings(seed=check_seed("", table.get("seed", 0)), **given)
     windows = WindowFunctions(run.range_window, run.doppler_window)
     return dataclasses.replace(run, range_window=windows.range, doppler_window=windows.doppler)
