@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.system.checks import check_number, shown
+from rtradar.system.toml_tables import check_keys
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
 _PATTERNS = ("isotropic", "cosine", "dipole", "table")
@@ -109,10 +110,7 @@ class Antenna:
         InputError
             Where there is an unknown key, or a value without meaning.
         """
-        known = [field.name for field in dataclasses.fields(cls)]
-        for key in table:
-            if key not in known:
-                raise InputError(f"antenna: unknown key {shown(key)}; allowed: {', '.join(known)}")
+        check_keys("antenna: ", table, (), tuple(field.name for field in dataclasses.fields(cls)))
         return cls(**table)
 
     @property

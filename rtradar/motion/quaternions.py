@@ -55,6 +55,22 @@ def quaternion_multiply(
     return np.concatenate([vector, scalar], axis=-1)
 
 
+def smallest_rotation(
+    before: NDArray[np.float64], after: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Quaternions (..., 4) of the smallest rotations that take unit vectors (..., 3) to others.
+
+    Between opposite vectors half a turn about any line across them will do.
+    """
+    cosine = np.sum(before * after, axis=-1, keepdims=True)
+    rotation = np.concatenate([np.cross(before, after), 1 + cosine], axis=-1)
+    norms = np.linalg.norm(rotation, axis=-1, keepdims=True)
+    across = np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=-1)])
+    across /= np.linalg.norm(across, axis=-1, keepdims=True)
+    half = np.concatenate([across, np.zeros((*across.shape[:-1], 1))], axis=-1)
+    return np.where(norms > 1e-6, rotation / np.maximum(norms, 1e-6), half)
+
+
 def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
     """Choose the signs of quaternions (frame, ..., 4) so that each is nearest to the one before."""
     if all(same_side.all() for _, same_side in _sides(quaternions)):

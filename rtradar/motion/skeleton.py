@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate
+from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, smallest_rotation
 from rtradar.system.row_files import FileBackedRows, in_blocks
 
 Array = NDArray[np.float64]
@@ -275,11 +275,8 @@ def _between(motion: Motion, first: int, last: int) -> _Bone:
     rest /= max(float(np.linalg.norm(rest)), 1e-12)
 
     def pointing(positions: Array, rotations: Array) -> Array:
-        # The smallest rotation from the rest direction to that of the chord in each frame.
         directions = _directions(chord(positions, rotations))
-        swing = np.concatenate([np.cross(rest, directions), 1 + directions @ rest[:, None]], axis=1)
-        norms = np.linalg.norm(swing, axis=1, keepdims=True)
-        swing = np.where(norms > 1e-9, swing / np.maximum(norms, 1e-9), [1.0, 0.0, 0.0, 0.0])
+        swing = smallest_rotation(np.broadcast_to(rest, directions.shape), directions)
         return quaternion_multiply(rotations[:, last], swing)
 
     return _Bone(length * rest, pointing)

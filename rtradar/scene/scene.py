@@ -31,20 +31,17 @@ from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, t
 Piece = TypeVar("Piece", Wall, Furniture)
 
 KEYS: Mapping[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
-    "top": ((), ("name", "description")),
-    "[radar]": (("position_m",), ()),
-    "[person]": ((), ("position_m", "heading_deg")),
-    "[room]": (("size_m", "corner_m"), ()),
-    "a side of a room": (("material", "thickness_m"), ("roughness_m",)),
-    "[[walls]]": (
-        ("name", "corner_m", "edge_u_m", "edge_v_m", "material", "thickness_m"),
-        ("roughness_m",),
-    ),
-    "[[furniture]]": (
-        ("name", "mesh", "material", "position_m"),
-        ("yaw_deg", "scale", "metres_per_unit", "sheet"),
-    ),
-    "[materials.NAME]": (("source", "low_hz", "high_hz", "a"), ("b", "c", "d")),
+    table: (tuple(needed.split()), tuple(others.split()))
+    for table, needed, others in (
+        ("top", "", "name description"),
+        ("[radar]", "position_m", ""),
+        ("[person]", "", "position_m heading_deg"),
+        ("[room]", "size_m corner_m", ""),
+        ("a side of a room", "material thickness_m", "roughness_m"),
+        ("[[walls]]", "name corner_m edge_u_m edge_v_m material thickness_m", "roughness_m"),
+        ("[[furniture]]", "name mesh material position_m", "yaw_deg scale metres_per_unit sheet"),
+        ("[materials.NAME]", "source low_hz high_hz a", "b c d"),
+    )
 }
 """Keys of each table of a scene file: those that must be given, and the others."""
 

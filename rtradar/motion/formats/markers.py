@@ -32,7 +32,12 @@ from scipy.spatial.transform import Rotation
 
 from rtradar.errors import InputError
 from rtradar.motion.motion import Motion
-from rtradar.motion.quaternions import quaternion_multiply, quaternion_rotate, sign_continuous
+from rtradar.motion.quaternions import (
+    quaternion_multiply,
+    quaternion_rotate,
+    sign_continuous,
+    smallest_rotation,
+)
 from rtradar.motion.skeleton import MINIMUM_PART_M, NODE_PARENT, NODES
 
 Array = NDArray[np.float64]
@@ -243,17 +248,8 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
 
 def _followed(directions: Array) -> Array:
     """Rotations (frame, bone, 4) of directions (frame, bone, 3) from the first to each frame."""
-    before, after = directions[:-1], directions[1:]
-    cosine = np.sum(before * after, axis=2, keepdims=True)
-    steps = np.concatenate([np.cross(before, after), 1 + cosine], axis=2)
-    norms = np.linalg.norm(steps, axis=2, keepdims=True)
-    # A bone that points the other way in the next frame has no smallest rotation: half a turn about
-    # any line across it will do.
-    across = _unit(np.cross(before, np.eye(3)[np.argmin(np.abs(before), axis=2)]))
-    half = np.concatenate([across, np.zeros_like(norms)], axis=2)
-    steps = np.where(norms > 1e-6, steps / np.maximum(norms, 1e-6), half)
     rotations = np.empty((*directions.shape[:2], 4))
     rotations[0] = [0.0, 0.0, 0.0, 1.0]
-    for frame, step in enumerate(steps):
+    for frame, step in enumerate(smallest_rotation(directions[:-1], directions[1:])):
         rotations[frame + 1] = quaternion_multiply(step, rotations[frame])
     return rotations / np.linalg.norm(rotations, axis=2, keepdims=True)

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from rtradar.motion.synthetic.curves import bump, hermite, keyed
 from rtradar.motion.synthetic.figure import (
     ANKLE,
     FOREARM,
@@ -29,6 +28,9 @@ from rtradar.motion.synthetic.figure import (
     PosesAt,
     Subject,
     about,
+    bump,
+    hermite,
+    keyed,
     reach_arm,
     rolled,
     swing_arm,

@@ -12,7 +12,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rtradar.motion.synthetic.curves import bump, hermite, keyed, state
 from rtradar.motion.synthetic.figure import (
     ANKLE,
     HEEL_X,
@@ -25,7 +24,11 @@ from rtradar.motion.synthetic.figure import (
     PosesAt,
     Subject,
     about,
+    bump,
+    hermite,
+    keyed,
     rolled,
+    state,
     swing_arm,
     xyz,
 )

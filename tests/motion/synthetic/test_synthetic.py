@@ -9,8 +9,16 @@ from rtradar.errors import InputError
 from rtradar.motion import ACTIVITIES, Motion, synthetic_motion
 from rtradar.motion.quaternions import quaternion_rotate
 from rtradar.motion.skeleton import NODES
-from rtradar.motion.synthetic.curves import bump, hermite, keyed, smooth
-from rtradar.motion.synthetic.figure import ANKLE, HEEL_X, TOE_HEIGHT, bend
+from rtradar.motion.synthetic.figure import (
+    ANKLE,
+    HEEL_X,
+    TOE_HEIGHT,
+    bend,
+    bump,
+    hermite,
+    keyed,
+    smooth,
+)
 
 NODE = NODES.index
 
