@@ -15,6 +15,7 @@ from __future__ import annotations
 import itertools
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,6 +28,10 @@ from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import Taper
 from rtradar.radar import Radar
 from rtradar.validate.rows import Row, judged, main, reported
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import power_db
 
 Array = NDArray[np.float64]
 
@@ -125,10 +130,6 @@ def closed_form(preset: str, focus: bool) -> tuple[float, float]:
     return peak_and_width(angles, np.abs(np.exp(1j * phase).mean(axis=(1, 2))) ** 2)
 
 
-def decibels(ratio: float) -> float:
-    return float(10 * np.log10(ratio))
-
-
 def direction_rows(preset: str, direction: tuple[float, float], speed: float) -> Iterator[Row]:
     radar = Radar.preset(preset)
     place = place_of(*direction)
@@ -171,8 +172,8 @@ def beam_rows(preset: str, x: NDArray[np.complex64]) -> Iterator[Row]:
         figures[focus, taper] = peak_and_width(*finely(seen))
     case = f"{preset}, beam on the boresight"
     sharp, flat = closed_form(preset, True), closed_form(preset, False)
-    ours = decibels(figures[False, "uniform"][0] / figures[True, "uniform"][0])
-    loss = decibels(flat[0] / sharp[0])
+    ours = float(power_db(figures[False, "uniform"][0] / figures[True, "uniform"][0]))
+    loss = float(power_db(flat[0] / sharp[0]))
     if preset == "paper-12ghz":
         says = "beam at 4 m, 12 GHz, broadside: what the far-field FFT loses to focusing, at least"
         yield judged(case, "far-field FFT against focusing, at most", "dB", ours, -3.5, says=says)
@@ -221,7 +222,9 @@ def pair_rows(preset: str, apart_deg: float, taper: Taper) -> Iterator[Row]:
             angles, power = finely(seen)
             near = np.where(abs(angles) < apart_deg, power, 0.0)
             left, right = (int(np.where(side * angles > 0, near, 0.0).argmax()) for side in (-1, 1))
-            into.append(decibels(power[left : right + 1].min() / min(power[left], power[right])))
+            into.append(
+                float(power_db(power[left : right + 1].min() / min(power[left], power[right])))
+            )
             if focus:
                 errors += [abs(abs(angles[there]) - apart_deg / 2) for there in (left, right)]
                 counts.append(len(spatial_points(seen, radar, 0.0).points))

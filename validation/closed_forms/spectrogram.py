@@ -46,6 +46,10 @@ from rtradar.scatter import build_model
 from rtradar.signal import Noise, synthesize
 from rtradar.validate.rows import Row, judged, main, reported
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import power_db
+
 Array = NDArray[np.float64]
 SPEED_OF_LIGHT = 299_792_458.0
 WINDOW = 128
@@ -282,10 +286,12 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
                 claim,
                 f"{case}: above the noise, median",
                 "dB",
-                decibels(np.median(power.max(axis=1)) / noise),
+                float(power_db(np.median(power.max(axis=1)) / noise)),
             )
             level = np.median(power.max(axis=1) / found.power[apart].max(axis=1))
-            yield reported(claim, f"{case}: re the highest cell, median", "dB", decibels(level))
+            yield reported(
+                claim, f"{case}: re the highest cell, median", "dB", float(power_db(level))
+            )
             count += 1
     # The right foot swings when the recording begins, then the left, right and left one.
     yield judged(
@@ -297,10 +303,6 @@ def walk_rows(radar: rt.Radar, body: Body, gait: Gait, fidelity: str) -> Iterato
         reference=4,
         says="swings of the legs in that spectrogram, of 4: missed",
     )
-
-
-def decibels(ratio: float) -> float:
-    return float(10 * np.log10(ratio))
 
 
 def measure(quick: bool) -> list[Row]:

@@ -18,7 +18,7 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
@@ -35,6 +34,10 @@ from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material
 from rtradar.signal import synthesize
 from rtradar.validate.rows import Row, judged, main, reported
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import MovingEllipsoid
 
 Array = NDArray[np.float64]
 Field = NDArray[np.complex128]
@@ -59,24 +62,6 @@ MIRRORS = (
     ("glass", 0.02),
 )
 PRESETS = ("paper-12ghz", "paper-77ghz")
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A sphere in straight flight; at 0 s it is at ``centre``."""
-
-    centre: tuple[float, float, float]
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    duration_s: float = 1.0
-    part_names: tuple[str, ...] = ("ball",)
-
-    @property
-    def semi_axes(self) -> Array:
-        return np.full((1, 3), RADIUS_M)
-
-    def at(self, times: Array) -> Poses:
-        centres = np.array(self.centre) + np.asarray(times)[:, None, None] * np.array(self.velocity)
-        return Poses(centres, np.tile(np.eye(3), (len(centres), 1, 1, 1)), self.semi_axes)
 
 
 def made_of(name: str, radar: rt.Radar) -> Material:
@@ -284,7 +269,7 @@ def behind_rows(quick: bool) -> Iterator[Row]:
             for where, centre in (
                 places.items() if not quick else [("35 degrees", places["35 degrees"])]
             ):
-                body = Ball(centre, velocity=(0.5, 1.5, 0.0))
+                body = MovingEllipsoid(centre, (RADIUS_M,) * 3, (0.5, 1.5, 0.0))
                 model = Multipath(radar, body, Scene(walls=(wall,)), order=0)
                 echoes = model.echoes(chirps)
                 ours = spectrum(echoes.length, echoes.amplitude, echoes.frequency, frequency)
@@ -356,7 +341,8 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                 "53 degrees": (2.0, -0.3, 1.2),
                 "32 degrees": (0.0, 0.1, 0.8),
             }.items():
-                model = Multipath(radar, Ball(centre), Scene(walls=(wall,)), order=2)
+                ball = MovingEllipsoid(centre, (RADIUS_M,) * 3)
+                model = Multipath(radar, ball, Scene(walls=(wall,)), order=2)
                 echoes = model.echoes(chirps)
                 names = np.array(model.path_names)
                 for path, sides in {

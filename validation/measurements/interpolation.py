@@ -34,6 +34,10 @@ from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.validate.rows import Row, main, reported
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import rms
+
 Array = NDArray[np.float64]
 Method = Callable[[Array, Array, Array], Array]
 
@@ -170,10 +174,6 @@ def smooth_root(spline: Callable[[Array, Array], Callable[[Array], Array]]) -> f
     return error_db(
         spline(times, 0.01 * np.sin(4 * np.pi * times))(at) - 0.01 * np.sin(4 * np.pi * at)
     )
-
-
-def rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def recorded_rows(folder: Path, quick: bool) -> Iterator[Row]:

@@ -34,6 +34,10 @@ from rtradar.scatter import build_model
 from rtradar.scatter.common.poses import anchor_step
 from rtradar.validate.rows import Row, judged, main, reported
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import power_db
+
 Array = NDArray[np.float64]
 ACTIVITIES = ("walk", "kick", "punch", "jumping_jack")
 TOLERANCE_DB = 0.1
@@ -143,10 +147,6 @@ def still(motion: rt.Motion, frame: int) -> rt.Motion:
     )
 
 
-def decibels(ratio: Array) -> Array:
-    return np.asarray(10 * np.log10(ratio))
-
-
 def compared_rows(preset: str) -> Iterator[Row]:
     """Each part of a standing person that no channel misses, by `compare`."""
     radar = rt.Radar.preset(preset)
@@ -172,7 +172,7 @@ def compared_rows(preset: str) -> Iterator[Row]:
             by_fidelity["specular"]["part_power_m2"][part]
             / by_fidelity["analytic"]["part_power_m2"][part]
         )
-        expected = float(decibels(factor[part]))
+        expected = float(power_db(factor[part]))
         quantity = f"{part}: specular over analytic, ref. near field"
         says = (
             "`compare` of `analytic` with `specular`, standing: "
@@ -182,7 +182,7 @@ def compared_rows(preset: str) -> Iterator[Row]:
             claim,
             quantity,
             "dB",
-            float(decibels(ratio)),
+            float(power_db(ratio)),
             TOLERANCE_DB,
             reference=expected,
             says=says,
@@ -216,7 +216,7 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     hidden = found["specular"].hidden_at
     seen = hidden == 0
     claim = f"{activity}, {preset}, {duration_s:g} s"
-    error = decibels(specular[seen] / analytic[seen]) - decibels(near[seen] / far[seen])
+    error = power_db(specular[seen] / analytic[seen]) - power_db(near[seen] / far[seen])
     count = f"{seen.sum()} of {seen.size} parts and instants"
     quantity = f"fully visible, {count}: worst |dB| after the near field"
     says = "`analytic` against `specular`, four activities: the same of visible parts, each instant"
@@ -224,18 +224,18 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     yield judged(claim, quantity, "dB", worst, TOLERANCE_DB, says=says, cases=int(seen.sum()))
     yield reported(claim, "the same, rms", "dB", float(np.sqrt(np.mean(error**2))))
     yield reported(
-        claim, "near field of these, mean", "dB", float(decibels(near[seen] / far[seen]).mean())
+        claim, "near field of these, mean", "dB", float(power_db(near[seen] / far[seen]).mean())
     )
     yield reported(
-        claim, "near field of these, most", "dB", float(decibels(near[seen] / far[seen]).min())
+        claim, "near field of these, most", "dB", float(power_db(near[seen] / far[seen]).min())
     )
     # The frame powers of the models differ by the near field of all parts and occlusion of some.
-    whole = decibels(specular.sum(axis=1) / analytic.sum(axis=1))
-    bent = decibels((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
+    whole = power_db(specular.sum(axis=1) / analytic.sum(axis=1))
+    bent = power_db((analytic * near / far).sum(axis=1) / analytic.sum(axis=1))
     yield reported(claim, "frame power, specular over analytic, mean", "dB", float(whole.mean()))
     yield reported(claim, "of that, near field", "dB", float(bent.mean()))
     yield reported(claim, "of that, occlusion", "dB", float((whole - bent).mean()))
-    left = decibels(specular.sum(axis=1) / (analytic * near / far * (1 - hidden)).sum(axis=1))
+    left = power_db(specular.sum(axis=1) / (analytic * near / far * (1 - hidden)).sum(axis=1))
     yield reported(
         claim, "left after occluded fractions, rms", "dB", float(np.sqrt(np.mean(left**2)))
     )

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -26,6 +27,10 @@ from rtradar.errors import InputError
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.validate.rows import Row, judged, main, reported
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import one_ellipsoid, rms
+
 Array = NDArray[np.float64]
 SPEED_OF_LIGHT = 299_792_458.0
 FAR_M = 1e6
@@ -38,17 +43,9 @@ def field(
     return facet_scattering(target, tx, rx, np.full(len(tx), frequency), facets=facets)
 
 
-def alone(axes: Array, frame: Array | None = None) -> rt.Ellipsoids:
-    return rt.Ellipsoids([np.zeros(3)], [np.eye(3) if frame is None else frame], [axes])
-
-
 def directions(n: int, seed: int) -> Array:
     random = np.random.default_rng(seed).normal(size=(n, 3))
     return random / np.linalg.norm(random, axis=1, keepdims=True)
-
-
-def rms(values: Array | NDArray[np.complex128]) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 # -- closed forms ----------------------------------------------------------------------------------
@@ -60,7 +57,7 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
     for index, ka in enumerate(kas):
         frequency = ka * SPEED_OF_LIGHT / (2 * np.pi * 0.1)
         tx = FAR_M * directions(1 if quick or ka > 200 else 4, index)
-        ratio = field(alone(np.full(3, 0.1)), tx, tx, frequency) / rt.rcs.sphere(
+        ratio = field(one_ellipsoid(np.full(3, 0.1)), tx, tx, frequency) / rt.rcs.sphere(
             0.1, frequency, "po"
         )
         worst = max(worst, float(np.abs(20 * np.log10(np.abs(ratio))).max()))
@@ -83,7 +80,7 @@ def sphere_rows(quick: bool) -> Iterator[Row]:
     yield reported(claim, "rms complex error", "", rms(np.array(complex_errors)), key="sphere")
     try:
         field(
-            alone(np.full(3, 0.1)),
+            one_ellipsoid(np.full(3, 0.1)),
             FAR_M * directions(1, 0),
             FAR_M * directions(1, 0),
             401 * SPEED_OF_LIGHT / (0.2 * np.pi),
@@ -162,7 +159,9 @@ def ellipsoid_rows(quick: bool) -> Iterator[Row]:
                 expected = lit_points(tx @ frame, rx @ frame, axes, frequency).scattering_length(
                     frequency
                 )
-                errors.append(field(alone(axes, frame), tx, rx, frequency, facets)[0] - expected)
+                errors.append(
+                    field(one_ellipsoid(axes, frame), tx, rx, frequency, facets)[0] - expected
+                )
                 fields.append(expected)
             claim = f"ellipsoids of the body at 4 m, {frequency / 1e9:g} GHz, {name}"
             # 2 % is 0.17 dB; the quadrature omits polarisation, by which pairs 0.5 m apart lose
@@ -192,7 +191,7 @@ def shadow_rows(quick: bool) -> Iterator[Row]:
             before = rt.Ellipsoids([occluder], [np.eye(3)], [np.full(3, radius)])
             whole, front, free = (
                 field(each, ANTENNA, ANTENNA, frequency, facets)[0]
-                for each in (both, before, alone(TARGET))
+                for each in (both, before, one_ellipsoid(TARGET))
             )
             errors.append((whole - front) / free - target.field(occluder, radius))
         claim = "thigh behind the edge of a sphere, 14 GHz"

@@ -13,9 +13,9 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import partial
 from itertools import product
+from pathlib import Path
 from typing import NamedTuple
 from unittest import mock
 
@@ -26,7 +26,6 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.process import angle, power_map, range_spectrum
@@ -40,6 +39,10 @@ from rtradar.signal import synthesize
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import MovingEllipsoid, power_db
+
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="multipath") for kind in (rows.judged, rows.reported))
 LEAST_K_RHO = 10.0  # as in specular.py
@@ -49,26 +52,6 @@ SHAPES = {
     "forearm": (0.05, 0.05, 0.14),
     "head": (0.1, 0.1, 0.12),
 }
-
-
-@dataclass(frozen=True)
-class Mover:
-    """One ellipsoid in straight motion; at 0 s it is at ``centre``."""
-
-    centre: tuple[float, float, float]
-    axes: tuple[float, float, float]
-    frame: Array
-    velocity: tuple[float, float, float]
-    duration_s: float = 10.0
-    part_names: tuple[str, ...] = ("mover",)
-
-    @property
-    def semi_axes(self) -> Array:
-        return np.array([self.axes])
-
-    def at(self, times: Array) -> Poses:
-        centres = np.array(self.centre) + np.asarray(times)[:, None, None] * np.array(self.velocity)
-        return Poses(centres, np.broadcast_to(self.frame, (len(times), 1, 3, 3)), self.semi_axes)
 
 
 def box() -> tuple[Wall, ...]:
@@ -150,12 +133,8 @@ def length_rows(quick: bool) -> Iterator[Row]:
         radar = rt.Radar.preset(preset)
         worst, count = {1: 0.0, 2: 0.0}, {1: 0, 2: 0}
         for seed, axes in enumerate(SHAPES.values()):
-            body = Mover(
-                (0.0, 0.4, 1.2),
-                axes,
-                Rotation.random(random_state=seed).as_matrix(),
-                (-1.2, 0.6, 0.1),
-            )
+            frame = Rotation.random(random_state=seed).as_matrix()
+            body = MovingEllipsoid((0.0, 0.4, 1.2), axes, (-1.2, 0.6, 0.1), frame)
             model = Multipath(radar, body, Scene(walls=box()), order=2)
             # Between two keyframes, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
@@ -222,7 +201,7 @@ def vector_optics(
     plane: Plane,
     over: tuple[bool, bool],
     antenna: Array,
-    body: Mover,
+    body: MovingEllipsoid,
     polarization: str,
     sweep: Array,
 ) -> Array:
@@ -268,7 +247,7 @@ def vector_optics(
 
 
 def ours(
-    plane: Plane, antenna: Array, body: Mover, polarization: str, sweep: Array
+    plane: Plane, antenna: Array, body: MovingEllipsoid, polarization: str, sweep: Array
 ) -> dict[tuple[bool, bool], Array]:
     """The same by `Multipath`, path by path."""
     u, v = (
@@ -298,7 +277,7 @@ def ours(
     return found
 
 
-def k_rho(plane: Plane, antenna: Array, body: Mover, sweep: Array) -> float:
+def k_rho(plane: Plane, antenna: Array, body: MovingEllipsoid, sweep: Array) -> float:
     """Wave number at the sweep's middle times the smaller radius at the one-way specular point."""
     ways = [place - np.array(body.centre) for place in (antenna, plane.image(antenna))]
     normal = body.frame.T @ sum(way / np.linalg.norm(way) for way in ways)
@@ -307,10 +286,6 @@ def k_rho(plane: Plane, antenna: Array, body: Mover, sweep: Array) -> float:
         *body.axes, np.arccos(normal[2]), np.arctan2(normal[1], normal[0])
     )
     return wave_number(float(sweep.mean())) * float(smaller)
-
-
-def decibel(ratio: Array | float) -> float:
-    return float(10 * np.log10(ratio))
 
 
 def optics_rows(quick: bool) -> Iterator[Row]:
@@ -326,9 +301,8 @@ def optics_rows(quick: bool) -> Iterator[Row]:
     for plane, polarization, (seed, axes), place in product(
         (FLOOR, LEFT), "vh", enumerate(SHAPES.values()), places
     ):
-        body = Mover(
-            place, axes, Rotation.random(random_state=10 + seed).as_matrix(), (0.0, 0.0, 0.0)
-        )
+        frame = Rotation.random(random_state=10 + seed).as_matrix()
+        body = MovingEllipsoid(place, axes, frame=frame)
         mine = ours(plane, antenna, body, polarization, sweep)
         if any((values == 0).all() for values in mine.values()):
             continue
@@ -339,14 +313,14 @@ def optics_rows(quick: bool) -> Iterator[Row]:
             over: (np.mean(np.abs(mine[over]) ** 2), np.mean(np.abs(optics[over]) ** 2))
             for over in mine
         }
-        one_way = [decibel(np.divide(*power[over])) for over in ((True, False), (False, True))]
+        one_way = [power_db(np.divide(*power[over])) for over in ((True, False), (False, True))]
         if k_rho(plane, antenna, body, sweep) < LEAST_K_RHO:
             tight += one_way
             continue
         ghosts["one leg over the plane"] += one_way
-        ghosts["both legs over the plane"].append(decibel(np.divide(*power[True, True])))
+        ghosts["both legs over the plane"].append(power_db(np.divide(*power[True, True])))
         total = [np.mean(np.abs(sum(fields.values())) ** 2) for fields in (mine, optics)]
-        ghosts["all four together"].append(decibel(total[0] / total[1]))
+        ghosts["all four together"].append(power_db(total[0] / total[1]))
     for name, errors in ghosts.items():
         # Power is averaged over the sweep, because the terminator wave of physical optics makes it
         # ripple.
@@ -384,7 +358,7 @@ def map_rows(quick: bool) -> Iterator[Row]:
     # All walls once, and the same one twice.
     rooms = [(box(), 1), *(((wall,), 2) for wall in box() if wall.name not in ("near", "far"))]
     for (walls, order), (start, velocity) in product(rooms, starts[: 1 if quick else 3]):
-        mover = Mover(start, (0.12,) * 3, np.eye(3), velocity)
+        mover = MovingEllipsoid(start, (0.12,) * 3, velocity)
         for name, errors in ghosts_of(radar, mover, walls, order).items():
             found[name] += errors
     limits = {
@@ -419,7 +393,7 @@ class Ghost(NamedTuple):
 
 
 def ghosts_of(
-    radar: rt.Radar, body: Mover, walls: tuple[Wall, ...], order: int
+    radar: rt.Radar, body: MovingEllipsoid, walls: tuple[Wall, ...], order: int
 ) -> dict[str, list[float]]:
     model = Multipath(radar, body, Scene(walls=walls), order=order)
     chirps = np.arange(radar.chirps_per_frame)
@@ -470,7 +444,7 @@ def ghosts_of(
 
 def predicted(
     radar: rt.Radar,
-    body: Mover,
+    body: MovingEllipsoid,
     legs: tuple[tuple[str, ...], tuple[str, ...]],
     middle: float,
     strength: float,
@@ -572,7 +546,7 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
         fields[apart_s] = field @ of_path
     first, last = fields.values()
     yield from shadow_rows(radar, scene, body, chirps)
-    error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
+    error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported(
         "living room, walk",
         f"ghosts at keyframes {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms",
@@ -594,13 +568,13 @@ def shadow_rows(
         shadows.append(cycles - cycles.mean(axis=0))
     first, last = shadows
     quantity = f"shadow at keyframes {clutter_shadow.ANCHORS_S * 1e3:g} ms apart against 2.5 ms"
-    error = decibel((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
+    error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported("living room, walk", quantity, "dB", error)
     yield reported(
         "living room, walk",
         "what changes of the shadow in 0.1 s, per IF sample",
         "dB re 1 m2",
-        decibel((np.abs(first) ** 2).mean()),
+        power_db((np.abs(first) ** 2).mean()),
     )
 
 

@@ -22,6 +22,7 @@ import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numba import prange
@@ -40,6 +41,10 @@ from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import rms
 
 Array = NDArray[np.float64]
 judged, reported = (partial(kind, key="edge") for kind in (rows.judged, rows.reported))
@@ -352,10 +357,6 @@ def fade_rows(quick: bool) -> Iterator[Row]:
                 "",
                 rms(np.array(errors)),
             )
-
-
-def rms(values: Array | NDArray[np.complex128]) -> float:
-    return float(np.sqrt(np.mean(np.abs(values) ** 2)))
 
 
 def db_mean(values: list[float]) -> float:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
 from functools import partial
 from itertools import pairwise, product
 
@@ -103,62 +102,33 @@ def sionna(pairs: list[tuple[Array, Array]]) -> list[Array] | None:
 
 
 def measure(quick: bool) -> list[Row]:
-    return list(_rows(quick))
-
-
-def _rows(quick: bool) -> Iterator[Row]:
     rng = np.random.default_rng(0)
     inside = [CORNER + SIZE * rng.uniform(0.08, 0.92, (2, 3)) for _ in range(5 if quick else 20)]
     pairs = [(two[0], two[1]) for two in inside]
-    mine, closed = [ours(*pair) for pair in pairs], [lattice(*pair) for pair in pairs]
-    count = sum(len(lengths) for lengths in mine)
-    lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, closed, strict=True))
+    mine, theirs = [ours(*pair) for pair in pairs], sionna(pairs)
     says = "specular paths of an empty box room, orders 0 to 2"
-    yield judged(
-        "box room",
-        f"paths more or fewer than of the lattice, {count}",
-        "",
-        lost,
-        0,
-        says=says,
-        cases=count,
-    )
+    rows = compared(mine, [lattice(*pair) for pair in pairs], ("the lattice of images", 1.0), says)
+    if theirs is not None:
+        says = "specular paths of an empty box room, to Sionna RT (float32)"
+        rows += compared(mine, theirs, ("Sionna RT", 50.0), says)
+    return rows
+
+
+def compared(
+    mine: list[Array], others: list[Array], reference: tuple[str, float], says: str
+) -> list[Row]:
+    """Number and lengths of all paths; the reference has a name and a limit of the length [um]."""
+    name, limit_um = reference
+    count = sum(len(lengths) for lengths in mine)
+    lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, others, strict=True))
+    about = {"says": says, "cases": count}
+    quantity = f"paths more or fewer than of {name}, {count}"
+    rows = [judged("box room", quantity, "", lost, 0, **about)]
     if lost == 0:
-        worst = max(float(np.abs(a - b).max()) for a, b in zip(mine, closed, strict=True))
-        yield judged(
-            "box room",
-            f"worst length to the lattice of images, {count} paths",
-            "um",
-            worst * 1e6,
-            1.0,
-            says=says,
-            cases=count,
-        )
-    theirs = sionna(pairs)
-    if theirs is None:
-        return
-    lost = sum(abs(len(a) - len(b)) for a, b in zip(mine, theirs, strict=True))
-    says = "specular paths of an empty box room, to Sionna RT (float32)"
-    yield judged(
-        "box room",
-        f"paths more or fewer than of Sionna RT, {count}",
-        "",
-        lost,
-        0,
-        says=says,
-        cases=count,
-    )
-    if lost == 0:
-        worst = max(float(np.abs(a - b).max()) for a, b in zip(mine, theirs, strict=True))
-        yield judged(
-            "box room",
-            f"worst length to Sionna RT, {count} paths",
-            "um",
-            worst * 1e6,
-            50.0,
-            says=says,
-            cases=count,
-        )
+        worst = max(float(np.abs(a - b).max()) for a, b in zip(mine, others, strict=True))
+        quantity = f"worst length to {name}, {count} paths"
+        rows.append(judged("box room", quantity, "um", worst * 1e6, limit_um, **about))
+    return rows
 
 
 if __name__ == "__main__":

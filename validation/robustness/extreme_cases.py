@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
+import sys
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 import rtradar.body
-from rtradar.body.body import Poses
 from rtradar.scatter import build_model
+
+sys.path.append(str(Path(__file__).resolve().parents[1]))
+
+from helpers import MovingEllipsoid
 
 Array = NDArray[np.float64]
 C = 299_792_458.0
@@ -104,25 +107,11 @@ def worst_error(pairs: list[tuple[complex, complex]], limit: float) -> str:
     return f"right to {max(errors):.1e}"
 
 
-@dataclasses.dataclass(frozen=True)
-class Ball:
-    """A sphere that flies along x, with all that a model needs of a body."""
-
-    speed: float = 0.0
-    radius: float = 0.2
-    place: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    part_names: tuple[str, ...] = ("ball",)
-    duration_s: float = 0.2
-
-    @property
-    def semi_axes(self) -> Array:
-        return np.full((1, 3), self.radius)
-
-    def at(self, times: Array) -> Poses:
-        times = np.atleast_1d(times)
-        centres = np.tile(np.asarray(self.place, dtype=np.float64), (len(times), 1, 1))
-        centres[:, 0, 0] += self.speed * times
-        return Poses(centres, np.broadcast_to(np.eye(3), (len(times), 1, 3, 3)), self.semi_axes)
+def ball(
+    speed: float = 0.0, radius: float = 0.2, place: tuple[float, float, float] = (0.0, 0.0, 1.0)
+) -> MovingEllipsoid:
+    """A sphere that flies along x."""
+    return MovingEllipsoid(place, (radius,) * 3, (speed, 0.0, 0.0), duration_s=0.2)
 
 
 def small_radar(**changes: Any) -> rt.Radar:
@@ -159,7 +148,7 @@ def chain(
     return result, [str(warning.message) for warning in caught]
 
 
-def spectrum(radar: rt.Radar, body: Ball, fidelity: str = "analytic") -> Any:
+def spectrum(radar: rt.Radar, body: MovingEllipsoid, fidelity: str = "analytic") -> Any:
     """Range-Doppler spectrum of one frame of a sphere."""
     chirps = np.arange(radar.chirps_per_frame)
     # A model needs the poses, the parts and the duration of a body, which this one has.

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from extreme_cases import (
     TRACED,
-    Ball,
+    ball,
     chain,
     collector,
     motion,
@@ -31,7 +31,7 @@ CASES, case = collector()
 
 @case("0 m/s", "all power at Doppler 0 and its window's two neighbours")
 def _() -> str:
-    power = (np.abs(spectrum(small_radar(), Ball()).values) ** 2).sum(axis=(0, 2))
+    power = (np.abs(spectrum(small_radar(), ball()).values) ** 2).sum(axis=(0, 2))
     middle = len(power) // 2
     beside = 1 - power[middle - 1 : middle + 2].sum() / power.sum()
     assert abs(beside) < 1e-12, beside
@@ -40,7 +40,7 @@ def _() -> str:
 
 @case("100 m/s", "a warning of motion inside a chirp; finite")
 def _() -> str:
-    body = Ball(speed=100.0)
+    body = ball(speed=100.0)
     found, said = warned(
         lambda: spectrum(small_radar(chirp_duration_s=500e-6), body, "specular"), "inside one chirp"
     )
@@ -55,7 +55,7 @@ def _() -> str:
     )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
-        found = spectrum(radar, Ball(speed=100.0, place=(-0.5, 1.0, 1.0)))
+        found = spectrum(radar, ball(speed=100.0, place=(-0.5, 1.0, 1.0)))
     power = (np.abs(found.values) ** 2).sum(axis=(0, 2))
     read = float(np.sum(found.velocity * power) / power.sum())
     expected = (100.0 + radar.max_velocity_mps) % (
@@ -185,7 +185,7 @@ def _() -> str:
                 with warnings.catch_warnings():
                     warnings.simplefilter("ignore", rt.ValidityWarning)
                     values = spectrum(
-                        radar, Ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), fidelity
+                        radar, ball(speed=speed, radius=0.1, place=(-2.5, 0.0, 1.0)), fidelity
                     ).values
                 assert np.isfinite(values).all(), (fidelity, radar, speed)
                 assert np.abs(values).max() > 0, (fidelity, radar, speed)

@@ -10,10 +10,10 @@ from extreme_cases import (
     BESIDE,
     MODELS,
     TRACED,
-    Ball,
     C,
     alone,
     along_axis,
+    ball,
     chain,
     collector,
     motion,
@@ -107,7 +107,7 @@ def _() -> str:
 @case("a person 10 km from a radar that reaches so far", "finite, at the right range")
 def _() -> str:
     radar = small_radar(position_m=(-9e3, 0.0, 1.0), bandwidth_hz=2e6, samples_per_chirp=256)
-    values = np.abs(spectrum(radar, Ball()).values)
+    values = np.abs(spectrum(radar, ball()).values)
     read = float(np.argmax(values.sum(axis=(1, 2)))) * radar.range_bin_m
     assert np.isfinite(values).all()
     assert abs(read - 9e3) < radar.range_bin_m, read
@@ -358,10 +358,10 @@ def _() -> str:
         variant = None
 
         def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-            seen = build_model("analytic", radar, Ball()).echoes(chirps)
+            seen = build_model("analytic", radar, ball()).echoes(chirps)
             return dataclasses.replace(seen, amplitude=seen.amplitude * 0)
 
-    found, said = warned(lambda: survey(Silence(), radar, Ball(), 400), "nobody is visible")
+    found, said = warned(lambda: survey(Silence(), radar, ball(), 400), "nobody is visible")
     distance = float(np.linalg.norm(radar.position_m))
     assert not found.visible
     assert abs(found.power * distance**4 - 1) < 1e-12, found.power
