@@ -32,7 +32,7 @@ def unit(vector: Array) -> Array:
 
 
 def incidence(angle: float) -> tuple[Array, Array, Array, Array]:
-    """Direction, normal, and unit fields across and in the plane of incidence, rotated at random."""
+    """Direction, normal, and unit fields across and in the plane of incidence, at random."""
     turn = Rotation.from_euler("xyz", [0.4, 1.1, -0.7])
     way, normal = np.array([np.sin(angle), 0.0, -np.cos(angle)]), np.array([0.0, 0.0, 1.0])
     across = np.array([0.0, 1.0, 0.0])

@@ -1,4 +1,4 @@
-"""The echo model `analytic`: specular range and closed-form cross-section, and the paper's plane waves."""
+"""The echo model `analytic`: specular range, closed-form cross-section, the paper's plane waves."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ def one(tx: ArrayLike, rx: ArrayLike, body: Any, **options: bool) -> tuple[Array
 
 
 def bisectors(tx: ArrayLike, rx: ArrayLike, body: Any) -> tuple[Array, Array, Array]:
-    """As each centre sees it: the unit bisector of Tx and Rx in local axes (part, 3), |u_tx + u_rx| and the path (part,)."""
+    """Unit bisector of Tx and Rx in each part's axes (part, 3), |u_tx + u_rx|, path (part,)."""
     ways = [np.asarray(place) - body.centres for place in (tx, rx)]
     ranges = [np.linalg.norm(way, axis=1) for way in ways]
     both = sum(way / distance[:, None] for way, distance in zip(ways, ranges, strict=True))
@@ -95,7 +95,7 @@ directions = st.tuples(st.floats(-1, 1), st.floats(-math.pi, math.pi)).map(
 seeds = st.integers(0, 999)
 
 
-# -- specular range --------------------------------------------------------------------------------------------------
+# -- specular range --------------------------------------------------------------------------------
 
 
 @given(to_tx=directions, to_rx=directions, seed=seeds)
@@ -103,7 +103,7 @@ seeds = st.integers(0, 999)
 def test_far_away_the_path_is_shorter_by_the_support_function(
     to_tx: Array, to_rx: Array, seed: int
 ) -> None:
-    # A plane wave meets the surface h(n) = |A n| before the centre, on the way there and on the way back.
+    # A plane wave meets the surface h(n) = |A n| before the centre, on both legs.
     assume(np.linalg.norm(to_tx + to_rx) > 0.1)  # straight on there is no bisector
     body, far = toy(seed=seed), 1e6
     length, _ = one(far * to_tx, far * to_rx, body)
@@ -145,7 +145,8 @@ def test_along_an_axis_the_surface_is_a_semi_axis_nearer(aspect: int) -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_at_four_metres_it_is_the_shortest_path_but_for_a_millimetre(seed: int) -> None:
-    # Fermat: the true specular point makes the path over the surface shortest. Ours is where a far radar would see it.
+    # Fermat: the true specular point makes the path over the surface shortest. The model takes the
+    # point that a far radar would see.
     body = toy(parts=1, seed=seed)
     tx, rx = np.array([-4.0, 1.2, 1.0]), np.array([-4.0, 0.9, 1.0])
     length, _ = one(tx, rx, body)
@@ -176,7 +177,7 @@ def test_straight_through_there_is_no_reflection() -> None:
     assert amplitude.tolist() == [0.0]
 
 
-# -- cross-section ---------------------------------------------------------------------------------------------------
+# -- cross-section ---------------------------------------------------------------------------------
 
 
 @given(tx=directions, rx=directions, seed=seeds)
@@ -210,7 +211,8 @@ def test_a_sphere(radius: float) -> None:
 @given(seed=seeds)
 @settings(max_examples=20)
 def test_spreading_is_one_over_both_legs(seed: int) -> None:
-    # Antennas on one line through the centre: the legs are the distances to the surface, there along the c axis.
+    # Antennas on one line through the centre: the legs are the distances to the surface, there
+    # along the c axis.
     body = toy(parts=1, seed=seed)
     outward, c = body.frames[0][:, 2], body.semi_axes[0, 2]
     near, far = body.centres[0] + 2.0 * outward, body.centres[0] + 5.0 * outward
@@ -220,7 +222,7 @@ def test_spreading_is_one_over_both_legs(seed: int) -> None:
     assert bare[0] / spread[0] == pytest.approx((2 - c) * (5 - c), rel=1e-12)
 
 
-# -- laws ------------------------------------------------------------------------------------------------------------
+# -- laws ------------------------------------------------------------------------------------------
 
 both_models = pytest.mark.parametrize("paper", [False, True], ids=["specular range", "paper"])
 
@@ -228,7 +230,7 @@ both_models = pytest.mark.parametrize("paper", [False, True], ids=["specular ran
 def model(
     paper: bool, tx: Array, rx: Array, body: Any, *, spreading: bool = True
 ) -> tuple[Array, Array]:
-    """Length and amplitude (part,) for one Tx and one Rx by either model; the array's centre is the origin."""
+    """Length and amplitude (part,) for one Tx and one Rx by either model, the array at the origin."""
     if not paper:
         return one(tx, rx, body, spreading=spreading)
     pose = (body.centres[None], body.frames[None], body.semi_axes)
@@ -289,7 +291,7 @@ def test_twice_the_size(paper: bool) -> None:
     np.testing.assert_allclose(twice_amplitude, 2 * amplitude, rtol=1e-12)
 
 
-# -- the paper's model -----------------------------------------------------------------------------------------------
+# -- the paper's model -----------------------------------------------------------------------------
 
 
 def at_angles(range_m: float, azimuth: float, elevation: float) -> Any:
@@ -304,8 +306,9 @@ def at_angles(range_m: float, azimuth: float, elevation: float) -> Any:
 @pytest.mark.parametrize("angle_deg", [-30.0, -14.0, 0.0, 3.0, 45.0])
 @pytest.mark.parametrize("line", ["y", "z"])
 def test_plane_waves_reach_the_array_as_in_the_paper(angle_deg: float, line: str) -> None:
-    # Eqs 10 and 11: the received phase of channel 8 t + r rises by k d_R sin(angle), d_R half a start wavelength, toward
-    # a target on the side where the index rises; nothing on the other line. Range: of the centre.
+    # Eqs 10 and 11: the received phase of channel 8 t + r rises by k d_R sin(angle), d_R half a
+    # start wavelength, toward a target on the side where the index rises; nothing on the other
+    # line. Range: of the centre.
     angle, range_m = math.radians(angle_deg), 4.0
     body = at_angles(range_m, angle if line == "y" else 0.0, 0.0 if line == "y" else angle)
     echoes = AnalyticPaper(FLAT, body).echoes(np.arange(12))
@@ -315,10 +318,12 @@ def test_plane_waves_reach_the_array_as_in_the_paper(angle_deg: float, line: str
     on_line, off_line = (lead[:6], lead[6:]) if line == "y" else (lead[6:], lead[:6])
     np.testing.assert_allclose(on_line, expected, rtol=0, atol=1e-14)
     np.testing.assert_allclose(off_line, 0, atol=1e-14)
-    # In the IF, which is the transmitted wave times the conjugate of the received one, that phase falls with the index.
+    # In the IF, which is the transmitted wave times the conjugate of the received one, that phase
+    # falls with the index.
     first = synthesize(echoes, FLAT, FLAT.chirp_times(12))[:, :, 0]
     steps = np.angle(first[:, 1:] / first[:, :-1])[slice(6) if line == "y" else slice(6, 12)]
-    # s tau^2 / 2 turns a little, too: 2 pi s tau (tau of one channel less that of the next) is up to 3e-4.
+    # s tau^2 / 2 also changes a little: 2 pi s tau times the difference of tau between channels is
+    # up to 3e-4.
     np.testing.assert_allclose(steps, -math.pi * math.sin(angle), rtol=0, atol=5e-4)
 
 
@@ -331,7 +336,8 @@ def test_far_away_plane_waves_are_exact(place: tuple[float, float, float]) -> No
     exact = np.linalg.norm(FLAT.tx - body.centres, axis=1)[:, None] + np.linalg.norm(
         FLAT.rx[FLAT.rx_of_tx] - body.centres, axis=2
     )
-    # (0.25 m)^2 / 2 R = 3e-8 m of wavefront curvature and 1e-9 m of float64, where off the boresight leads are up to 0.2 m.
+    # (0.25 m)^2 / 2 R = 3e-8 m of wavefront curvature and 1e-9 m of float64, where off the
+    # boresight leads are up to 0.2 m.
     np.testing.assert_allclose(length, exact, rtol=0, atol=1e-7)
 
 
@@ -347,7 +353,7 @@ def test_the_papers_amplitude_is_that_of_the_line_of_sight(spreading: bool) -> N
     np.testing.assert_allclose(amplitude, expected, rtol=1e-12)  # every channel alike, and real
 
 
-# -- as a model -------------------------------------------------------------------------------------------------------
+# -- as a model ------------------------------------------------------------------------------------
 
 
 @both_models

@@ -1,4 +1,4 @@
-"""The share of Fresnel zones in view: against the closed form of a straight edge, and in the model."""
+"""The visible fraction of Fresnel zones, against a straight edge, and in the model."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ ANTENNA = np.array([-4.0, 0.0, 0.0])
 
 @dataclass(frozen=True)
 class Curtain:
-    """A small ellipsoid at the origin; 0.5 m before it a large sphere whose edge passes y = 0 at 0.1 s."""
+    """A small ellipsoid, and 0.5 m before it a large sphere whose edge passes y = 0 at 0.1 s."""
 
     speed: float = 0.0
     edge: float = 0.0
@@ -60,7 +60,7 @@ def small_radar(**fields: object) -> Radar:
 
 
 def share_behind_plate(radius: float, frequency: float, edge: float) -> complex:
-    """Share left of a sphere's return behind a thin plate half way, whose shadow leaves what lies above z = ``edge``."""
+    """Fraction left of a sphere's return where a plate half way shadows all below z = ``edge``."""
     k = np.array([2 * np.pi * frequency / C])
     below = ANTENNA[0] / 2, 0.0, edge / 2 - 1.0
     poses = Poses(
@@ -80,7 +80,8 @@ def share_behind_plate(radius: float, frequency: float, edge: float) -> complex:
 @pytest.mark.parametrize(("radius", "frequency"), [(0.1, 79e9), (0.3, 79e9), (0.3, 14e9)])
 def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: float) -> None:
     k = 2 * np.pi * frequency / C
-    # k dL = z^2 k h / 2 with h = 2 / R + 2 / radius; across the edge the integral of exp(-j u^2) from the edge on.
+    # k dL = z^2 k h / 2 with h = 2 / R + 2 / radius; across the edge the integral of exp(-j u^2)
+    # from the edge on.
     h = 2 / (4 - radius) + 2 / radius
     u = np.linspace(-3, 3, 41)
     edges = u / np.sqrt(k * h / 2)
@@ -88,7 +89,8 @@ def test_a_straight_edge_leaves_the_fresnel_integral(radius: float, frequency: f
         [share_behind_plate(radius, frequency, edge / (1 - radius / 4)) for edge in edges]
     )
     exact = erfc(np.exp(0.25j * np.pi) * u) / 2
-    # The window takes away what is more than RIM away, a wave of 1 / (2 sqrt(pi) RIM) = 4 % at most there; curvature adds 1 %.
+    # The window takes away what is more than RIM away, a wave of 1 / (2 sqrt(pi) RIM) = 4 % at most
+    # there; curvature adds 1 %.
     assert np.sqrt(np.mean(np.abs(got - exact) ** 2)) < 0.02
     assert np.abs(got - exact).max() < 0.04
 
@@ -98,7 +100,8 @@ def test_an_edge_that_wanders_changes_the_share_without_jumps() -> None:
     k = 2 * np.pi * 79e9 / C
     edges = u / np.sqrt(k * (2 / 3.9 + 2 / 0.1) / 2)
     share = np.array([share_behind_plate(0.1, 79e9, edge) for edge in edges])
-    # exp(-j u^2) bends by 2 u / sqrt(pi) a unit squared: 5e-6 at a step of 2e-3. A ray that pops would be 1e-2.
+    # exp(-j u^2) bends by 2 u / sqrt(pi) a unit squared: 5e-6 at a step of 2e-3. A ray that pops
+    # would be 1e-2.
     assert np.abs(np.diff(share, 2)).max() < 1e-4
 
 
@@ -133,7 +136,8 @@ def test_the_model_and_the_function_agree_phase_and_all(backend: Backend, edge: 
             target, ANTENNA[None], ANTENNA[None], np.array([frequency]), variant=backend.kind
         )
         there_and_back = np.exp(-2j * np.pi * frequency / C * 8.0) / 16
-        # The same search, but zones laid out for each frequency, and for the middle of the sweep in the model.
+        # The same search, but zones laid out for each frequency, and for the middle of the sweep in
+        # the model.
         np.testing.assert_allclose(received, field[0] * there_and_back, rtol=0.03)
 
 
@@ -180,7 +184,7 @@ def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(
     np.testing.assert_array_equal(shares.at(chirps, np.array([1, 0])), whole[..., [1, 0]])
     between = np.concatenate(found[anchors:])
     assert (between == 0).all()
-    # The edge passes part 0 in these intervals: all their nodes, and beside them one on either side at most.
+    # The edge passes part 0 in these intervals: all their nodes, and at most one on either side.
     inner = shares._fine - 1
     assert 0 < len(between) <= 4 * inner + 2
     assert len(between) % inner in (0, 1, 2)
@@ -191,10 +195,12 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
     model = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
     chirps = np.arange(200, 601)
     share = model.fractions.at(chirps)[1, :, 0, 0]
-    # 5 cm on either side, four Fresnel radii: a round edge diffracts a little more than the 0.1 of a straight one.
+    # 5 cm on either side, four Fresnel radii: a round edge diffracts a little more than the 0.1 of
+    # a straight one.
     assert np.abs(share[0]) < 0.15
     assert np.abs(share[-1] - 1) < 0.15
-    # The specular point comes free as the edge crosses y = 0: a straight edge leaves a half there, a round one a little more.
+    # The specular point becomes visible as the edge crosses y = 0: a straight edge leaves a half
+    # there, a round one a little more.
     assert share[200] == pytest.approx(0.5, abs=0.1)
     poses = body.at(radar.chirp_times(len(chirps), 200))
     exact = []
@@ -215,7 +221,8 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
         exact.append((both - before) / free)
     # What the cubics between anchors leave out.
     np.testing.assert_allclose(share[::20], exact, atol=0.01)
-    # Within 3 cm, 2.2 Fresnel radii, exp(-j u^2) bends by 1e-3 a chirp; corners of straight pieces 1.25 ms long, by 5e-3.
+    # Within 3 cm, 2.2 Fresnel radii, exp(-j u^2) bends by 1e-3 a chirp; corners of straight pieces
+    # 1.25 ms long, by 5e-3.
     assert np.abs(np.diff(share[80:321], 2)).max() < 3e-3
 
 
