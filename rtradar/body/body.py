@@ -18,7 +18,7 @@ from rtradar.motion.skeleton import NODES, to_nodes
 _SAME = 1e-4
 """Distance of two parts, relative to the least semi-axis, at which rays find the same surface."""
 
-_SIDED: Mapping[str, tuple[str, float]] = {
+_SIDED = {
     "hip": ("hip", 0.07),
     "knee": ("thigh", 0.07),
     "ankle": ("shank", 0.06),
@@ -28,28 +28,21 @@ _SIDED: Mapping[str, tuple[str, float]] = {
     "wrist": ("forearm", 0.04),
     "hand": ("hand", 0.04),
 }
-_MIDDLE: Mapping[str, tuple[str, float]] = {
+_PARTS: Mapping[str, tuple[str, float]] = {
     "lowerback": ("lower torso", 0.10),
     "upperback": ("middle torso", 0.10),
     "thorax": ("upper torso", 0.10),
     "neck": ("neck", 0.04),
     "head": ("head", 0.06),
+    **{f"l_{node}": (f"left {name}", radius) for node, (name, radius) in _SIDED.items()},
+    **{f"r_{node}": (f"right {name}", radius) for node, (name, radius) in _SIDED.items()},
 }
+"""Name and thickness [m] of the part that ends in each node."""
 
-
-def _part(node: str) -> tuple[str, float]:
-    """Name and thickness [m] of the part that ends in a node."""
-    if node in _MIDDLE:
-        return _MIDDLE[node]
-    side, joint = node.split("_")
-    name, radius = _SIDED[joint]
-    return f"{'left' if side == 'l' else 'right'} {name}", radius
-
-
-PART_NAMES: tuple[str, ...] = tuple(_part(node)[0] for node in NODES[1:])
+PART_NAMES: tuple[str, ...] = tuple(_PARTS[node][0] for node in NODES[1:])
 """The 21 parts, in the order of the nodes that they end in."""
 
-PART_RADII_M: tuple[float, ...] = tuple(_part(node)[1] for node in NODES[1:])
+PART_RADII_M: tuple[float, ...] = tuple(_PARTS[node][1] for node in NODES[1:])
 """Semi-axes a = b of each part of a body of girth 1."""
 
 

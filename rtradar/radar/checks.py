@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -25,14 +25,6 @@ class FieldRule(NamedTuple):
     allows: Callable[[Any], bool]
     convert: Callable[[Any], Any]
     requirement: str
-
-
-class Rule(NamedTuple):
-    """Rule for fields that must fit each other: a test, and the complaint where it fails."""
-
-    name: str
-    holds: Callable[[Radar], Any]
-    complaint: Callable[[Radar], str]
 
 
 def _is_number(value: Any) -> bool:
@@ -116,94 +108,62 @@ FIELD_RULES: dict[str, FieldRule] = {
 }
 """The rule of each field by itself, in the order in which they are checked."""
 
-RULES: tuple[Rule, ...] = (
-    Rule(
-        "the array has antennas",
-        lambda r: r.tx_y + r.tx_z and r.rx_y + r.rx_z,
-        lambda _: "the array has no Tx or no Rx; give at least one of each",
-    ),
-    Rule(
-        "pairs keep as many Rx for every Tx",
-        lambda r: (
-            r.channels == "all"
-            or {rx for tx, rx in ((r.tx_y, r.rx_y), (r.tx_z, r.rx_z)) if tx} == {r.n_rx} != {0}
-        ),
-        lambda r: (
-            "channels = 'pairs' needs as many Rx on the y-line as on the z-line, here "
-            f"{r.rx_y} and {r.rx_z}; make them equal or set channels = 'all'"
-        ),
-    ),
-    Rule(
-        "carrier_step_hz belongs to fdm",
-        lambda r: r.carrier_step_hz is None or r.multiplexing == "fdm",
-        lambda _: "carrier_step_hz belongs to multiplexing = 'fdm'; leave it out",
-    ),
-    Rule(
-        "doppler_bands belongs to ddm",
-        lambda r: r.doppler_bands is None or r.multiplexing == "ddm",
-        lambda _: "doppler_bands belongs to multiplexing = 'ddm'; leave it out",
-    ),
-    Rule(
-        "bands of the IF do not overlap",
-        lambda r: (
-            r.carrier_step_hz is None
-            or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz)
-        ),
-        lambda r: (
-            f"carrier_step_hz = {shown(r.carrier_step_hz)}; bands of the IF are "
-            f"{r.sample_rate_hz:g} Hz wide (samples_per_chirp / chirp_duration_s), so carriers "
-            "must be at least that far apart"
-        ),
-    ),
-    Rule(
-        "carriers are positive",
-        lambda r: -r.tx_offset_hz[0] < r.start_frequency_hz,
-        lambda r: (
-            f"{r.n_tx} carriers {r.carrier_step_hz or r.sample_rate_hz:g} Hz apart begin "
-            f"{-r.tx_offset_hz[0]:g} Hz below start_frequency_hz = {r.start_frequency_hz:g}, at "
-            "no positive frequency; raise that, or set them nearer (carrier_step_hz)"
-        ),
-    ),
-    Rule(
-        "some Doppler bands stay empty",
-        lambda r: (
-            r.doppler_bands is None
-            or (_is_count(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST)
-        ),
-        lambda r: (
-            f"doppler_bands = {shown(r.doppler_bands)}; it must be a whole number above {r.n_tx}, "
-            "the number of Tx"
-        ),
-    ),
-    Rule(
-        "every Rx receives all Tx of ddm",
-        lambda r: r.multiplexing != "ddm" or r.channels == "all" or not (r.tx_y and r.tx_z),
-        lambda _: (
-            "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx "
-            "on one line"
-        ),
-    ),
-    Rule(
-        "a frame holds a cycle",
-        lambda r: r.cycles_per_frame >= 1,
-        lambda r: (
-            f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} "
-            f"cycle of {r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or "
-            "shorten the chirp"
-        ),
-    ),
-    Rule(
-        "a frame fits in memory",
-        lambda r: r.chirps_per_frame * r.n_rx * r.samples_per_chirp <= _MOST_SAMPLES_PER_FRAME,
-        lambda r: (
-            f"frame_duration_s = {r.frame_duration_s} holds "
-            f"{r.chirps_per_frame * r.n_rx * r.samples_per_chirp:.2g} samples, more than "
-            f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer "
-            "chirps"
-        ),
-    ),
-)
-"""The rules for fields that must fit each other, in the order in which they are checked."""
+
+def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
+    """Yield whether fields fit each other, and the complaint where they do not, one by one."""
+    yield (
+        r.tx_y + r.tx_z and r.rx_y + r.rx_z,
+        "the array has no Tx or no Rx; give at least one of each",
+    )
+    yield (
+        r.channels == "all"
+        or {rx for tx, rx in ((r.tx_y, r.rx_y), (r.tx_z, r.rx_z)) if tx} == {r.n_rx} != {0},
+        f"channels = 'pairs' needs as many Rx on the y-line as on the z-line, here {r.rx_y} and "
+        f"{r.rx_z}; make them equal or set channels = 'all'",
+    )
+    yield (
+        r.carrier_step_hz is None or r.multiplexing == "fdm",
+        "carrier_step_hz belongs to multiplexing = 'fdm'; leave it out",
+    )
+    yield (
+        r.doppler_bands is None or r.multiplexing == "ddm",
+        "doppler_bands belongs to multiplexing = 'ddm'; leave it out",
+    )
+    yield (
+        r.carrier_step_hz is None
+        or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz),
+        f"carrier_step_hz = {shown(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
+        "Hz wide (samples_per_chirp / chirp_duration_s), so carriers must be at least that far "
+        "apart",
+    )
+    yield (
+        -r.tx_offset_hz[0] < r.start_frequency_hz,
+        f"{r.n_tx} carriers {r.carrier_step_hz or r.sample_rate_hz:g} Hz apart begin "
+        f"{-r.tx_offset_hz[0]:g} Hz below start_frequency_hz = {r.start_frequency_hz:g}, at no "
+        "positive frequency; raise that, or set them nearer (carrier_step_hz)",
+    )
+    yield (
+        r.doppler_bands is None
+        or (_is_count(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST),
+        f"doppler_bands = {shown(r.doppler_bands)}; it must be a whole number above {r.n_tx}, the "
+        "number of Tx",
+    )
+    yield (
+        r.multiplexing != "ddm" or r.channels == "all" or not (r.tx_y and r.tx_z),
+        "under multiplexing = 'ddm' every Rx receives all Tx; set channels = 'all', or give Tx on "
+        "one line",
+    )
+    yield (
+        r.cycles_per_frame >= 1,
+        f"frame_duration_s = {r.frame_duration_s} holds no whole {r.multiplexing.upper()} cycle of "
+        f"{r.cycle_duration_s * r.n_doppler_bands:.3g} s; lengthen the frame or shorten the chirp",
+    )
+    samples = r.chirps_per_frame * r.n_rx * r.samples_per_chirp
+    yield (
+        samples <= _MOST_SAMPLES_PER_FRAME,
+        f"frame_duration_s = {r.frame_duration_s} holds {samples:.2g} samples, more than "
+        f"{_MOST_SAMPLES_PER_FRAME:.2g}; shorten the frame, or take fewer samples or longer chirps",
+    )
 
 
 def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -230,6 +190,6 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
 
 def check_rules(radar: Radar) -> None:
     """Refuse a radar whose fields do not fit each other, by the first rule that fails."""
-    for rule in RULES:
-        if not rule.holds(radar):
-            raise InputError(f"radar '{radar.name}': {rule.complaint(radar)}")
+    for holds, complaint in _rules(radar):
+        if not holds:
+            raise InputError(f"radar '{radar.name}': {complaint}")

@@ -230,7 +230,7 @@ both_models = pytest.mark.parametrize("paper", [False, True], ids=["specular ran
 def model(
     paper: bool, tx: Array, rx: Array, body: Any, *, spreading: bool = True
 ) -> tuple[Array, Array]:
-    """Length and amplitude (part,) for one Tx and one Rx by either model, the array at the origin."""
+    """Length and amplitude (part,) for one Tx and one Rx, with the array's centre at the origin."""
     if not paper:
         return one(tx, rx, body, spreading=spreading)
     pose = (body.centres[None], body.frames[None], body.semi_axes)
