@@ -20,7 +20,7 @@ from rtradar.motion import ACTIVITIES
 from rtradar.process import CLUTTER_REMOVALS, DETECTORS, WindowFunctions
 from rtradar.radar import Radar
 from rtradar.scatter import MODELS
-from rtradar.scatter.common.body_material import BODY_MATERIALS
+from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
 from rtradar.system.checks import check_number, check_text, check_vector, inside, shown

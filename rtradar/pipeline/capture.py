@@ -13,12 +13,12 @@ from tqdm import tqdm
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
-from rtradar.pipeline.rooms.indoors import Indoors
-from rtradar.pipeline.survey import Survey
+from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.timing import Stages
 from rtradar.process import ClutterRemoval, Detector, WindowFunctions, range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
+from rtradar.scatter.link_budget import LinkBudget
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.system.files import uninterruptible
 
@@ -45,7 +45,7 @@ class Capture:
     model : EchoModel
     inside : Indoors, optional
         The room, where the scene has one.
-    survey : Survey
+    survey : LinkBudget
     warned : tuple of str
         What the survey warned of.
     noise : Noise
@@ -71,7 +71,7 @@ class Capture:
     body: Body
     model: EchoModel
     inside: Indoors | None
-    survey: Survey
+    survey: LinkBudget
     warned: tuple[str, ...]
     noise: Noise
     n_chirps: int

@@ -27,11 +27,11 @@ from rtradar.pipeline.pictures.snapshots import moments
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.products import Products
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.survey import Survey
 from rtradar.pipeline.timing import Stages, forget_peak_memory, give_back_memory, keep_memory_low
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
+from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
@@ -48,7 +48,7 @@ class Result:
         RDT cloud: time [s], range [m], velocity [m/s].
     summary : dict
         All that stands in ``summary.json``.
-    survey : Survey
+    survey : LinkBudget
         Echo power of each part over time, and what was hidden.
     out : path
         Folder of the files.
@@ -56,7 +56,7 @@ class Result:
 
     points: NDArray[np.float64]
     summary: dict[str, Any]
-    survey: Survey
+    survey: LinkBudget
     out: Path
 
 

@@ -1,4 +1,4 @@
-"""Setting a person before a radar in a scene: echoes surveyed, noise settled, the room traced."""
+"""Setting a person before a radar in a scene: echoes budget, noise settled, the room traced."""
 
 from __future__ import annotations
 
@@ -14,15 +14,14 @@ from rtradar.errors import InputError, ValidityWarning
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
-from rtradar.pipeline.rooms.indoors import indoors
-from rtradar.pipeline.survey import Survey, survey
+from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.timing import Stages
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.process import WindowFunctions, build_detector, clutter_removal
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
-from rtradar.scatter.antenna_gain import is_shaped
-from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter.link_budget import LinkBudget, link_budget
+from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene
 from rtradar.settings import MAX_SNR_DB, RunSettings
@@ -47,8 +46,8 @@ def prepare(
             radar, body = _placed(motion, radar, scene, settings)
         n_chirps, windows = _frames(motion, radar, body)
         warm = time.perf_counter()
-        paths, model = _echo_model(radar, body, scene, settings)
-        echoes = (paths or model).echoes(np.arange(2 * radar.n_tx))
+        model = _echo_model(radar, body, scene, settings)
+        echoes = model.echoes(np.arange(2 * radar.n_tx))
         # Not every model has specular points; the report shows them of all.
         solve_specular_points(
             Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0])), points=True
@@ -57,24 +56,26 @@ def prepare(
     warmup_s = time.perf_counter() - warm
     with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
-        surveyed = survey(model, radar, body, n_chirps, spreading=settings.spreading, scene=scene)
+        person = model.person if isinstance(model, RoomModel) else model
+        budget = link_budget(
+            person, radar, body, n_chirps, spreading=settings.spreading, scene=scene
+        )
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
-    noise = _noise(radar, surveyed, settings)
+    noise = _noise(radar, budget, settings)
     inside = None
-    if paths is not None:
+    if isinstance(model, RoomModel):
         with stages.time("room"):
             inside = indoors(
-                paths, radar, body, scene, settings, n_chirps, surveyed.power, noise.power
+                model, radar, body, scene, settings, n_chirps, budget.power, noise.power
             )
-        model = inside.model
-    names = [motion.name, radar.name, settings.fidelity, *([scene.name] if paths else [])]
+    names = [motion.name, radar.name, settings.fidelity, *([scene.name] if inside else [])]
     return Capture(
         radar=radar,
         body=body,
         model=model,
         inside=inside,
-        survey=surveyed,
+        survey=budget,
         warned=tuple(str(warning.message) for warning in caught),
         noise=noise,
         n_chirps=n_chirps,
@@ -86,10 +87,6 @@ def prepare(
         stages=stages,
         warmup_s=warmup_s,
     )
-
-
-def _has_room(scene: Scene) -> bool:
-    return bool(scene.walls or scene.furniture)
 
 
 def _placed(
@@ -119,56 +116,30 @@ def _frames(motion: Motion, radar: Radar, body: Body) -> tuple[int, NDArray[np.i
     return n_chirps, windows
 
 
-def _echo_model(
-    radar: Radar, body: Body, scene: Scene, settings: RunSettings
-) -> tuple[Multipath | None, EchoModel]:
-    """The paths of the room, if the scene has one, and the model of the person alone."""
-    variant, spreading, material = settings.variant, settings.spreading, settings.body_material
+def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> EchoModel:
     options = dict(settings.model_options or {})
-    if not _has_room(scene):
-        of_skin = {} if material == "perfect-conductor" else {"material": material}
-        model = build_model(
-            settings.fidelity,
-            radar,
-            body,
-            variant=variant,
-            spreading=spreading,
-            **options,
-            **of_skin,
-        )
-        return None, model
-    if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
-        raise InputError(
-            f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths "
-            "over walls, whose directions at the antennas are not followed; take free-space, or "
-            "antennas with pattern = 'isotropic'"
-        )
-    if options:
-        raise InputError(
-            f"fidelity '{settings.fidelity}' has no option '{next(iter(options))}' in scene "
-            f"'{scene.name}'; leave it out"
-        )
-    paths = Multipath(
+    if settings.body_material != "perfect-conductor":
+        options["material"] = settings.body_material
+    return build_model(
+        settings.fidelity,
         radar,
         body,
-        scene,
-        variant=variant,
-        spreading=spreading,
+        scene=scene,
         order=settings.order,
-        fidelity=settings.fidelity,
-        material=material,
+        variant=settings.variant,
+        spreading=settings.spreading,
+        **options,
     )
-    return paths, paths.person
 
 
-def _noise(radar: Radar, surveyed: Survey, settings: RunSettings) -> Noise:
+def _noise(radar: Radar, budget: LinkBudget, settings: RunSettings) -> Noise:
     """The noise per sample, by the first of the settings that says its power."""
     if settings.noise_power_m2 is not None:
         return Noise(settings.noise_power_m2, settings.seed)
     if not isinstance(settings.snr_db, str):
-        return Noise.for_snr(surveyed.power, settings.snr_db, settings.seed)
+        return Noise.for_snr(budget.power, settings.snr_db, settings.seed)
     power = radar.noise_power_w / radar.watts_per_m2
-    if power > surveyed.power * 10 ** (MAX_SNR_DB / 10):
+    if power > budget.power * 10 ** (MAX_SNR_DB / 10):
         raise InputError(
             f"snr_db = physical: noise of radar '{radar.name}' is more than {MAX_SNR_DB:g} dB "
             "above the echo; look at transmit_power_dbm, noise_figure_db, noise_temperature_k "

@@ -3,7 +3,7 @@
 In one TDM cycle Tx k transmits k chirps late; meanwhile the phase of an echo of range rate v grows
 by 2 pi f_D k T, f_D = 2 v / lambda with the wavelength of the sweep centre. That is removed with
 the velocity of the cell; an echo faster than the unambiguous velocity keeps a part of it, and
-appears in a wrong direction (`folded_angle_deg`).
+appears in a wrong direction (`rtradar.scatter.validity.folded_angle_deg`).
 
 The line along y measures the sine u = y / r, the line along z the sine w = z / r;
 azimuth = atan2(y, x) = asin(u / sqrt(1 - w^2)), elevation = asin(w). A radar with one line alone
@@ -254,31 +254,6 @@ def angle(
         math.nan if found.y is None else azimuth,
         math.nan if found.z is None else math.asin(w),
     )
-
-
-def folded_angle_deg(radar: Radar) -> float:
-    """How far beside its direction an echo appears whose velocity is folded once, at broadside.
-
-    With a range rate that is wrong by twice the unambiguous velocity, one Tx after the other is
-    rotated by 1 / n_tx of a turn too little or too much, which on a line of Tx d apart is the
-    effect of a direction whose sine differs by lambda / (n_tx d).
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar whose schedule and array count.
-
-    Returns
-    -------
-    float
-        Angle [deg]; 0 where Tx do not take turns, or no line has two of them.
-    """
-    take_turns = radar.tx_delay_s[-1] > 0
-    on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
-    if not (take_turns and on_a_line):
-        return 0.0
-    spacing_m = radar.tx_spacing_wavelengths * radar.start_wavelength_m
-    return math.degrees(math.asin(min(1.0, radar.wavelength_m / (radar.n_tx * spacing_m))))
 
 
 def _nearest(bins: float, least: float, largest: float) -> int | None:

@@ -14,8 +14,9 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.antenna_gain import through_antennas
+from rtradar.scatter.antenna_gain import is_shaped, through_antennas
 from rtradar.scatter.common.poses import Accountable, EchoModel
+from rtradar.scene import Scene
 from rtradar.system.registry import Registry
 
 MODELS = Registry(
@@ -44,11 +45,13 @@ def build_model(
     radar: Radar,
     body: Body,
     *,
+    scene: Scene | None = None,
+    order: int = 1,
     variant: str = "auto",
     spreading: bool = True,
     **model_options: Any,
 ) -> EchoModel:
-    """The model of that name, for this body and radar, through the radar's antennas.
+    """Build the model of that name for this body, radar and scene, through the radar's antennas.
 
     Parameters
     ----------
@@ -58,6 +61,10 @@ def build_model(
         Radar whose chirps and antennas the model uses.
     body : Body
         Person, or another moving body of ellipsoids.
+    scene : Scene, optional
+        Walls and furniture. In a room the model is a `RoomModel` around the one of that name.
+    order : int
+        Largest number of reflections at walls on a path, 0 to 3.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend, for models that trace.
     spreading : bool
@@ -72,13 +79,16 @@ def build_model(
     Raises
     ------
     InputError
-        Where there is no such model, or it has no such option.
+        If there is no such model, it has no such option, or it cannot be used in such a scene.
     BackendError
         Where it traces and no backend of that kind works here.
     ExtensionError
         Where it is of another package, and fails.
     """
     kind = MODELS.find(fidelity)
+    room = scene if scene is not None and (scene.walls or scene.furniture) else None
+    if room is not None:
+        _check_for_room(fidelity, radar, room)
     with MODELS.guarded(fidelity):
         taken = inspect.signature(kind).parameters
         known = [name for name in taken if name not in _COMMON]
@@ -90,11 +100,27 @@ def build_model(
         # What traces nothing takes no backend.
         backend = {"variant": variant} if takes_backend(fidelity) else {}
         model: EchoModel = kind(radar, body, spreading=spreading, **backend, **model_options)
+    if room is not None:
+        from rtradar.scatter.multipath.room_model import RoomModel  # which takes long to import
+
+        return RoomModel(model, room, radar, body, order=order)  # type: ignore[arg-type]
     return through_antennas(
         model if fidelity in MODELS.built_in else _Checked(fidelity, model, radar, body),
         radar,
         body,
     )
+
+
+def _check_for_room(fidelity: str, radar: Radar, scene: Scene) -> None:
+    if not getattr(MODELS.find(fidelity), "supports_rooms", False):
+        allowed = ", ".join(models_that("supports_rooms"))
+        raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: {allowed}")
+    if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
+        raise InputError(
+            f"radar '{radar.name}' has antennas with a pattern, and scene '{scene.name}' paths "
+            "over walls, whose directions at the antennas are not followed; take free-space, or "
+            "antennas with pattern = 'isotropic'"
+        )
 
 
 def models_that(ability: str) -> list[str]:

@@ -14,9 +14,9 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
-from rtradar.scatter.common.validity import warn_of_small_radii
 from rtradar.scatter.echo_models import MODELS
 from rtradar.scatter.models.analytic import far_field_echo
+from rtradar.scatter.validity import warn_of_small_radii
 
 if TYPE_CHECKING:
     import trimesh

@@ -12,8 +12,8 @@ from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
 from rtradar.pipeline.received import ReceivedWindow
-from rtradar.pipeline.rooms.indoors import ghosts
-from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter import build_model
+from rtradar.scatter.multipath.path_summary import ghosts
 
 RADAR = rt.Radar(
     name="small",
@@ -69,12 +69,13 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
     assert summary["parameters"]["scene"] == "room"
     paths = {row["path"]: row for row in summary["room"]["paths"]}
     assert set(paths) == {"body", "side > body", "body > side"}
-    # The wall is to the radar's left, and both legs see it: nothing of these paths is far below the direct one.
+    # The wall is to the radar's left, and both legs see it: nothing of these paths is far below the
+    # direct one.
     assert paths["side > body"]["over_noise_db"] > paths["body"]["over_noise_db"] - 10
     kept = {item["name"]: item for item in summary["room"]["clutter"]["kept"]}
     assert kept["side"]["kind"] == "mirror"
-    # A conducting mirror d = 1.5 m to the left sends the field 1 / (2 d), that of sqrt(4 pi) / (2 d) for |F| / (R1 R2); 10 % in
-    # power for antennas some 5 cm from the array's middle.
+    # A conducting mirror d = 1.5 m to the left sends the field 1 / (2 d), that of sqrt(4 pi) / (2
+    # d) for |F| / (R1 R2); 10 % in power for antennas some 5 cm from the array's middle.
     assert kept["side"]["power_m2"] == pytest.approx(4 * np.pi / (2 * 1.5) ** 2, rel=0.1)
     pictures = {"plan.png", "clutter_removal.png", "range_azimuth_walls.png"}
     for picture in pictures:
@@ -99,10 +100,11 @@ def test_a_run_in_a_room_says_what_it_kept_and_shows_the_map_before_and_after(
 def test_a_ghost_is_as_far_as_the_person_mirrored(room: rt.Scene) -> None:
     radar = room.place(RADAR)
     body = Body.from_motion(place(rt.synthetic_motion("punch", seed=0, duration_s=0.2)))
-    model = Multipath(radar, body, room, fidelity="analytic")
+    model = build_model("analytic", radar, body, scene=room)
     found = {ghost.path: ghost for ghost in ghosts(model, radar, 0.1)}
     assert set(found) == {"side > body", "body > side"}
-    # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few centimetres.
+    # Mean of the straight way to the body and that to its image in y = 2.5, less the surface's few
+    # centimetres.
     place_of_radar, person = np.array([-4, 1, 1.0]), body.at([0.1]).centres[0].mean(axis=0)
     image = person * [1, -1, 1] + [0, 5, 0]
     expected = (

@@ -14,7 +14,6 @@ from rtradar.motion import place
 from rtradar.pipeline.pictures import snapshots as module
 from rtradar.pipeline.pictures.snapshots import moments
 from rtradar.scatter import build_model
-from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Scene, Wall, material
 
 # One antenna at one place, so that lengths are those of a radar in the middle of its array.
@@ -86,7 +85,7 @@ def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
 
 def test_a_ghost_is_mirrored_by_wall_and_sphere(spheres: Body) -> None:
     scene = Scene(name="one wall", walls=(WALL,))
-    model = Multipath(RADAR, spheres, scene, fidelity="analytic")
+    model = build_model("analytic", RADAR, spheres, scene=scene)
     found = look(spheres, model, scene)
     assert found.path_names.tolist() == ["body", "body > left", "left > body"]
     antenna = np.array(RADAR.position_m)
@@ -173,7 +172,7 @@ def test_long_captures_and_rich_rooms_keep_no_more(
     monkeypatch.setattr(module, "MOST_STEPS", 4)
     monkeypatch.setattr(module, "MOST_ECHOES", 25)
     scene = Scene(name="one wall", walls=(WALL,))
-    found = look(spheres, Multipath(RADAR, spheres, scene, fidelity="analytic"), scene)
+    found = look(spheres, build_model("analytic", RADAR, spheres, scene=scene), scene)
     windows = RADAR.window_starts(N_CHIRPS)
     assert found.window.tolist() == list(range(0, len(windows), -(-len(windows) // 4)))
     np.testing.assert_allclose(found.times, RADAR.window_times(windows)[found.window])

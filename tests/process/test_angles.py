@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.process import range_spectrum
 from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
-from rtradar.process.angles import angle, angle_spectra, find_peaks, folded_angle_deg
+from rtradar.process.angles import angle, angle_spectra, find_peaks
 from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import (
     measures_angle,
@@ -24,6 +24,7 @@ from rtradar.process.steering import (
     virtual_lines,
 )
 from rtradar.radar import Radar
+from rtradar.scatter.validity import folded_angle_deg
 
 Array = NDArray[np.float64]
 

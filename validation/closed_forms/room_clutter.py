@@ -24,9 +24,9 @@ from doppler_floor import ATTENUATION_DB, main_lobe_bins
 from numpy.typing import NDArray
 
 import rtradar as rt
-from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Surface, Wall, material, room_walls
+from rtradar.signal.static_clutter import RoomIf
 from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
@@ -259,7 +259,7 @@ def still_rows(quick: bool) -> Iterator[Row]:
         radar = scene.place(replace(rt.Radar.preset(preset), tx_y=2, tx_z=2, rx_y=2, rx_z=2))
         n = min(radar.cycles_per_frame, 400)
         clutter = Clutter(radar, scene)
-        samples = RoomIf(clutter).clutter_if(np.arange(n * radar.n_tx))
+        samples = RoomIf(clutter.radar, clutter.cycle()).clutter_if(np.arange(n * radar.n_tx))
         chebyshev = rt.process.WindowFunctions(*2 * [("chebwin", ATTENUATION_DB)])
         spectra = rt.process.range_doppler(samples, radar, window_functions=chebyshev)
         power = (np.abs(spectra.values) ** 2).max(axis=(0, 2))

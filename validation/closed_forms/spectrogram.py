@@ -39,10 +39,10 @@ from scipy.special import ellipj
 import rtradar as rt
 from rtradar.body import PART_NAMES, Body
 from rtradar.motion import place
-from rtradar.pipeline.survey import survey
 from rtradar.process import range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram
 from rtradar.scatter import build_model
+from rtradar.scatter.link_budget import link_budget
 from rtradar.signal import Noise, synthesize
 from rtradar.validate.rows import Row, judged, main, reported
 
@@ -181,7 +181,7 @@ def walk_spectrogram(
     """Channel 0 of a walk, by the single steps of the chain."""
     model = build_model(fidelity, radar, body)
     n_chirps = int(body.duration_s / radar.cycle_duration_s) * radar.n_tx
-    noise = Noise.for_snr(survey(model, radar, body, n_chirps).power, snr_db, seed=0)
+    noise = Noise.for_snr(link_budget(model, radar, body, n_chirps).power, snr_db, seed=0)
     block = 34 * radar.n_tx
 
     def blocks() -> Iterator[NDArray[np.complex64]]:

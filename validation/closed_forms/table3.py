@@ -49,10 +49,10 @@ from scipy.stats import ncx2
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.pipeline.survey import survey
 from rtradar.process import ca_cfar, ca_scale, os_cfar, power_map, range_doppler, range_spectrum
 from rtradar.process.window_functions import hann
 from rtradar.scatter import build_model
+from rtradar.scatter.link_budget import link_budget
 from rtradar.signal import Noise, synthesize
 from rtradar.validate.rows import Row, judged, main, reported
 
@@ -89,7 +89,7 @@ class Capture(NamedTuple):
         body = Body.from_motion(place(rt.synthetic_motion(activity, seed=0)))
         n_chirps = math.floor(body.duration_s / RADAR.cycle_duration_s) * RADAR.n_tx
         model = build_model(fidelity, RADAR, body, spreading=spreading)
-        power = survey(model, RADAR, body, n_chirps, spreading=spreading).power
+        power = link_budget(model, RADAR, body, n_chirps, spreading=spreading).power
         return cls(model, RADAR.window_starts(n_chirps)[::every], power)
 
     def samples(self, start: int) -> NDArray[np.complex64]:

@@ -28,9 +28,9 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.errors import InputError
+from rtradar.scatter import build_model
 from rtradar.scatter.clutter.returns import RoomEchoes
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material
 from rtradar.signal import synthesize
 from rtradar.validate.rows import Row, judged, main, reported
@@ -270,7 +270,7 @@ def behind_rows(quick: bool) -> Iterator[Row]:
                 places.items() if not quick else [("35 degrees", places["35 degrees"])]
             ):
                 body = MovingEllipsoid(centre, (RADIUS_M,) * 3, (0.5, 1.5, 0.0))
-                model = Multipath(radar, body, Scene(walls=(wall,)), order=0)
+                model = build_model("specular", radar, body, scene=Scene(walls=(wall,)), order=0)
                 echoes = model.echoes(chirps)
                 ours = spectrum(echoes.length, echoes.amplitude, echoes.frequency, frequency)
                 rx = radar.rx[radar.rx_of_tx]
@@ -342,7 +342,7 @@ def ghost_rows(quick: bool) -> Iterator[Row]:
                 "32 degrees": (0.0, 0.1, 0.8),
             }.items():
                 ball = MovingEllipsoid(centre, (RADIUS_M,) * 3)
-                model = Multipath(radar, ball, Scene(walls=(wall,)), order=2)
+                model = build_model("specular", radar, ball, scene=Scene(walls=(wall,)), order=2)
                 echoes = model.echoes(chirps)
                 names = np.array(model.path_names)
                 for path, sides in {

@@ -29,9 +29,9 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.motion import place
-from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_model
-from rtradar.scatter.common.poses import anchor_step
+from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.link_budget import link_budget
 from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
@@ -111,7 +111,7 @@ def stationary(tx: Array, rx: Array, axes: Array) -> tuple[Array, Array]:
 
 def near_and_far(radar: rt.Radar, body: rt.Body, n_chirps: int) -> tuple[Array, Array]:
     """Power (time, part) [m^2] of each part by stationary phase, near by and for plane waves."""
-    chirps = np.arange(0, n_chirps, anchor_step(radar))
+    chirps = np.arange(0, n_chirps, keyframe_step(radar))
     poses = body.at(np.minimum((chirps + 0.5) * radar.chirp_duration_s, body.duration_s))
     index = radar.tx_of_chirp(chirps)
     tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
@@ -208,7 +208,7 @@ def activity_rows(activity: str, preset: str, duration_s: float) -> Iterator[Row
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", rt.ValidityWarning)
         found = {
-            fidelity: survey(build_model(fidelity, radar, body), radar, body, n_chirps)
+            fidelity: link_budget(build_model(fidelity, radar, body), radar, body, n_chirps)
             for fidelity in ("analytic", "specular")
         }
     near, far = near_and_far(radar, body, n_chirps)

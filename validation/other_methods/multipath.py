@@ -27,15 +27,15 @@ from scipy.spatial.transform import Rotation
 
 import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
-from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.process import angle, power_map, range_spectrum
+from rtradar.scatter import build_model
 from rtradar.scatter.clutter import body_shadow as clutter_shadow
 from rtradar.scatter.clutter.static_clutter import Clutter
-from rtradar.scatter.multipath import multipath
+from rtradar.scatter.multipath import room_model
 from rtradar.scatter.multipath.image_paths import WallPath
-from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scene import Scene, Surface, Wall, material, room_walls
 from rtradar.signal import synthesize
+from rtradar.signal.static_clutter import RoomIf
 from rtradar.validate import rows
 from rtradar.validate.rows import Row, main
 
@@ -135,7 +135,7 @@ def length_rows(quick: bool) -> Iterator[Row]:
         for seed, axes in enumerate(SHAPES.values()):
             frame = Rotation.random(random_state=seed).as_matrix()
             body = MovingEllipsoid((0.0, 0.4, 1.2), axes, (-1.2, 0.6, 0.1), frame)
-            model = Multipath(radar, body, Scene(walls=box()), order=2)
+            model = build_model("specular", radar, body, scene=Scene(walls=box()), order=2)
             # Between two keyframes, where the specular point is not known beforehand.
             chirps = np.sort(rng.integers(0, 4000, 2 if quick else 6))
             echoes = model.echoes(chirps)
@@ -249,7 +249,7 @@ def vector_optics(
 def ours(
     plane: Plane, antenna: Array, body: MovingEllipsoid, polarization: str, sweep: Array
 ) -> dict[tuple[bool, bool], Array]:
-    """The same by `Multipath`, path by path."""
+    """The same by `RoomModel`, path by path."""
     u, v = (
         ((20.0, 0.0, 0.0), (0.0, 20.0, 0.0))
         if plane is FLOOR
@@ -267,7 +267,7 @@ def ours(
     radar = rt.Radar(
         tx_y=1, tx_z=0, rx_y=1, rx_z=0, position_m=tuple(antenna), polarization=polarization
     )
-    model = Multipath(radar, body, Scene(walls=(wall,)), order=2)
+    model = build_model("specular", radar, body, scene=Scene(walls=(wall,)), order=2)
     # Chirp 0 is 31 us late, a time in which nobody moves far.
     echoes = model.echoes(np.zeros(1, dtype=np.int64))
     found = {}
@@ -395,7 +395,7 @@ class Ghost(NamedTuple):
 def ghosts_of(
     radar: rt.Radar, body: MovingEllipsoid, walls: tuple[Wall, ...], order: int
 ) -> dict[str, list[float]]:
-    model = Multipath(radar, body, Scene(walls=walls), order=order)
+    model = build_model("specular", radar, body, scene=Scene(walls=walls), order=order)
     chirps = np.arange(radar.chirps_per_frame)
     echoes = model.echoes(chirps)
     x = synthesize(echoes, radar, radar.chirp_times(len(chirps)), dtype=np.complex64)
@@ -531,9 +531,9 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
     # A tenth of a second from the middle of the capture on.
     chirps = np.arange(radar.chirps_per_frame) + 20_000 // radar.n_tx * radar.n_tx
     fields = {}
-    for apart_s in (2.5e-3, multipath.ANCHORS_S):
-        with mock.patch.object(multipath, "ANCHORS_S", apart_s):
-            model = Multipath(radar, body, scene)
+    for apart_s in (2.5e-3, room_model.KEYFRAMES_S):
+        with mock.patch.object(room_model, "KEYFRAMES_S", apart_s):
+            model = build_model("specular", radar, body, scene=scene)
             echoes = model.echoes(chirps)
         phase = 2 * np.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS * echoes.length
         field = echoes.amplitude[len(echoes.frequency) // 2] * np.exp(1j * phase)
@@ -549,7 +549,7 @@ def keyframe_rows(quick: bool) -> Iterator[Row]:
     error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported(
         "living room, walk",
-        f"ghosts at keyframes {multipath.ANCHORS_S * 1e3:g} ms apart against 2.5 ms",
+        f"ghosts at keyframes {room_model.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms",
         "dB",
         error,
     )
@@ -561,13 +561,14 @@ def shadow_rows(
     """The same for the moving shadow in the clutter, over its change in that time."""
     clutter = Clutter(radar, scene, order=1)
     shadows = []
-    for apart_s in (2.5e-3, clutter_shadow.ANCHORS_S):
-        with mock.patch.object(clutter_shadow, "ANCHORS_S", apart_s):
-            room = RoomIf(clutter, body).clutter_if(chirps)
+    for apart_s in (2.5e-3, clutter_shadow.KEYFRAMES_S):
+        with mock.patch.object(clutter_shadow, "KEYFRAMES_S", apart_s):
+            shadow = clutter_shadow.ClutterShadow(clutter, body)
+            room = RoomIf(radar, clutter.cycle(), shadow).clutter_if(chirps)
         cycles = room.reshape(-1, radar.n_tx, *room.shape[1:])
         shadows.append(cycles - cycles.mean(axis=0))
     first, last = shadows
-    quantity = f"shadow at keyframes {clutter_shadow.ANCHORS_S * 1e3:g} ms apart against 2.5 ms"
+    quantity = f"shadow at keyframes {clutter_shadow.KEYFRAMES_S * 1e3:g} ms apart against 2.5 ms"
     error = power_db((np.abs(last - first) ** 2).sum() / (np.abs(first) ** 2).sum())
     yield reported("living room, walk", quantity, "dB", error)
     yield reported(

@@ -35,7 +35,7 @@ from rtradar.body.body import Poses
 from rtradar.kernels.jit import compiled
 from rtradar.motion import place
 from rtradar.scatter import build_model
-from rtradar.scatter.common.poses import anchor_step
+from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -415,7 +415,7 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
         free = build_model("analytic", radar, body)
         traced = Both(BodyTracer(mi, body.semi_axes), ClosedForm(body.semi_axes))
         # Power of each part at one chirp of every keyframe, by the tracer and by the closed form.
-        step = anchor_step(radar)
+        step = keyframe_step(radar)
         chirps = np.arange(0, int(body.duration_s / radar.chirp_interval_s) - 1, step)
         amplitudes = [free.echoes(chirp).amplitude[0] for chirp in chirps[:, None]]
         powers = []

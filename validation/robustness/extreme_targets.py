@@ -30,8 +30,8 @@ import rtradar as rt
 import rtradar.body
 from rtradar.echoes import Echoes
 from rtradar.motion import place
-from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_model
+from rtradar.scatter.link_budget import link_budget
 
 CASES, case = collector()
 
@@ -361,7 +361,7 @@ def _() -> str:
             seen = build_model("analytic", radar, ball()).echoes(chirps)
             return dataclasses.replace(seen, amplitude=seen.amplitude * 0)
 
-    found, said = warned(lambda: survey(Silence(), radar, ball(), 400), "nobody is visible")
+    found, said = warned(lambda: link_budget(Silence(), radar, ball(), 400), "nobody is visible")
     distance = float(np.linalg.norm(radar.position_m))
     assert not found.visible
     assert abs(found.power * distance**4 - 1) < 1e-12, found.power

@@ -8,10 +8,11 @@ import h5py
 import numpy as np
 
 from rtradar.body import Body
+from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.pictures.run_pictures import busiest_window, removed
-from rtradar.pipeline.rooms.indoors import Indoors, ghosts
 from rtradar.radar import Radar
 from rtradar.report import draw_before_after, draw_plan, draw_range_azimuth_with_walls
+from rtradar.scatter.multipath.path_summary import ghosts
 from rtradar.scene import Scene
 
 _TRACK_POINTS = 400

@@ -15,7 +15,7 @@ from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 from rtradar.scatter import EchoModel
 from rtradar.scatter.multipath.image_paths import WallPath, corners, images
-from rtradar.scatter.multipath.multipath import Multipath
+from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene, Triangles
 
@@ -83,7 +83,7 @@ def moments(
     every = max(math.ceil(len(windows) / MOST_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
     window = np.arange(0, len(windows), every)
     times = np.minimum(radar.window_times(windows[window]), body.duration_s)
-    paths = model.paths if isinstance(model, Multipath) else (WallPath((), ()),)
+    paths = model.paths if isinstance(model, RoomModel) else (WallPath((), ()),)
     keys, looked = _look(
         model, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx
     )
@@ -182,7 +182,7 @@ def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles
 
 def _path_of_echoes(model: EchoModel, n_echoes: int) -> list[int]:
     """Number of each echo's path; without walls there is one."""
-    if not isinstance(model, Multipath):
+    if not isinstance(model, RoomModel):
         return [0] * n_echoes
     numbers = {path.name: number for number, path in enumerate(model.paths)}
     return [numbers[name] for name in model.path_names]

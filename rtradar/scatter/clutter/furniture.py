@@ -1,18 +1,19 @@
-"""Furniture: physical optics over its facets, as each Tx lights them and each Rx sees them; sheets with several bounces.
+"""Furniture: physical optics over its facets; sheets with several bounces.
 
-The machinery is that of the model `rays`: facets are tubes, Mitsuba says which of them an antenna sees past all furniture,
-lengths and phases are float64. A closed piece returns one bounce: each facet is a mirror by the Fresnel coefficients of a
-half-space of its material, TE and TM apart, at its own angle and the sweep's centre frequency. A thin sheet, which is of metal,
-reflects on both sides and up to `SHEET_BOUNCES` times: a corner reflector. Bounces between different pieces, and between
-pieces and walls, are left out; walls on the way let through what their slabs do, taken once a group.
+The machinery is that of the model `rays`: facets are tubes, Mitsuba says which of them an antenna
+sees past all furniture, and lengths and phases are float64. A closed piece returns one bounce: each
+facet reflects by the Fresnel coefficients of a half-space of its material, TE and TM apart, at its
+own angle and the sweep's centre frequency. A thin sheet, which is of metal, reflects on both sides
+and up to `SHEET_BOUNCES` times: a corner reflector. Bounces between different pieces, and between
+pieces and walls, are left out; walls on the way transmit what their slabs do, once a group.
 
-Facets that lie within half a range bin of each other, and side by side, are one echo: the phase that is left over the sweep
-is small enough for a polynomial through `FURNITURE_NODES` frequencies.
+Facets that are within half a range bin of each other, and side by side, are one echo: the phase
+that is left over the sweep is small enough for a polynomial through `FURNITURE_NODES` frequencies.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import Any, Literal, NamedTuple
 
@@ -23,10 +24,8 @@ from tqdm import tqdm
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.behind_walls import behind_walls
-from rtradar.scatter.clutter.facet_groups import FacetGroups, PathGroups
-from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes
-from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.clutter.returns import FURNITURE_NODES, RoomEchoes, behind_walls
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import apply_te_tm
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
@@ -35,22 +34,32 @@ from rtradar.scene import Furniture, Material, Scene, reflection
 from rtradar.trace.bounces import MeshSurfaces, Surfaces
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
 SHEET_BOUNCES = 3
-"""Of a trihedral."""
+"""Bounces of a trihedral."""
 MOST_FACETS = 1_000_000
 _BOW_RAD = 0.3
-"""By which paths over a facet may bow; three quarters of that are made good."""
+"""Largest bow of paths over a facet [rad]; three quarters of it are corrected."""
 _OF_PIECE = 0.125
-"""Of a piece's longest extent, where nothing else asks for smaller facets: what corners and other pieces hide is hidden by
-whole facets. A trihedral is then within 0.1 dB of closed form."""
+"""Largest facet over the longest extent of a piece, where nothing else asks for smaller ones.
+
+What corners and other pieces occlude is occluded by whole facets. A trihedral is then within 0.1 dB
+of the closed form.
+"""
 _PATIENCE_S = 2.0
-"""What lasts longer shows a bar."""
+"""Time after which a progress bar is shown [s]."""
+_WIDTH_BINS = 4.0
+"""Width of a group of facets across the line of sight, in range bins.
+
+Seen from the ends of the array, the group stays within its half bin.
+"""
 
 _POLARIZATIONS: tuple[Literal["te"], Literal["tm"]] = ("te", "tm")
 
 
 class _Piece:
-    """The surfaces of all furniture, of which rays bounce on one piece only: what meets another is lost."""
+    """Surfaces of all furniture, of which rays bounce on one piece only: others absorb them."""
 
     flat = True
 
@@ -59,23 +68,25 @@ class _Piece:
         self.sees, self.distance, self.normal = surfaces.sees, surfaces.distance, surfaces.normal
 
     def meets(
-        self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], Array]:
-        """As `Surfaces.meets`."""
+        self, points: Array, normals: Array, directions: Array, own: Indices
+    ) -> tuple[Indices, Array]:
+        """Find what rays meet, as `Surfaces.meets`."""
         face, distance = self._all.meets(points, normals, directions, own)
         other = (face < self._first) | (face >= self._last)
         return np.where(other, -1, face), np.where(other, np.inf, distance)
 
 
 def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoes]:
-    """Returns of every piece of furniture.
+    """Compute the returns of every piece of furniture.
 
     Parameters
     ----------
     mi : module
         Mitsuba with its variant set.
     radar : Radar
+        Radar in the scene.
     scene : Scene
+        Furniture and walls.
 
     Yields
     ------
@@ -85,7 +96,7 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     Raises
     ------
     InputError
-        Where a mesh cannot be used, or would take too many facets.
+        If a mesh cannot be used, or would take too many facets.
     """
     pieces = [(piece, piece.triangles()) for piece in scene.furniture]
     if not pieces:
@@ -98,16 +109,18 @@ def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoe
     for piece, triangles in bar:
         last = first + len(triangles.faces)
         grid = _facets(triangles.corners, first, _facet_edge(triangles.corners, radar))
-        returns = _returns(
-            piece, triangles.closed, _Piece(surfaces, first, last), grid, radar, scene
-        )
+        own = _Piece(surfaces, first, last)
+        returns = _returns(piece, triangles.closed, own, grid, radar, scene)
         if returns is not None:
             yield returns
         first = last
 
 
+# -- facets ----------------------------------------------------------------------------------------
+
+
 def _facet_edge(corners: Array, radar: Radar) -> float:
-    """Longest side of facets [m]: paths bow over it by no more than `_BOW_RAD`, it fits into a group and into the piece."""
+    """Longest side of facets [m], by the bow of paths over it, the group and the piece."""
     antennas = np.concatenate([radar.tx, radar.rx])
     low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
     nearest = np.linalg.norm(antennas - np.clip(antennas, low, high), axis=1).min()
@@ -118,43 +131,164 @@ def _facet_edge(corners: Array, radar: Radar) -> float:
 
 
 def _facets(corners: Array, first: int, edge: float) -> MeshGrid:
-    """Faces, numbered from ``first`` on, halved across their longest sides until none is longer: few where they are slender."""
+    """Faces, numbered from ``first`` on, halved across their longest sides until these fit."""
     face = np.arange(first, first + len(corners))
-    done: list[tuple[Array, NDArray[np.int64]]] = []
+    done: list[tuple[Array, Indices]] = []
     count = 0
     while len(corners):
         sides = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
-        area = np.linalg.norm(
-            np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
-        )
-        flat = area <= 1e-12 * sides.max(axis=1) ** 2
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        flat = np.linalg.norm(normals, axis=1) <= 1e-12 * sides.max(axis=1) ** 2
         small = sides.max(axis=1) <= edge
         done.append((corners[small & ~flat], face[small & ~flat]))
         count += len(done[-1][0])
         corners, face, sides = (array[~small & ~flat] for array in (corners, face, sides))
         if count + 2 * len(corners) > MOST_FACETS:
             raise InputError(
-                f"furniture: more than {MOST_FACETS} facets of {edge:.3g} m; leave pieces out or move them away"
+                f"furniture: more than {MOST_FACETS} facets of {edge:.3g} m; leave pieces out or "
+                "move them away"
             )
-        # The longest side from corner 0 to corner 1.
-        turned = np.take_along_axis(
-            corners, ((sides.argmax(axis=1)[:, None] + np.arange(3)) % 3)[..., None], axis=1
-        )
-        middle = (turned[:, 0] + turned[:, 1]) / 2
-        halves = [
-            np.stack([turned[:, 0], middle, turned[:, 2]], axis=1),
-            np.stack([middle, turned[:, 1], turned[:, 2]], axis=1),
-        ]
+        # Roll each face so that its longest side goes from corner 0 to corner 1.
+        order = (sides.argmax(axis=1)[:, None] + np.arange(3)) % 3
+        a, b, c = np.moveaxis(np.take_along_axis(corners, order[..., None], axis=1), 1, 0)
+        middle = (a + b) / 2
+        halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
         corners, face = np.concatenate(halves), np.tile(face, 2)
-    return MeshGrid(
-        np.concatenate([part for part, _ in done]), np.concatenate([part for _, part in done])
-    )
+    return MeshGrid(*(np.concatenate(parts) for parts in zip(*done, strict=True)))
+
+
+# -- groups of facets ------------------------------------------------------------------------------
+
+
+class FacetGroups:
+    """Groups of facets that are one echo each: half a range bin deep, `_WIDTH_BINS` wide.
+
+    The depth is that from the array's centre, the width across the way to the piece.
+
+    Parameters
+    ----------
+    middles : (facet, 3) float64
+        Middles of the facets [m].
+    radar : Radar
+        Radar in the scene.
+
+    Attributes
+    ----------
+    centres : (group, 3) float64
+        Mean of the middles in each [m].
+    """
+
+    def __init__(self, middles: Array, radar: Radar) -> None:
+        self._origin, self._bin = np.array(radar.position_m), radar.range_bin_m
+        way = (middles - self._origin).mean(axis=0)
+        self._sides = np.linalg.svd(way[None])[2][1:]
+        cells = self._cells(middles)
+        self._least, self._count = cells.min(axis=0), np.ptp(cells, axis=0) + 1
+        self._keys, own, counts = np.unique(
+            self._key(cells), return_inverse=True, return_counts=True
+        )
+        sums = np.stack([np.bincount(own, weights=middles[:, axis]) for axis in range(3)], axis=-1)
+        self.centres = sums / counts[:, None]
+
+    def of(self, points: Array) -> Indices:
+        """Return the group of each of the middles, (point,)."""
+        return np.searchsorted(self._keys, self._key(self._cells(points)))
+
+    def _cells(self, points: Array) -> Indices:
+        # Axis by axis, so that a point is rounded alike in any company.
+        x, y, z = (points[:, axis] - self._origin[axis] for axis in range(3))
+        width = _WIDTH_BINS * self._bin
+        across = [(x * side[0] + y * side[1] + z * side[2]) / width for side in self._sides]
+        deep = np.sqrt(x * x + y * y + z * z) / (self._bin / 2)
+        return np.floor(np.stack([deep, *across], axis=-1)).astype(np.int64)
+
+    def _key(self, cells: Indices) -> Indices:
+        deep, left, up = np.moveaxis(cells - self._least, -1, 0)
+        return np.asarray((deep * self._count[1] + left) * self._count[2] + up)
+
+
+class PathGroups:
+    """Groups of echoes with one number of bounces, half a range bin of path length each.
+
+    Parameters
+    ----------
+    places : (facet, 4, 3) float64
+        Positions of the corners and middles of the object's facets [m].
+    radar : Radar
+        Radar in the scene.
+    order : int
+        Number of bounces.
+
+    Attributes
+    ----------
+    count : int
+        Number of groups.
+    """
+
+    def __init__(self, places: Array, radar: Radar, order: int) -> None:
+        low, high = places.min(axis=(0, 1)), places.max(axis=(0, 1))
+        self._middle, self._step, self.order = (low + high) / 2, radar.range_bin_m, order
+        self._origin = np.array(radar.position_m)
+        # From face to face and back, no path differs from that over the middle by more.
+        self._half = int(np.ceil((order + 1) * np.linalg.norm(high - low) / self._step))
+        self.count = 2 * self._half + 1
+        self._weight, self._sum = np.zeros(self.count), np.zeros((self.count, 3))
+
+    def of(self, footprints: Footprints, tx: Array) -> Indices:
+        """Return the group of each footprint, and add these to its `centres`."""
+        places = footprints.places[:, 3]
+        path = footprints.path[:, 3] + np.linalg.norm(places - self._origin, axis=1)
+        middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(self._origin - self._middle)
+        number = np.rint((path - middle) / self._step).astype(np.int64)
+        group = np.clip(number + self._half, 0, self.count - 1)
+        power = _power(footprints)
+        self._weight += np.bincount(group, weights=power, minlength=self.count)
+        self._sum += np.stack(
+            [np.bincount(group, weights=power * along, minlength=self.count) for along in places.T],
+            axis=-1,
+        )
+        return group
+
+    def lengths(self, footprints: Footprints, group: Indices, tx: Array, rx: Array) -> Array:
+        """Return the mean path of each group, (rx, echo) [m]; over the middle if it is empty."""
+        power = _power(footprints)
+        total = np.bincount(group, weights=power, minlength=self.count)
+        over_middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(rx - self._middle, axis=1)
+        lengths = np.repeat(over_middle[:, None], self.count, axis=1)
+        for receiver, antenna in enumerate(rx):
+            path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
+            sums = np.bincount(group, weights=power * path, minlength=self.count)
+            np.divide(sums, total, out=lengths[receiver], where=total > 0)
+        return lengths
+
+    def centres(self) -> Array:
+        """Return the mean place of the last bounce of each group, (echo, 3) [m]."""
+        weight, middle = self._weight[:, None], np.tile(self._middle, (self.count, 1))
+        return np.divide(self._sum, weight, out=middle, where=weight > 0)
+
+
+def _power(footprints: Footprints) -> Array:
+    return np.asarray((footprints.field**2).sum(axis=1) * footprints.width())
+
+
+# -- returns ---------------------------------------------------------------------------------------
+
+
+class _Sampling(NamedTuple):
+    """How a piece is sampled: its surfaces and material, groups of echoes, and frequencies."""
+
+    surfaces: Surfaces
+    material: Material
+    groups: FacetGroups
+    chains: Sequence[PathGroups]
+    nodes: Array
+    radar: Radar
 
 
 def _returns(
     piece: Furniture, closed: bool, surfaces: Surfaces, grid: MeshGrid, radar: Radar, scene: Scene
 ) -> RoomEchoes | None:
-    bounces = 1 if closed else SHEET_BOUNCES
+    bounces, places = 1 if closed else SHEET_BOUNCES, grid.tubes.places
     wavenumber = 2 * np.pi * (radar.start_frequency_hz + radar.bandwidth_hz) / SPEED_OF_LIGHT_MPS
     shooter = Shooter(
         surfaces=surfaces,
@@ -164,63 +298,37 @@ def _returns(
         polarization=radar.polarization,
         two_sided=not closed,
     )
-    groups = FacetGroups(grid.tubes.places[:, 3], radar)
-    chains = [PathGroups(grid.tubes.places, radar, order) for order in range(2, bounces + 1)]
+    groups = FacetGroups(places[:, 3], radar)
+    chains = [PathGroups(places, radar, order) for order in range(2, bounces + 1)]
     nodes = sweep_nodes(radar, FURNITURE_NODES)
-    shots = [
-        _shot(
-            shooter.shoot(tx),
-            surfaces,
-            piece.material,
-            groups,
-            chains,
-            tx,
-            radar.rx[radar.rx_of_tx[index]],
-            nodes,
-            radar,
-        )
-        for index, tx in enumerate(radar.tx)
-    ]
-    amplitude = np.stack([shot.amplitude for shot in shots], axis=1)
+    sampling = _Sampling(surfaces, piece.material, groups, chains, nodes, radar)
+    shots = [_shot(sampling, shooter.shoot(tx), index) for index, tx in enumerate(radar.tx)]
+    amplitude = np.stack([amplitude for _, amplitude in shots], axis=1)
     if not amplitude.any():
         return None
     centres = np.concatenate([groups.centres, *(chain.centres() for chain in chains)])
-    bounced = [
-        np.ones(len(groups.centres)),
-        *(np.full(chain.count, chain.order) for chain in chains),
-    ]
+    orders = [1, *(chain.order for chain in chains)]
+    counts = [len(groups.centres), *(chain.count for chain in chains)]
     returns = RoomEchoes(
         name=piece.name,
         kind="furniture" if closed else "reflector",
-        length=np.stack([shot.length for shot in shots]),
+        length=np.stack([length for length, _ in shots]),
         amplitude=amplitude,
         frequency=nodes,
-        bounces=np.concatenate(bounced).astype(np.int64),
+        bounces=np.repeat(orders, counts),
         points=centres[None, None, :, None],
-    ).heard(radar)
+    ).received(radar)
     if returns.n_echoes == 0:
         return None
-    return behind_walls(returns, radar, scene).heard(radar)
-
-
-class _Shot(NamedTuple):
-    """``length (rx, echo)`` [m] and ``amplitude (node, rx, echo)`` of one Tx."""
-
-    length: Array
-    amplitude: NDArray[np.complex128]
+    return behind_walls(returns, radar, scene).received(radar)
 
 
 def _shot(
-    sets: list[Footprints],
-    surfaces: Surfaces,
-    material: Material,
-    groups: FacetGroups,
-    chains: list[PathGroups],
-    tx: Array,
-    rx: Array,
-    nodes: Array,
-    radar: Radar,
-) -> _Shot:
+    sampling: _Sampling, sets: list[Footprints], index: int
+) -> tuple[Array, NDArray[np.complex128]]:
+    """Lengths (rx, echo) [m] and amplitudes (node, rx, echo) of the footprints of one Tx."""
+    surfaces, material, groups, chains, nodes, radar = sampling
+    tx, rx = radar.tx[index], radar.rx[radar.rx_of_tx[index]]
     wavenumber = 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS
     lengths = [
         np.linalg.norm(rx[:, None] - groups.centres, axis=-1)
@@ -228,26 +336,27 @@ def _shot(
     ]
     sums = []
     for order, footprints in enumerate(sets):
-        group = (
-            chains[order - 1].of(footprints, tx) if order else groups.of(footprints.places[:, 3])
-        )
         if order:
+            group = chains[order - 1].of(footprints, tx)
             lengths.append(chains[order - 1].lengths(footprints, group, tx, rx))
+        else:
+            group = groups.of(footprints.places[:, 3])
         visible = exits(surfaces, footprints, rx)
         turn, lit = _reflected(footprints, material, radar.centre_frequency_hz)
-        total = turn * radiate(
+        own = radiate(
             lit, visible, group, rx, wavenumber, lengths[-1], polarization=radar.polarization
         )
-        sums.append(total)
-    return _Shot(np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj())
+        sums.append(turn * own)
+    return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
 
 
 def _reflected(
     footprints: Footprints, material: Material, frequency_hz: float
 ) -> tuple[complex, Footprints]:
-    """Footprints whose fields, sent back by a conductor, times this factor, are what the material sends back.
+    """Footprints and a factor that, for a conductor, give what the material reflects.
 
-    The factor is the turn of the phase straight on; how it changes with the angle, 1 % of the field in wood, is left out.
+    The factor is the phase at normal incidence; how it changes with the angle, 1 % of the field in
+    wood, is left out.
     """
     if material.conducts or len(footprints) == 0:
         return 1.0, footprints
@@ -258,6 +367,5 @@ def _reflected(
     turn = complex(straight / abs(straight)) if straight != 0 else 1.0 + 0j
     te, tm = ((reflection(eta, cosine, kind) / turn).real for kind in _POLARIZATIONS)
     # A conductor, whose coefficients are -1 and +1, leaves these fields as they are.
-    return turn, replace(
-        footprints, field=apply_te_tm(footprints.field, ways, ways, normals, -te, tm)
-    )
+    field = apply_te_tm(footprints.field, ways, ways, normals, -te, tm)
+    return turn, replace(footprints, field=field)

@@ -1,29 +1,42 @@
-"""What one object of a room sends back: echoes of every Tx and every Rx kept with it, and where their paths go."""
+"""What one object of a room returns: echoes of every Tx and every Rx kept with it.
+
+Walls between the antennas and an object let through what their slabs do: its echoes then come once
+for each delay in them.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
 from dataclasses import dataclass, replace
-from typing import Literal
+from functools import lru_cache
+from itertools import product
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.polarization import antenna_field
+from rtradar.scatter.multipath.image_paths import crossed
+from rtradar.scatter.multipath.slab_series import WallSeries, room_series
+from rtradar.scatter.multipath.wall_interaction import WallResponse, Wave
+from rtradar.scatter.validity import sampled
+from rtradar.scene import Scene, Wall
 
 Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
 Kind = Literal["mirror", "furniture", "reflector", "rough"]
 
 MOST_NODES = 13
-"""Of a polynomial over the sweep: with more, what `synthesize` makes of it in powers of time loses digits."""
+"""Largest number of nodes over the sweep: with more, `synthesize` loses digits."""
 FURNITURE_NODES = 5
-DENSE_NODES = 33
-"""Frequencies at which slabs are taken before as few as serve are kept."""
 _NODES = (1, 3, 5, 7, 9, 11, MOST_NODES)
 FREQUENCY_ERROR = 1e-3
-"""Of the strongest echo of an object, by which its amplitude may be off between frequency nodes."""
+"""Error that amplitudes may have between nodes, over the strongest echo of an object."""
+ENOUGH = 0.3 * FREQUENCY_ERROR
+"""The same for a slab's coefficient, for each echo, and for all that is left out behind walls."""
 
 
 @dataclass(frozen=True)
@@ -36,24 +49,27 @@ class RoomEchoes:
         Name of the wall, of the walls in the order of their reflections, or of the piece of
         furniture.
     kind : {"mirror", "furniture", "reflector", "rough"}
-        Reflection by walls; facets of furniture; sheets of metal with several bounces; diffuse return of a rough wall.
+        Specular reflection by walls; facets of furniture; sheets of metal with several bounces;
+        diffuse return of a rough wall.
     length : (tx, rx, echo) float64
-        Tx..Rx [m], rx as kept with that Tx.
+        Length of the path [m], for the rx that are kept with that Tx.
     amplitude : (node, tx, rx, echo) complex128
         Scattering lengths, defined as in `Echoes` [m].
     frequency : (node,) float64
-        [Hz].
+        Frequencies of the nodes [Hz].
     bounces : (echo,) int64
+        Number of bounces.
     points : (tx or 1, rx or 1, echo, hop, 3) float64
-        Where the path goes between Tx and Rx, world [m]; 1 where all antennas share the points.
+        Corners of the path, world [m]; 1 where all antennas share them.
     off_m : float
-        What the polynomial through the nodes is known to be off by, at most, where that is more than was asked for [m].
+        Largest known error of the polynomial through the nodes, if it is above what was asked for
+        [m].
     """
 
     name: str
     kind: Kind
     length: Array
-    amplitude: NDArray[np.complex128]
+    amplitude: Field
     frequency: Array
     bounces: NDArray[np.int64]
     points: Array
@@ -61,42 +77,37 @@ class RoomEchoes:
 
     @property
     def n_echoes(self) -> int:
-        """How many."""
+        """Number of echoes."""
         return len(self.bounces)
 
     def power_m2(self) -> float:
-        """Sum of |amplitude|^2 at the sweep's middle node, mean over the channels [m^2]."""
+        """Return the sum of |amplitude|^2 at the middle node, averaged over the channels [m^2]."""
         middle = self.amplitude[len(self.frequency) // 2]
         return float((np.abs(middle) ** 2).sum(axis=-1).mean())
 
     def strongest_cell_m2(self, radar: Radar) -> float:
-        """Largest power of any channel in any range bin, its echoes added with their phases [m^2]."""
-        middle = len(self.frequency) // 2
+        """Return the largest power of a channel in a range bin, with phases of echoes [m^2]."""
+        middle, bins = len(self.frequency) // 2, radar.samples_per_chirp
         wavenumber = 2 * np.pi * self.frequency[middle] / SPEED_OF_LIGHT_MPS
-        field = (self.amplitude[middle] * np.exp(1j * wavenumber * self.length)).reshape(
-            -1, self.n_echoes
-        )
-        bins = np.minimum(self.length / (2 * radar.range_bin_m), radar.samples_per_chirp).astype(
-            np.int64
-        )
+        field = self.amplitude[middle] * np.exp(1j * wavenumber * self.length)
+        field = field.reshape(-1, self.n_echoes)
+        channel = np.arange(len(field))[:, None] * (bins + 1)
         strongest = 0.0
-        # Once more with bins half a bin further: no pair of neighbours is always parted.
-        shifted = np.minimum(
-            self.length / (2 * radar.range_bin_m) + 0.5, radar.samples_per_chirp
-        ).astype(np.int64)
-        for cells in (bins.reshape(field.shape), shifted.reshape(field.shape)):
-            channel = np.arange(len(field))[:, None] * (radar.samples_per_chirp + 1)
+        # Once more with bins half a bin further: no pair of neighbours is always separated.
+        for shift in (0.0, 0.5):
+            cells = np.minimum(self.length / (2 * radar.range_bin_m) + shift, bins)
+            cells = cells.astype(np.int64).reshape(field.shape)
             # Beyond the last bin the low-pass lets nothing through.
-            heard = cells < radar.samples_per_chirp
-            sums = [
-                np.bincount((channel + cells)[heard], weights=part[heard], minlength=1)
+            kept = cells < bins
+            real, imaginary = (
+                np.bincount((channel + cells)[kept], weights=part[kept], minlength=1)
                 for part in (field.real, field.imag)
-            ]
-            strongest = max(strongest, float((sums[0] ** 2 + sums[1] ** 2).max()))
+            )
+            strongest = max(strongest, float((real**2 + imaginary**2).max()))
         return strongest
 
     def take(self, which: NDArray[np.bool_]) -> RoomEchoes:
-        """Some of the echoes."""
+        """Return some of the echoes."""
         return replace(
             self,
             length=self.length[..., which],
@@ -105,18 +116,21 @@ class RoomEchoes:
             points=self.points[:, :, which],
         )
 
-    def heard(self, radar: Radar) -> RoomEchoes:
-        """Those that any antenna hears: not all hidden, and not all beyond the reach of the sampling."""
-        near = (self.length < 2 * radar.max_range_m) & (self.amplitude != 0).any(axis=0)
+    def received(self, radar: Radar) -> RoomEchoes:
+        """Return the echoes that any antenna receives: visible, and within the sampled range."""
+        near = sampled(self.length, radar) & (self.amplitude != 0).any(axis=0)
         return self.take(near.any(axis=(0, 1)))
 
-    def at_nodes(self, frequency: Array) -> NDArray[np.complex128]:
-        """Amplitudes (node, tx, rx, echo) of the polynomial at other frequencies (node,) [Hz]."""
+    def at_nodes(self, frequency: Array) -> Field:
+        """Interpolate amplitudes (node, tx, rx, echo) at other frequencies (node,) [Hz]."""
         weights = interpolation_weights(self.frequency, frequency)
         return np.asarray(np.tensordot(weights, self.amplitude, axes=1))
 
     def with_fewest_nodes(self, radar: Radar, error: float = FREQUENCY_ERROR) -> RoomEchoes:
-        """With the fewest frequency nodes that keep the amplitudes within this of the strongest; see ``off_m``."""
+        """Return the echoes at the fewest nodes that keep amplitudes to this; see ``off_m``.
+
+        The error is relative to the strongest amplitude.
+        """
         largest = np.abs(self.amplitude).max(initial=0.0)
         for count in _NODES:
             nodes = sweep_nodes(radar, count)
@@ -128,12 +142,127 @@ class RoomEchoes:
         return replace(self, amplitude=fewer, frequency=nodes, off_m=off)
 
 
-def best_followed(ways: Iterable[Callable[[], RoomEchoes | None]]) -> RoomEchoes | None:
-    """Of several ways to write the same echoes, the first that as many nodes as there may be follow; else the nearest to it."""
-    best = None
-    for way in ways:
-        found = way()
-        if found is None or not found.off_m:
-            return found
-        best = found if best is None or found.off_m < best.off_m else best
-    return best
+# -- behind walls ----------------------------------------------------------------------------------
+
+
+@lru_cache(maxsize=8)
+def delayed(
+    walls: tuple[Wall, ...], radar: Radar, most_nodes: int = MOST_NODES
+) -> tuple[WallSeries, ...]:
+    """Return the terms of all walls, for polynomials of at most so many nodes."""
+    return room_series(walls, radar, most_nodes=most_nodes, enough=ENOUGH, bounces=1).walls
+
+
+class _Pair(NamedTuple):
+    """A wave out with one back, and what is left of the field on each: (node, tx or rx, echo)."""
+
+    out: Wave
+    back: Wave
+    left_out: Field
+    left_back: Field
+
+
+def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
+    """Apply what walls on the way transmit, on both legs, to echoes of points.
+
+    Waves that pass a slab equally often, out and back together, are one echo: their delays differ
+    by the distance of Tx and Rx.
+
+    Parameters
+    ----------
+    returns : RoomEchoes
+        Echoes without the walls, of points that all antennas share.
+    radar : Radar
+        Radar in the scene.
+    scene : Scene
+        Scene with its walls.
+    """
+    points = returns.points[0, 0, :, 0]
+    behind = np.zeros(len(points), dtype=bool)
+    for wall, antennas in product(scene.walls, (radar.tx, radar.rx)):
+        behind |= crossed(wall, antennas[:, None], points).any(axis=0)
+    if not behind.any():
+        return returns
+    nodes = sweep_nodes(radar, FURNITURE_NODES)
+    returns = replace(returns, amplitude=returns.at_nodes(nodes), frequency=nodes)
+    parts, off = _transmitted(returns.take(behind), radar, scene)
+    parts = [returns.take(~behind), *parts]
+    whole = replace(
+        returns,
+        length=np.concatenate([part.length for part in parts], axis=-1),
+        amplitude=np.concatenate([part.amplitude for part in parts], axis=-1),
+        bounces=np.concatenate([part.bounces for part in parts]),
+        points=np.concatenate([part.points for part in parts], axis=2),
+    ).with_fewest_nodes(radar, ENOUGH)
+    return replace(whole, off_m=max(whole.off_m, off))
+
+
+def _transmitted(returns: RoomEchoes, radar: Radar, scene: Scene) -> tuple[list[RoomEchoes], float]:
+    """Echoes behind walls, in groups of equal delays, and their error [m]."""
+    points = returns.points[0, 0, :, 0]
+    series = delayed(scene.walls, radar, FURNITURE_NODES)
+    walls = WallResponse(scene.walls, series, returns.frequency)
+
+    def legs(antennas: Array) -> list[tuple[Wave, Field]]:
+        ways = points - antennas[:, None]
+        directions = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
+        sent = antenna_field(directions, radar.polarization, x_for_steep=True)
+        waves = walls.transmitted(0, walls.start(sent), antennas[:, None], points)
+        return [(wave, np.asarray((wave.field * sent).sum(axis=-1).conj())) for wave in waves]
+
+    groups: dict[tuple[tuple[int, int], ...], list[_Pair]] = {}
+    for (out, left_out), (back, left_back) in product(legs(radar.tx), legs(radar.rx)):
+        passes = Counter[int]()
+        for one in (*out.passages, *back.passages):
+            passes[one.wall] += one.passes
+        pair = _Pair(out, back, left_out, left_back)
+        groups.setdefault(tuple(sorted(passes.items())), []).append(pair)
+    # A bound of each echo, for most are not worth what they hold in memory.
+    strength = np.abs(returns.amplitude).max(axis=(0, 1, 2))
+    bounds = [
+        sum(_most(pair.left_out) * _most(pair.left_back) for pair in pairs) * strength
+        for pairs in groups.values()
+    ]
+    sizes, parts, off = np.array(bounds), list[RoomEchoes](), 0.0
+    for pairs, size, some in zip(groups.values(), sizes, _worth(sizes), strict=True):
+        if some.any():
+            parts.append(_together(returns.take(some), pairs, some, radar.rx_of_tx))
+            passed = (one for pair in pairs for one in (*pair.out.passages, *pair.back.passages))
+            if any(not series[one.wall].held[1] for one in passed):
+                off = max(off, float(size.max()))
+    return parts, off
+
+
+def _most(left: Field) -> Array:
+    return np.asarray(np.abs(left).max(axis=(0, 1)))
+
+
+def _together(
+    returns: RoomEchoes, pairs: list[_Pair], some: NDArray[np.bool_], kept: NDArray[np.int64]
+) -> RoomEchoes:
+    """Some of the echoes by all pairs of waves, at their mean length.
+
+    What each is longer is in its amplitude.
+    """
+    longer = [
+        pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some] for pair in pairs
+    ]
+    left = [pair.left_out[:, :, None, some] * pair.left_back[:, kept][..., some] for pair in pairs]
+    weights = [np.abs(one[len(one) // 2]) for one in left]
+    total = np.sum(weights, axis=0)
+    weighted = np.sum([weight * own for weight, own in zip(weights, longer, strict=True)], axis=0)
+    mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
+    wavenumber = 2 * np.pi * returns.frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
+    factor = sum(
+        one * np.exp(1j * wavenumber * (own - mean)) for one, own in zip(left, longer, strict=True)
+    )
+    return replace(returns, length=returns.length + mean, amplitude=returns.amplitude * factor)
+
+
+def _worth(sizes: Array) -> NDArray[np.bool_]:
+    """All but the weakest, whose rms sum is a small fraction of the strongest."""
+    order = np.argsort(sizes, axis=None)
+    together = np.sqrt(np.cumsum(sizes.ravel()[order] ** 2))
+    worth = np.ones(sizes.size, dtype=bool)
+    worth[order[together <= ENOUGH * sizes.max(initial=0.0)]] = False
+    return worth.reshape(sizes.shape)

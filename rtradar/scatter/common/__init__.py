@@ -1,1 +1,1 @@
-"""What several echo models share: poses of a chirp, interpolation over the array, polarisation and materials."""
+"""Common parts of echo models: poses, keyframes, interpolation, and polarisation."""

@@ -1,4 +1,8 @@
-"""Polarisation of antennas, and what a surface does to it: one TE and one TM coefficient."""
+"""Polarisation: what antennas send and receive, and what surfaces do to it.
+
+A surface multiplies the TE and the TM part of a field by one coefficient each. The body's surface
+is a perfect conductor, or a half-space such as skin.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,15 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.errors import InputError
+from rtradar.radar import Radar
+from rtradar.scatter.common.poses import ChirpPoses
+from rtradar.scene import Material, material, reflection
+
 Array = NDArray[np.float64]
+Field = NDArray[np.complex128]
+
+BODY_MATERIALS = ("perfect-conductor", "skin")
 
 STEEP = 1e-9
 """Sine of the angle from the vertical below which v has no direction of its own."""
@@ -15,10 +27,16 @@ _NORMAL_INCIDENCE = 1e-9
 """Sine of incidence below which the plane of incidence has no direction of its own."""
 
 
+def unit(vectors: Array) -> Array:
+    """Return unit vectors (..., 3); 0 for no direction."""
+    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(np.where(size > 1e-12, vectors / np.where(size > 1e-12, size, 1.0), 0.0))
+
+
 def antenna_field(
     directions: Array, polarization: Literal["v", "h"], *, x_for_steep: bool = False
 ) -> Array:
-    """Polarisation of the field that an antenna sends in some directions.
+    """Compute the polarisation of the field that an antenna sends in some directions.
 
     Parameters
     ----------
@@ -39,29 +57,16 @@ def antenna_field(
         steep = np.hypot(directions[..., 0], directions[..., 1]) < STEEP
         up = np.where(steep[..., None], [1.0, 0.0, 0.0], up)
     along = np.sum(up * directions, axis=-1, keepdims=True)
-    field = up - along * directions if polarization == "v" else np.cross(directions, up)
-    return _unit_or_0(field)
+    return unit(up - along * directions if polarization == "v" else np.cross(directions, up))
 
 
 def bisector(to_tx: Array, to_rx: Array) -> Array:
-    """Normals of a surface that reflects Tx into Rx.
+    """Return the unit normals (..., 3) of a surface that reflects Tx into Rx.
 
-    Parameters
-    ----------
-    to_tx, to_rx : (..., 3) float64
-        Unit vectors from the surface to the antennas.
-
-    Returns
-    -------
-    (..., 3) float64
-        Unit vectors; 0 where the antennas are exactly opposite.
+    The arguments are unit vectors (..., 3) from the surface to the antennas. Where these are
+    exactly opposite, the normal is 0.
     """
-    return _unit_or_0(to_tx + to_rx)
-
-
-def _unit_or_0(vectors: Array) -> Array:
-    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    return np.asarray(np.where(size > 1e-12, vectors / np.where(size > 1e-12, size, 1.0), 0.0))
+    return unit(to_tx + to_rx)
 
 
 def apply_te_tm(
@@ -93,7 +98,7 @@ def apply_te_tm(
     across = np.cross(arriving, normal)
     sine = np.linalg.norm(across, axis=-1, keepdims=True)
     # At normal incidence both coefficients do the same: any direction across the ray serves.
-    spare = _unit_or_0(np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)]))
+    spare = unit(np.cross(normal, np.eye(3)[np.abs(normal).argmin(axis=-1)]))
     across = np.where(sine > _NORMAL_INCIDENCE, across / np.where(sine > 0, sine, 1.0), spare)
     in_te = (field * across).sum(axis=-1) * te
     in_tm = (field * np.cross(across, arriving)).sum(axis=-1) * tm
@@ -101,7 +106,7 @@ def apply_te_tm(
 
 
 def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Array:
-    """Co-polar fraction of the field that a conductor reflects from Tx to Rx, its normal their bisector.
+    """Compute the co-polar fraction of the field that a conductor reflects from Tx to Rx.
 
     Parameters
     ----------
@@ -113,8 +118,8 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
     Returns
     -------
     (...) float64
-        E_r = 2 (n.E) n - E_i between unit vectors of polarisation; 1 where Tx and Rx are one,
-        where they are exactly opposite, and where v has no direction.
+        E_r = 2 (n.E) n - E_i between unit vectors of polarisation, n their bisector; 1 where Tx
+        and Rx are one, where they are exactly opposite, and where v has no direction.
 
     Notes
     -----
@@ -131,3 +136,130 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
     )
     known = sent.any(axis=-1) & received.any(axis=-1) & normal.any(axis=-1)
     return np.asarray(np.where(known, fraction, 1.0))
+
+
+# -- the body's surface ----------------------------------------------------------------------------
+
+
+def body_material(name: str, frequency_hz: Array) -> Material:
+    """Return the material of that name, if it is known at these frequencies.
+
+    Raises
+    ------
+    InputError
+        If a body is not made of that, or a frequency is outside the material's limits.
+    """
+    if name not in BODY_MATERIALS:
+        raise InputError(f"body material '{name}' is unknown; allowed: {', '.join(BODY_MATERIALS)}")
+    chosen = material(name)
+    chosen.eta(np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)))
+    return chosen
+
+
+def body_reflection(field: Field, directions: Array, normals: Array, eta: Field) -> Field:
+    """Compute the field right after reflection by a half-space, at the specular point.
+
+    Parameters
+    ----------
+    field : (node, ..., 3) complex
+        Incident field.
+    directions : (..., 3) float64
+        Unit vectors along which the incident wave travels.
+    normals : (..., 3) float64
+        Unit normals, out of the body.
+    eta : (node,) complex128
+        Relative permittivity; infinite for a perfect conductor: E_r = 2 (n.E) n - E_i.
+
+    Returns
+    -------
+    (node, ..., 3) complex128
+        Reflected field, without the divergence of curved surfaces.
+    """
+    eta = np.asarray(eta, dtype=np.complex128)
+    if np.isinf(eta).all():
+        turned = 2 * np.sum(field * normals, axis=-1, keepdims=True) * normals - field
+        return np.asarray(turned, dtype=np.complex128)
+    cosine = np.clip(-np.sum(directions * normals, axis=-1), 0.0, 1.0)
+    eta = eta.reshape(-1, *(1,) * cosine.ndim)
+    te, tm = (reflection(eta, cosine, kind) for kind in ("te", "tm"))
+    onward = directions - 2 * np.sum(directions * normals, axis=-1, keepdims=True) * normals
+    return apply_te_tm(field, directions, onward, normals, te, tm)
+
+
+def material_factor(
+    to_tx: Array, to_rx: Array, eta: Field, polarization: Literal["v", "h"]
+) -> Field:
+    """Compute the co-polar echo over that of a perfect conductor of the same shape.
+
+    Parameters
+    ----------
+    to_tx, to_rx : (..., 3) float64
+        Vectors from the specular point to the antennas, of any length.
+    eta : (node,) complex128
+        Relative complex permittivity of the body at each frequency node.
+    polarization : {"v", "h"}
+        Polarisation of both antennas.
+
+    Returns
+    -------
+    (node, ...) complex128
+        Factor for exp(+j omega t); amplitudes of `Echoes` take its conjugate.
+    """
+    tx, rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in (to_tx, to_rx))
+    sent, received = antenna_field(-tx, polarization), antenna_field(-rx, polarization)
+    field = np.broadcast_to(sent.astype(np.complex128), (len(eta), *sent.shape))
+    back = -np.sum(received * body_reflection(field, -tx, bisector(tx, rx), eta), axis=-1)
+    return over_copolar(back, tx, rx, polarization)
+
+
+def over_copolar(
+    field: Field, to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]
+) -> Field:
+    """Divide a co-polar field (node, ...) by that of a conductor; 1 where that has none."""
+    own = copolar(to_tx, to_rx, polarization)
+    known = np.abs(own) > 1e-6
+    return np.asarray(np.where(known, field / np.where(known, own, 1.0), 1.0))
+
+
+class Surface:
+    """The surface of the body in free space, for models whose amplitudes are those of a conductor.
+
+    Parameters
+    ----------
+    name : {"perfect-conductor", "skin"}
+        Material of the body.
+    radar : Radar
+        Radar that receives the echoes.
+
+    Attributes
+    ----------
+    material : Material
+        The same material, known over the sweep.
+
+    Raises
+    ------
+    InputError
+        If a body is not made of that, or it is not known over the sweep.
+    """
+
+    def __init__(self, name: str, radar: Radar) -> None:
+        ends = radar.start_frequency_hz + np.array([0.0, radar.bandwidth_hz])
+        self.material = body_material(name, ends)
+        # Over a sweep the reflection of skin changes by a few hundredths: that at its middle
+        # serves for all of it.
+        self._eta = self.material.eta(np.array([radar.centre_frequency_hz]))
+        self._polarization = radar.polarization
+
+    def echo(self, at: ChirpPoses, amplitude: NDArray[Any]) -> NDArray[Any]:
+        """Compute amplitudes (chirp, rx, part) of `Echoes` from those of a conductor.
+
+        The angle of incidence is that at the centre of each part, for the middle of the receivers:
+        a line of them is short, and so near the normal a degree changes the reflection by less than
+        0.1 %.
+        """
+        if self.material.conducts:
+            return amplitude
+        to_tx = at.tx[:, None] - at.centres
+        to_rx = at.rx.mean(axis=1)[:, None] - at.centres
+        factor = material_factor(to_tx, to_rx, self._eta, self._polarization)[0]
+        return np.asarray(amplitude * factor.conj()[:, None])

@@ -1,4 +1,4 @@
-"""Where body and antennas are when a chirp is on its way: the common ground of all models."""
+"""Positions of body and antennas at each chirp, and what every echo model has in common."""
 
 from __future__ import annotations
 
@@ -11,16 +11,6 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 
-_ANCHORS_S = 10e-3
-
-
-def anchor_step(radar: Radar, apart_s: float = _ANCHORS_S) -> int:
-    """Chirps between anchors, the instants at which scenes are traced and power is measured.
-
-    A limb at 5 m/s goes 5 cm in 10 ms.
-    """
-    return max(1, round(apart_s / radar.chirp_interval_s))
-
 
 class BuiltInModel:
     """What the models of rtradar say of themselves; lists of models are derived from it.
@@ -29,10 +19,10 @@ class BuiltInModel:
     """
 
     traces: ClassVar[bool] = True
-    """Whether the model traces rays, so that parts of the body hide each other."""
+    """Whether the model traces rays, so that parts of the body occlude each other."""
 
     supports_rooms: ClassVar[bool] = False
-    """Whether the model of the person is part of `Multipath`, for scenes with walls."""
+    """Whether `RoomModel` can put the model into scenes with walls."""
 
     accepts_meshes: ClassVar[bool] = False
     """Whether `scattering_length` by this model takes meshes as well as ellipsoids."""
@@ -42,20 +32,20 @@ class BuiltInModel:
 
 
 class EchoModel(Protocol):
-    """An echo model: a body seen by a radar, ready to answer for any chirps of the capture.
+    """An echo model of a body seen by a radar, for any chirps of the capture.
 
-    ``variant`` is the backend that traces, in the words of the command line; None where nothing is traced.
+    ``variant`` is the backend that traces, in the words of the command line; None for no tracing.
     """
 
     variant: str | None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps (chirp,), numbered from the start of the capture, ascending.
+        """Compute the echoes at some chirps.
 
         Parameters
         ----------
         chirps : (chirp,) int64
-            From 0.
+            Chirps, numbered from the start of the capture, ascending.
 
         Returns
         -------
@@ -66,10 +56,10 @@ class EchoModel(Protocol):
 
 @runtime_checkable
 class Accountable(Protocol):
-    """What can say, for ``summary.json``, which of its choices it made and why."""
+    """A model that can report, for ``summary.json``, which of its choices it made and why."""
 
     def account(self) -> dict[str, Any]:
-        """What was modelled how so far, ready for JSON."""
+        """Report what was modelled how so far, ready for JSON."""
         ...
 
 
@@ -105,7 +95,6 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
     Returns
     -------
     ChirpPoses
-        World [m].
     """
     times = np.minimum(radar.centres_of(chirps), body.duration_s)
     poses = body.at(times)
@@ -119,23 +108,23 @@ def one_echo_a_part(
     amplitude: NDArray[np.float64],
     frequency_hz: float,
 ) -> Echoes:
-    """Echoes of single reflections, one a part, that do not change over the sweep.
+    """Make echoes of single reflections, one a part, that do not change over the sweep.
 
     Parameters
     ----------
     tx : (chirp,) int64
-        Which Tx each chirp is from.
+        Transmitter of each chirp.
     length : (chirp, rx, part) float64
         Length of the path from Tx to Rx [m].
     amplitude : (chirp, rx, part) float64 or complex128
         Scattering length, defined as in `Echoes` [m].
     frequency_hz : float
-        That the amplitudes are for.
+        Frequency of the amplitudes [Hz].
 
     Returns
     -------
     Echoes
-        Of one node and one bounce.
+        Echoes of one node and one bounce.
     """
     parts = length.shape[2]
     return Echoes(

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.scatter.common.keyframe_cache import FirstCome
+from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.system.threads import in_threads
 
 PIECES = 8
@@ -86,7 +86,7 @@ class Envelope:
             tolerance,
             end,
         )
-        self._anchors: FirstCome[int, Sample] = FirstCome(_KEPT_ANCHORS, _PASSING)
+        self._anchors: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_ANCHORS, _PASSING)
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()
 
     def prepare_anchors(self, indices: Iterable[int]) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.facets.integral import facet_integral
 from rtradar.scatter.facets.shadows import FacetShadows, Shares

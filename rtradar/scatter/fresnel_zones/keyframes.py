@@ -21,9 +21,8 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.kernels.scatter.fresnel_zones import blend_fractions
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.array_interpolation import array_nodes
-from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.poses import anchor_step
+from rtradar.scatter.common.interpolation import array_nodes
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
@@ -82,10 +81,10 @@ class ZoneFractions:
         self._shadow_rays = shadow_rays
         self._wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         self._nodes = array_nodes(radar, TX_NODES, RX_NODES)
-        self._step = anchor_step(radar)
+        self._step = keyframe_step(radar)
         finer = _FINE * max(1.0, radar.centre_frequency_hz / _FINE_FREQUENCY_HZ) ** 0.5
         self._fine = min(round(finer), self._step)
-        self._keyframes: FirstCome[int, NDArray[np.complex128]] = FirstCome(
+        self._keyframes: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(
             _KEPT_KEYFRAMES, _PASSING
         )
         self._intervals: OrderedDict[int, _Interval] = OrderedDict()

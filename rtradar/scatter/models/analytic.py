@@ -11,7 +11,7 @@ from rtradar.kernels.scatter.far_field import far_field
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
-from rtradar.scatter.common.body_material import Surface
+from rtradar.scatter.common.polarization import Surface
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 
 
@@ -95,6 +95,8 @@ class Analytic(BuiltInModel):
     traces = False
     supports_rooms = True
     relative_cost = 1.0
+    tracer = None
+    image_echo = staticmethod(far_field_echo)
 
     def __init__(
         self,
@@ -104,19 +106,25 @@ class Analytic(BuiltInModel):
         spreading: bool = True,
         material: str = "perfect-conductor",
     ) -> None:
-        self._radar, self._body, self._spreading = radar, body, spreading
-        self._surface = Surface(material, radar)
+        self._radar, self._body, self.spreading = radar, body, spreading
+        self.surface = Surface(material, radar)
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        length, amplitude = self._returns(at)
-        echo = self._surface.echo(at, amplitude)
+        length, amplitude = self.conductor_echo(chirps, at)
+        echo = self.surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
-    def _returns(self, at: ChirpPoses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return far_field_echo(at, spreading=self._spreading)
+    def conductor_echo(
+        self,
+        chirps: NDArray[np.int64],
+        at: ChirpPoses,
+        start: NDArray[np.float64] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echoes of a conductor; see `RoomReady`."""
+        return far_field_echo(at, spreading=self.spreading)
 
 
 class AnalyticPaper(Analytic):
@@ -124,5 +132,11 @@ class AnalyticPaper(Analytic):
 
     supports_rooms = False
 
-    def _returns(self, at: ChirpPoses) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return plane_wave_echo(self._radar, at, spreading=self._spreading)
+    def conductor_echo(
+        self,
+        chirps: NDArray[np.int64],
+        at: ChirpPoses,
+        start: NDArray[np.float64] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echoes as the paper has them."""
+        return plane_wave_echo(self._radar, at, spreading=self.spreading)

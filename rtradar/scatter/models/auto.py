@@ -16,8 +16,8 @@ from rtradar.errors import InputError
 from rtradar.kernels.blends import smoothstep
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.nodes import interpolation_weights
+from rtradar.scatter.common.interpolation import interpolation_weights
+from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.models.analytic import far_field_echo
@@ -121,7 +121,7 @@ class Auto(BuiltInModel):
         self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
         self._starts = StartPoints(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
-        self._planned: FirstCome[int, Planned] = FirstCome(_KEPT_CHUNKS, _PASSING)
+        self._planned: KeyframeCache[int, Planned] = KeyframeCache(_KEPT_CHUNKS, _PASSING)
         # What `account` tells: parts and instants (way, part) and by reason, and as bits of a number the chunks that are in it.
         self._ways = np.zeros((len(WAYS), len(body.part_names)), dtype=np.int64)
         self._why: Counter[str] = Counter()

@@ -27,7 +27,7 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid_radii
 from rtradar.scatter.antenna_gain import leg_gain
-from rtradar.scatter.common.array_interpolation import array_nodes
+from rtradar.scatter.common.interpolation import array_nodes
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.fresnel_zones.visible_fraction import Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo

@@ -13,7 +13,7 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import (

@@ -16,7 +16,7 @@ from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.array_interpolation import ArrayNodes, array_nodes, spread_nodes
+from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.envelope import (
     PIECES,

@@ -16,8 +16,8 @@ from rtradar.errors import InputError
 from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
@@ -92,7 +92,7 @@ class Rays(BuiltInModel):
         self.variant: str | None = backend.kind
         self._surfaces = BodySurfaces(use(backend), body.semi_axes)
         self._posed: tuple[int, PosedGrid] | None = None
-        self._shots: FirstCome[tuple[int, int], _Shot] = FirstCome(0, _KEPT_SHOTS)
+        self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps: of each part one for each number of bounces, by the part of the last bounce."""

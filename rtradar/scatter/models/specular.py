@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.body_material import Surface
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.polarization import Surface
+from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
@@ -37,6 +37,7 @@ class Specular(BuiltInModel):
     """
 
     supports_rooms = True
+    image_echo = None
     relative_cost = 1.5
 
     def __init__(
@@ -48,18 +49,32 @@ class Specular(BuiltInModel):
         spreading: bool = True,
         material: str = "perfect-conductor",
     ) -> None:
-        self._radar, self._body, self._spreading = radar, body, spreading
-        self._surface = Surface(material, radar)
+        self._radar, self._body, self.spreading = radar, body, spreading
+        self.surface = Surface(material, radar)
         backend = select(variant)
         self.variant: str | None = backend.kind
-        self.visibility = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))
+        self.tracer = BodyTracer(use(backend), body.semi_axes)
+        self.visibility = SpecularVisibility(radar, body, self.tracer)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        weight, start = self.visibility.at(chirps)
-        length, amplitude, _ = solve_specular_points(
-            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
-        )
-        echo = self._surface.echo(at, amplitude * weight)
+        length, amplitude = self.conductor_echo(chirps, at)
+        echo = self.surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
+
+    def conductor_echo(
+        self,
+        chirps: NDArray[np.int64],
+        at: ChirpPoses,
+        start: NDArray[np.float64] | None = None,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echoes of a conductor; see `RoomReady`."""
+        weight, known = self.visibility.at(chirps)
+        length, amplitude, _ = solve_specular_points(
+            at,
+            start=known if start is None else start,
+            polarization=self._radar.polarization,
+            spreading=self.spreading,
+        )
+        return length, amplitude * weight

@@ -1,118 +1,208 @@
-"""Paths from antenna to body over walls: which there are, mirror images of the antennas, and where the legs run."""
+"""Paths from antennas to the body over walls: which there are, and where their legs run.
+
+A leg over walls is straight from the mirror image of its antenna (image method). A wall has two
+faces: its front is the rectangle itself, and waves from behind meet the back, one thickness deeper.
+All of this is closed form in float64; nothing is traced.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import accumulate, product
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.scatter.multipath.wall_interaction import height, image, specular_point
 from rtradar.scene import Wall
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
 
 
 class Face(NamedTuple):
-    """A wall, and which of its two faces reflects."""
+    """A wall, and whether its back reflects, not its front."""
 
     wall: Wall
     back: bool
 
 
 Leg = tuple[Face, ...]
-"""Faces that reflect on the way from an antenna to the body, in that order; none where it is straight."""
+"""Faces that reflect on the way from an antenna, in this order; none where the leg is straight."""
 
 
 @dataclass(frozen=True)
 class WallPath:
-    """The way out, from Tx to the body, and the way back, told from Rx to the body."""
+    """A path: the leg from Tx to the body, and the leg from Rx to the body."""
 
     out: Leg
     back: Leg
 
     @property
     def order(self) -> int:
-        """Reflections at walls."""
+        """Number of reflections at walls."""
         return len(self.out) + len(self.back)
 
     @property
     def name(self) -> str:
-        """Walls in the order in which the wave meets them, the body between them: ``floor > body``."""
-        return " > ".join(
-            [
-                *(face.wall.name for face in self.out),
-                "body",
-                *(face.wall.name for face in reversed(self.back)),
-            ]
-        )
+        """Walls in the order in which the wave meets them, as in ``floor > body``."""
+        out, back = ([face.wall.name for face in leg] for leg in (self.out, self.back))
+        return " > ".join([*out, "body", *reversed(back)])
 
 
 def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPath, ...]:
-    """All paths with up to ``order`` reflections at walls, the direct one first.
+    """List all paths with up to ``order`` reflections at walls, the direct one first.
 
     Parameters
     ----------
     walls : sequence of Wall
+        Walls of the scene.
     place : (3,) float64
-        Middle of the array [m]; it, or its image, settles which face of a wall reflects.
+        Middle of the array [m]. It, or its image, settles which face of a wall reflects.
     order : int
-        0: the direct path alone.
+        Largest number of reflections; 0 gives the direct path alone.
     """
     legs: list[Leg] = [()]
     for depth in range(1, order + 1):
         legs += [
-            (*leg, _met(wall, images(leg, place)))
+            (*leg, Face(wall, bool(height(wall, images(leg, place)) < 0)))
             for leg in legs
             if len(leg) == depth - 1
             for wall in walls
             if not leg or leg[-1].wall is not wall
         ]
-    paths = [
-        WallPath(out, back) for out, back in product(legs, legs) if len(out) + len(back) <= order
-    ]
-    return tuple(sorted(paths, key=lambda path: path.order))
+    paths = (WallPath(*both) for both in product(legs, legs))
+    return tuple(
+        sorted((path for path in paths if path.order <= order), key=lambda path: path.order)
+    )
 
 
-def _met(wall: Wall, place: Array) -> Face:
-    return Face(wall, bool(height(wall, place) < 0))
+# -- geometry of one wall --------------------------------------------------------------------------
+
+
+def height(wall: Wall, points: Array, *, back: bool = False) -> Array:
+    """Height of points (..., 3) [m] above the front or the back, away from the slab (...) [m]."""
+    above = (np.asarray(points) - np.array(wall.corner_m)) @ wall.normal
+    return np.asarray(-above - wall.thickness_m if back else above)
+
+
+def image(wall: Wall, points: Array, *, back: bool = False) -> Array:
+    """Mirror images (..., 3) of points (..., 3) in the plane of the front or the back [m].
+
+    Equation :eq:`image` of the theory page.
+    """
+    normal = -wall.normal if back else wall.normal
+    return np.asarray(points - 2 * height(wall, points, back=back)[..., None] * normal)
+
+
+def inside(wall: Wall, points: Array, margin_m: float = 0.0) -> Bools:
+    """Whether points (..., 3) [m], projected onto the front, lie in its rectangle and a margin."""
+    away = np.asarray(points) - np.array(wall.corner_m)
+    within = np.ones(away.shape[:-1], dtype=bool)
+    for edge in (np.array(wall.edge_u_m), np.array(wall.edge_v_m)):
+        length = np.linalg.norm(edge)
+        along = away @ (edge / length)
+        within &= (along >= -margin_m) & (along <= length + margin_m)
+    return within
+
+
+def crossed(wall: Wall, origins: Array, targets: Array) -> Bools:
+    """Whether straight legs, ``origins`` to ``targets`` (..., 3) [m], pass through the slab.
+
+    They do where their ends are on different sides of the slab's middle plane, so a leg that ends
+    on a face does not cross it.
+    """
+    first, second = np.broadcast_arrays(height(wall, origins), height(wall, targets))
+    across = (first + wall.thickness_m / 2) * (second + wall.thickness_m / 2) < 0
+    if across.any():
+        # Where they pass the front: the fronts of a room meet, the middles of its slabs do not.
+        starts, ends = (
+            np.broadcast_to(places, (*across.shape, 3))[across] for places in (origins, targets)
+        )
+        fraction = first[across] / (first - second)[across]
+        across[across] = inside(wall, starts + fraction[:, None] * (ends - starts))
+    return across
+
+
+def specular_point(
+    wall: Wall, origins: Array, targets: Array, *, back: bool = False, margin_m: float = 0.0
+) -> tuple[Array, Bools]:
+    """Find where a wall reflects a wave from an origin to a target.
+
+    Parameters
+    ----------
+    wall : Wall
+        Wall that reflects.
+    origins, targets : (..., 3) float64
+        Ends of the path, world [m]; they broadcast.
+    back : bool
+        Whether the back reflects, not the front.
+    margin_m : float
+        Margin around the rectangle, and before the face for the target [m]; negative if narrower.
+
+    Returns
+    -------
+    point : (..., 3) float64
+        Specular point on the plane of that face [m]; NaN where the ends are on different sides.
+    valid : (...) bool
+        Whether both ends are before that face and the point lies in the rectangle.
+    """
+    origins, targets = np.broadcast_arrays(origins, targets)
+    first, second = height(wall, origins, back=back), height(wall, targets, back=back)
+    before = (first > abs(margin_m)) & (second > -margin_m)
+    fraction = np.where(before, first, np.nan) / np.where(before, first + second, 1.0)
+    point = origins + fraction[..., None] * (image(wall, targets, back=back) - origins)
+    return point, before & inside(wall, point, margin_m)
+
+
+# -- legs over several walls -----------------------------------------------------------------------
+
+
+def image_chain(leg: Leg, antennas: Array) -> list[Array]:
+    """Return antennas (..., 3) and their images after each face of a leg [m]."""
+    return list(
+        accumulate(
+            leg,
+            lambda points, face: image(face.wall, points, back=face.back),
+            initial=np.asarray(antennas),
+        )
+    )
 
 
 def images(leg: Leg, antennas: Array) -> Array:
-    """Images (..., 3) of antennas (..., 3) in the faces of a leg, one after the other [m]."""
-    for wall, back in leg:
-        antennas = image(wall, antennas, back=back)
-    return np.asarray(antennas)
+    """Return the images (..., 3) of antennas (..., 3) over all faces of a leg [m]."""
+    return image_chain(leg, antennas)[-1]
 
 
-def corners(leg: Leg, antennas: Array, points: Array) -> tuple[list[Array], NDArray[np.bool_]]:
-    """Where a leg runs.
+def corners(
+    leg: Leg, antennas: Array, points: Array, margin_m: float = 0.0
+) -> tuple[list[Array], Bools]:
+    """Find where a leg runs.
 
     Parameters
     ----------
     leg : Leg
+        Faces that reflect, none for a straight leg.
     antennas, points : (..., 3) float64
-        Its ends [m]; they broadcast.
+        Ends of the leg [m]; they broadcast.
+    margin_m : float
+        Margin of `specular_point` [m].
 
     Returns
     -------
     corners : list of (..., 3) float64
-        The antenna, the places of reflection, the point on the body [m].
+        Antenna, places of reflection, and the point at the other end [m].
     valid : (...) bool
-        Whether each place of reflection lies in its rectangle, before the face. Where two are on different sides of a face there
-        is none: the point stands for it, and ``valid`` is False.
+        Whether each place of reflection lies in its rectangle, before the face. Where both ends
+        are on different sides of a face, the next corner takes the place of the missing one.
     """
     antennas, points = np.broadcast_arrays(antennas, points)
-    chain = [antennas]
-    for wall, back in leg:
-        chain.append(image(wall, chain[-1], back=back))
     valid = np.ones(points.shape[:-1], dtype=bool)
     along = [points]
-    for (wall, back), source in zip(reversed(leg), reversed(chain[:-1]), strict=True):
-        place, holds = specular_point(wall, source, along[-1], back=back)
+    sources = image_chain(leg, antennas)[:-1]
+    for (wall, back), source in zip(reversed(leg), reversed(sources), strict=True):
+        place, holds = specular_point(wall, source, along[-1], back=back, margin_m=margin_m)
         along.append(np.where(np.isnan(place), along[-1], place))
         valid &= holds
     return [antennas, *reversed(along)], valid

@@ -1,70 +1,80 @@
-"""What became of the echoes over each path: how strong they are, which were kept, and why others were not."""
+"""What became of the echoes over each path: their power, which were kept, and where they show."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.radar import Radar
 from rtradar.scatter.multipath.image_paths import WallPath
 
+if TYPE_CHECKING:
+    from rtradar.scatter.multipath.room_model import RoomModel
+
 MARGIN_DB = 10.0
-"""What a room returns is left out where it is further below the noise."""
+"""Echoes of a room are left out where they are further below the noise than this [dB]."""
+
+_GHOST_STEP_CYCLES = 4
+"""TDM cycles over which the velocity of a ghost is measured."""
 
 
 @dataclass(frozen=True)
-class PathAccount:
-    """What became of the echoes of one path.
+class PathSummary:
+    """What became of the echoes over one path.
 
     Parameters
     ----------
     path : str
         Walls in the order in which the wave meets them.
     order : int
-        Reflections at walls.
+        Number of reflections at walls.
     power_m2 : float
         Echo power of all parts, averaged over rx and one chirp every 20 ms [m^2].
     over_noise_db : float or None
-        The same over noise, after the gain of samples, cycles and channels; None without noise or without an echo.
-    kept, dropped : tuple of str
-        Body parts.
+        Echo power over noise, after the gain of samples, cycles and channels [dB]; None without
+        noise or without an echo.
+    kept, dropped : list of str
+        Body parts whose echoes were kept and left out.
     why : str
-        Why those were dropped; empty where none was.
+        Why echoes were left out; empty if none were.
     """
 
     path: str
     order: int
     power_m2: float
     over_noise_db: float | None
-    kept: tuple[str, ...]
-    dropped: tuple[str, ...]
+    kept: list[str]
+    dropped: list[str]
     why: str
 
     def row(self) -> dict[str, Any]:
-        """For ``summary.json``."""
-        return {**self.__dict__, "kept": list(self.kept), "dropped": list(self.dropped)}
+        """Return the entry of ``summary.json``."""
+        return asdict(self)
 
 
-def account(
+def summarize(
     path: WallPath,
     own: NDArray[np.bool_],
     keep: NDArray[np.bool_],
     power: NDArray[np.float64],
     names: NDArray[Any],
     noise: float,
-) -> PathAccount:
-    """Account of one path.
+) -> PathSummary:
+    """Summarize one path.
 
     Parameters
     ----------
     path : WallPath
+        Path.
     own, keep, power, names : (echo,)
-        Which echoes are of this path, which of all are kept, their power [m^2] and the names of their parts.
+        Which echoes take this path and which of all are kept, their power [m^2], and the names of
+        their parts.
     noise : float
-        Over the gain of processing [m^2].
+        Noise power over the gain of processing [m^2].
     """
     total = float(power[own].sum())
     lost = own & ~keep
@@ -76,12 +86,44 @@ def account(
     if (power[lost] > 0).any():
         why.append(f"more than {MARGIN_DB:g} dB below the noise after processing")
     over = 10 * math.log10(total / noise) if total > 0 and noise > 0 else None
-    return PathAccount(
-        path.name,
-        path.order,
-        total,
-        over,
-        tuple(names[own & keep]),
-        tuple(names[lost]),
-        "; ".join(why),
-    )
+    kept, dropped = names[own & keep].tolist(), names[lost].tolist()
+    return PathSummary(path.name, path.order, total, over, kept, dropped, "; ".join(why))
+
+
+class Ghost(NamedTuple):
+    """Where the echoes over a path show, and their power."""
+
+    path: str
+    range_m: float
+    velocity_mps: float
+    azimuth_rad: float
+    power_m2: float
+
+
+def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
+    """Find where the echoes over walls show at one time [s], path by path.
+
+    Each is the mean of its parts, weighted by their power. The azimuth is that from which the last
+    leg comes, or that of its antenna's image mirrored back.
+    """
+    cycle = round(time_s / radar.cycle_duration_s - _GHOST_STEP_CYCLES / 2)
+    chirps = (max(cycle, 0) + np.array([0, _GHOST_STEP_CYCLES])) * radar.n_tx
+    echoes = model.echoes(chirps)
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
+    length = echoes.length.mean(axis=1)
+    rate = (length[1] - length[0]) / (_GHOST_STEP_CYCLES * radar.cycle_duration_s)
+    # The direction follows from the slope of the lengths along the line of receivers.
+    places, azimuth = radar.rx[: radar.rx_y, 1], np.zeros(len(power))
+    if len(places) > 1:
+        slope = np.polyfit(places, echoes.length[0, : radar.rx_y], 1)[0]
+        azimuth = np.arcsin(np.clip(-slope, -1, 1))
+    values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
+    names = np.array(model.path_names)
+    found = []
+    for path in dict.fromkeys(model.path_names):
+        own = (names == path) & (echoes.bounces > 1) & (power > 0)
+        if own.any():
+            total = float(power[own].sum())
+            range_m, rate_mps, angle = (values[:, own] @ (power[own] / total)).tolist()
+            found.append(Ghost(path, range_m, rate_mps, angle, total))
+    return found

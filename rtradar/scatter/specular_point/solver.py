@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry, Options, solve
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
 from rtradar.system.threads import in_threads
 
 _CHIRPS_PER_THREAD = 64
@@ -90,8 +90,10 @@ class StartPoints:
 
     def __init__(self, radar: Radar, body: Body) -> None:
         self._radar, self._body = radar, body
-        self._step = anchor_step(radar)
-        self._keyframes: FirstCome[int, NDArray[np.float64]] = FirstCome(_KEPT_KEYFRAMES, _PASSING)
+        self._step = keyframe_step(radar)
+        self._keyframes: KeyframeCache[int, NDArray[np.float64]] = KeyframeCache(
+            _KEPT_KEYFRAMES, _PASSING
+        )
 
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
-from rtradar.scatter.common.keyframe_cache import FirstCome
-from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
+from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
+from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
 from rtradar.scatter.specular_point.solver import local_points
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -93,10 +93,10 @@ class SpecularVisibility:
 
     def __init__(self, radar: Radar, body: Body, tracer: BodyTracer) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
-        self._step = anchor_step(radar)
+        self._step = keyframe_step(radar)
         # Visibility as bits, which take an eighth of the memory.
-        self._kept: FirstCome[int, tuple[NDArray[np.uint8], NDArray[np.float64]]]
-        self._kept = FirstCome(_KEPT_KEYFRAMES - _PASSING, _PASSING)
+        self._kept: KeyframeCache[int, tuple[NDArray[np.uint8], NDArray[np.float64]]]
+        self._kept = KeyframeCache(_KEPT_KEYFRAMES - _PASSING, _PASSING)
 
     def _keyframe(self, chirp: int) -> Keyframe:
         bits, start = self._kept.get(chirp, partial(self._trace, chirp))

@@ -1,4 +1,4 @@
-"""Static clutter of which a part lies behind a wall: the rest of it is as it would be without the wall."""
+"""Static clutter that is partly behind a wall: the rest is as it would be without the wall."""
 
 from __future__ import annotations
 
@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.behind_walls import behind_walls
 from rtradar.scatter.clutter.returns import (
     FREQUENCY_ERROR,
     FURNITURE_NODES,
     RoomEchoes,
+    behind_walls,
 )
-from rtradar.scatter.common.nodes import sweep_nodes
+from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scene import Scene, Wall, material
 
 RADAR = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, position_m=(0.0, 0.0, 1.0))

@@ -64,7 +64,10 @@ def gap(starts: Array, ends: Array, centre: Array) -> Array:
 
 
 def covered(offset: Array, radius: Array, ball: float) -> Array:
-    """Share of discs of these radii, whose middles are so far from the ball's, that a ball covers: by many random points."""
+    """Fraction of discs that a ball covers, by many random points.
+
+    The discs have these radii, and their middles these distances from the ball's.
+    """
     rng = np.random.default_rng(0)
     points = np.sqrt(rng.random(4000))[:, None] * np.exp(2j * np.pi * rng.random((4000, 1)))
     return (
@@ -85,7 +88,8 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
     rx = RADAR.rx[RADAR.rx_of_tx]
     expected = []
     for own, first in zip(clutter.objects, shadow.starts[:-1], strict=True):
-        # The ball stands in the middle of the room: of a path over one wall it meets one leg, and not the end of it.
+        # The ball stands in the middle of the room: of a path over one wall it meets one leg, and
+        # not the end of it.
         if own.kind != "mirror" or own.name not in ("far", "left"):
             continue
         point, length = own.points[:, :, 0, 0], own.length[..., 0]
@@ -99,7 +103,8 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
             )
             legs.append(covered(offset, radius, ball.radius))
         expected.append(np.maximum(*legs))
-        # Of 24 points spread evenly a straight edge through a disc finds its share to some two of them.
+        # Of 24 points spread evenly a straight edge through a disc finds its fraction to some two.
+        # them.
         np.testing.assert_allclose(share[..., first], expected[-1], atol=0.1)
     largest = np.max(expected)
     assert (largest > 0.5) == (anchor < 60)
@@ -108,7 +113,7 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
 def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> None:
     ball = Ball()
     shadow = ClutterShadow(clutter, ball, variant="scalar")
-    lost = shadow.hidden(0)
+    lost = shadow.at(0)
     centre = ball.at(np.array([0.5 * RADAR.chirp_duration_s])).centres[0, 0]
     antennas = np.concatenate([RADAR.tx, RADAR.rx])
     for own, first, last in zip(
@@ -119,8 +124,9 @@ def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> N
         nearest = gap(antennas[:, None], own.points[0, 0, :, 0], centre)
         inside = (lost.echo >= first) & (lost.echo < last)
         share = np.zeros((RADAR.n_tx, RADAR.n_rx, own.n_echoes))
-        share[..., lost.echo[inside] - first] = lost.share[..., inside]
-        # Along a line of antennas the share runs straight between its ends: certain where all antennas agree.
+        share[..., lost.echo[inside] - first] = lost.fraction[..., inside]
+        # Along a line of antennas the fraction changes linearly between its ends: certain where all
+        # antennas agree.
         assert (share[..., (nearest < ball.radius * 0.999).all(axis=0)] == 1).all()
         assert (share[..., (nearest > ball.radius * 1.001).all(axis=0)] == 0).all()
         assert share.min() >= 0
@@ -145,12 +151,12 @@ def test_weights_fade_smoothly_from_anchor_to_anchor(clutter: Clutter) -> None:
 
 def _dense(shadow: ClutterShadow, anchor: int, clutter: Clutter) -> Array:
     share = np.zeros((RADAR.n_tx, RADAR.n_rx, clutter.n_echoes))
-    lost = shadow.hidden(anchor)
-    share[..., lost.echo] = lost.share
+    lost = shadow.at(anchor)
+    share[..., lost.echo] = lost.fraction
     return share
 
 
 def test_a_body_outside_hides_nothing(clutter: Clutter) -> None:
     shadow = ClutterShadow(clutter, Ball(place=(30.0, 0.0, 1.0)), variant="scalar")
-    assert len(shadow.hidden(3).echo) == 0
+    assert len(shadow.at(3).echo) == 0
     np.testing.assert_array_equal(shadow.weights(np.arange(5)), 1)

@@ -7,8 +7,8 @@ import pytest
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
-from rtradar.scatter.clutter.diffuse import rough_returns
 from rtradar.scatter.clutter.returns import RoomEchoes
+from rtradar.scatter.clutter.wall_returns import rough_returns
 from rtradar.scatter.multipath.wall_interaction import reflect
 from rtradar.scene import Scene, Wall, material, slab
 from rtradar.trace.backends.backend import select, use
@@ -19,7 +19,7 @@ WAVENUMBER = 2 * np.pi * 14e9 / SPEED_OF_LIGHT_MPS
 
 
 def wall(turn_deg: float = 0.0, roughness_m: float = 0.002) -> Wall:
-    """One square metre at x = 0, its front to the radar, turned about the vertical through its middle."""
+    """One square metre at x = 0, facing the radar, turned about the vertical through its middle."""
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
     edge = np.array([s, -c, 0.0])
     corner = -edge / 2 + [0, 0, 0.5]
@@ -49,12 +49,14 @@ def test_power_per_area_is_that_of_the_closed_form(turn_deg: float, roughness_m:
     share = 1 - np.exp(-((2 * WAVENUMBER * roughness_m * cosine) ** 2))
     mirrored, _ = slab(material("concrete").eta(14e9), 0.2, 14e9, cosine, "te")
     expected = 4 * share * np.abs(mirrored) ** 2 * cosine**2
-    # From 8 m the square metre is seen within 3.6 degrees, more where it is turned: 1 / R^4 and cosines vary over it.
+    # From 8 m the square metre is seen within 3.6 degrees, more where it is turned: 1 / R^4 and
+    # cosines vary over it.
     assert echoes.power_m2() * 8**4 == pytest.approx(expected, rel=0.06)
 
 
 def test_mirrored_and_diffuse_power_are_what_a_smooth_wall_mirrors() -> None:
-    # Straight onto the wall: diffuse power by Lambert's law over half of space, sigma0 = 4 p cos cos.
+    # Straight onto the wall: diffuse power by Lambert's law over half of space, sigma0 = 4 p cos
+    # cos.
     for roughness in (0.0005, 0.002, 0.005):
         (echoes,) = rough(RADAR, wall(0.0, roughness))
         diffuse = echoes.power_m2() * 8**4 / 4

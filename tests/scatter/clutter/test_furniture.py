@@ -1,4 +1,4 @@
-"""Furniture: plates and corner reflectors against closed forms, materials, shadows, and walls on the way."""
+"""Furniture: plates and reflectors against closed forms, materials, shadows, walls on the way."""
 
 from pathlib import Path
 
@@ -9,7 +9,6 @@ import trimesh
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.scatter.clutter import facet_groups as clutter_groups
 from rtradar.scatter.clutter import furniture as clutter_furniture
 from rtradar.scatter.clutter.furniture import furniture_returns
 from rtradar.scatter.clutter.returns import RoomEchoes
@@ -30,7 +29,7 @@ def returns(radar: Radar, scene: Scene) -> dict[str, RoomEchoes]:
 def field(
     echoes: RoomEchoes, radar: Radar, frequency: np.ndarray, to: float = 2 * AWAY
 ) -> np.ndarray:
-    """Conjugate of the scattering length relative to the path of that length, times R1 R2: (frequency, tx, rx)."""
+    """Conjugate scattering length relative to that path, times R1 R2: (frequency, tx, rx)."""
     k = 2 * np.pi * frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
     return (echoes.at_nodes(frequency) * np.exp(1j * k * (echoes.length - to))).sum(axis=-1) * (
         to / 2
@@ -59,12 +58,14 @@ def test_a_flat_side_returns_as_a_plate(tmp_path: Path, made: str) -> None:
     scene = Scene(furniture=(block(tmp_path, "block", (0.1, 0.4, 0.3), (0.05, 0, 1), made),))
     frequency = np.linspace(12e9, 16e9, 9)
     found = field(returns(ONE, scene)["block"], ONE, frequency)[:, 0, 0]
-    # A plate seen straight on: j k A / sqrt(pi), times the mirror's coefficient over that of a conductor; conjugate.
+    # A plate seen straight on: j k A / sqrt(pi), times the mirror's coefficient over that of a
+    # conductor; conjugate.
     expected = np.conj(1j * 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS * 0.12 / np.sqrt(np.pi))
     expected *= np.conj(-reflection(material(made).eta(14e9), 1.0, "te"))
     # At 60 m waves bow over it: on the mean by (a^2 + b^2) / 12 R of path.
     expected *= np.exp(2j * np.pi * frequency / SPEED_OF_LIGHT_MPS * (0.4**2 + 0.3**2) / 12 / AWAY)
-    # Its square, 0.06 rad about the mean, takes 0.2 % of the size; the factor of the phase of concrete is that straight on.
+    # Its square, 0.06 rad about the mean, takes 0.2 % of the size; the factor of the phase of
+    # concrete is that straight on.
     np.testing.assert_allclose(found, expected, rtol=0.005)
 
 
@@ -86,7 +87,8 @@ def test_corner_reflectors_return_what_closed_forms_say(
     wavelength = SPEED_OF_LIGHT_MPS / 14e9
     rcs = exact * np.pi * 0.4**4 / wavelength**2
     found = np.abs(field(echoes, ONE, frequency)) ** 2
-    # Optics leaves out edges; at 60 m the dihedral is 1.3 times as far as 4 a^2 / lambda, where fields are those of far away.
+    # Optics leaves out edges; at 60 m the dihedral is 1.3 times as far as 4 a^2 / lambda, where
+    # fields are those of far away.
     assert abs(10 * np.log10(found.item() / rcs)) < limit_db
     assert echoes.kind == "reflector"
     assert set(echoes.bounces) >= {1, 2 if mesh == "dihedral" else 3}
@@ -136,9 +138,10 @@ def test_groups_and_their_frequency_nodes_add_up_to_all_facets(
     frequency = np.linspace(12.1e9, 15.9e9, 9)
     coarse = field(returns(near, scene)["block"], near, frequency, 8.0)
     monkeypatch.setattr(clutter_furniture, "FURNITURE_NODES", 9)
-    monkeypatch.setattr(clutter_groups, "_WIDTH_BINS", 1.0)
+    monkeypatch.setattr(clutter_furniture, "_WIDTH_BINS", 1.0)
     fine = field(returns(near, scene)["block"], near, frequency, 8.0)
-    # Facets seen edge-on reach two range bins from the middle of their group, more than five nodes follow to the last digit.
+    # Facets seen edge-on reach two range bins from the middle of their group, more than five nodes
+    # follow to the last digit.
     assert np.abs(coarse - fine).max() < 0.01 * np.abs(fine).max()
 
 

@@ -11,7 +11,7 @@ import trimesh
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.returns import RoomEchoes
-from rtradar.scatter.clutter.specular_walls import mirror_returns
+from rtradar.scatter.clutter.wall_returns import specular_returns
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls, slab
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.room_tracer import RoomTracer
@@ -34,7 +34,7 @@ def box(surface: Surface = METAL) -> Scene:
 
 
 def mirrors(radar: Radar, scene: Scene, order: int) -> list[RoomEchoes]:
-    return list(mirror_returns(radar, scene, RoomTracer(use(select("scalar")), scene), order))
+    return list(specular_returns(radar, scene, RoomTracer(use(select("scalar")), scene), order))
 
 
 def gain(echoes: RoomEchoes) -> np.ndarray:
@@ -60,7 +60,8 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
         opposite = len(names) == 2 and SIDES[names[0]][0] == SIDES[names[1]][0]
         key = echoes.name if opposite else frozenset(names)
         found[key] = found.get(key, 0.0) + gain(echoes)
-    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders share one path.
+    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders share
+    # one path.
     assert len(found) == 6 + 6 + 12
     for name, total in found.items():
         # A conductor mirrors v into v, whatever the angles.

@@ -16,7 +16,7 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.blends import hermite_weights
-from rtradar.scatter.common.array_interpolation import array_nodes, spread_nodes
+from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, stretch
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.models.physical_optics import PhysicalOptics

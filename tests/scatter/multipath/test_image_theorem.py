@@ -14,11 +14,13 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
+from rtradar.scatter import build_model
+from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.common.polarization import copolar
-from rtradar.scatter.common.poses import anchor_step, chirp_poses
+from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images, wall_paths
-from rtradar.scatter.multipath.multipath import ANCHORS_S, Multipath
+from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Furniture, Scene, Surface, Wall, material, room_walls
 from rtradar.trace.backends.backend import Backend
@@ -87,12 +89,12 @@ def unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
 
 
-def by_name(model: Multipath, name: str) -> int:
+def by_name(model: RoomModel, name: str) -> int:
     """Place of the echo of a one-part body over that path."""
     return [path.name for path in model.paths].index(name)
 
 
-# -- paths ----------------------------------------------------------------------------------------------------------
+# -- paths -----------------------------------------------------------------------------------------
 
 
 def box(name: str = "concrete") -> tuple[Wall, ...]:
@@ -102,7 +104,8 @@ def box(name: str = "concrete") -> tuple[Wall, ...]:
 
 
 def test_the_paths_of_a_box_are_counted() -> None:
-    # Order 2: two reflections out (6 x 5, no wall twice running), two back, or one on each way (6 x 6).
+    # Order 2: two reflections out (6 x 5, no wall twice running), two back, or one on each way (6 x
+    # 6).
     counts = [len(wall_paths(box(), np.array([-4.0, 1.0, 1.0]), order)) for order in (0, 1, 2)]
     assert counts == [1, 13, 13 + 30 + 30 + 36]
     paths = wall_paths(box(), np.array([-4.0, 1.0, 1.0]), 2)
@@ -120,7 +123,7 @@ def test_an_image_over_two_walls_keeps_the_length_of_the_path() -> None:
     )
 
 
-# -- the image theorem ------------------------------------------------------------------------------------------------
+# -- the image theorem -----------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("polarization", ["v", "h"])
@@ -130,7 +133,9 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
 ) -> None:
     body = one()
     radar = replace(Radar.preset("paper-12ghz"), polarization=polarization)
-    model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind, order=2)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(wall(side),)), variant=backend.kind, order=2
+    )  # type: ignore[arg-type]
     chirps = np.arange(24)
     echoes = model.echoes(chirps)
     number = by_name(model, f"{side} > body > {side}")
@@ -143,7 +148,8 @@ def test_out_and_back_over_a_conducting_plane_is_an_image_of_the_body(
     )
     # Of third order in the distance of a receiver from the middle of its line: 4 cm.
     np.testing.assert_allclose(echoes.length[..., number], length[..., 0], rtol=0, atol=1e-7)
-    # Between the ends of a line of antennas the polarisation is drawn straight, and the return is that of one specular point.
+    # Between the ends of a line of antennas the polarisation is drawn straight, and the return is
+    # that of one specular point.
     np.testing.assert_allclose(echoes.amplitude[0, ..., number], amplitude[..., 0], rtol=0.01)
     assert echoes.bounces[number] == 3
     assert echoes.part[number] == 0
@@ -155,7 +161,9 @@ def test_one_way_over_a_conducting_plane_by_hand(
     side: str, polarization: str, backend: Backend
 ) -> None:
     body, radar = one(), single(polarization=polarization)
-    model = Multipath(radar, body, Scene(walls=(wall(side),)), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(wall(side),)), variant=backend.kind
+    )  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(1))
     turn = np.diag([1.0, 1.0, -1.0]) if side == "floor" else np.diag([1.0, -1.0, 1.0])
     shift = np.zeros(3) if side == "floor" else np.array([0.0, 5.0, 0.0])
@@ -169,7 +177,8 @@ def test_one_way_over_a_conducting_plane_by_hand(
         )
     )
     bare = strength / copolar(image - point, antenna - point, "v")
-    # The antenna's field along the way it really goes; a conductor turns the part along itself round.
+    # The antenna's field along the way it really goes; a conductor turns the part along itself
+    # round.
     up = np.array([0.0, 0.0, 1.0])
 
     def sent(way: Array) -> Array:
@@ -191,7 +200,9 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     radius, centre = 0.2, np.array([0.5, 0.2, 1.1])
     body, radar = one((radius,) * 3, tuple(centre)), single()
     walls = (wall("floor", "concrete", 1.0), wall("left", "concrete", 1.0))
-    model = Multipath(radar, body, Scene(walls=walls), variant=backend.kind, order=2)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=walls), variant=backend.kind, order=2
+    )  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(1))
     antenna = np.array(radar.position_m)
     tx, rx = antenna * [1, 1, -1], antenna * [1, -1, 1] + [0, 5, 0]
@@ -204,7 +215,7 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     eta = material("concrete").eta(echoes.frequency[0])
 
     def reflected(arriving: Array, field: Array, normal: Array) -> Array:
-        """ITU-R P.2040-3, eqs (31a, b), TE and TM apart; TM is taken along the field that is left across the wave."""
+        """ITU-R P.2040-3, eqs (31a, b), TE and TM apart; TM along the rest of the field."""
         across = unit(np.cross(arriving, normal))
         leaving = arriving - 2 * (arriving @ normal) * normal
         cosine = -arriving @ normal
@@ -224,11 +235,12 @@ def test_floor_out_and_a_side_wall_back_by_hand(backend: Backend) -> None:
     expected = -bare * fields[1] @ (2 * (normal @ fields[0]) * normal - fields[0])
     number = by_name(model, "floor > body > left")
     assert echoes.length[0, 0, number] == pytest.approx(length, abs=1e-9)
-    # Amplitudes of Echoes are conjugate. Half-space and slab, and the polynomial over the sweep, agree to 1e-3 here.
+    # Amplitudes of Echoes are conjugate. Half-space and slab, and the polynomial over the sweep,
+    # agree to 1e-3 here.
     assert echoes.amplitude[0, 0, 0, number] == pytest.approx(np.conj(expected), rel=2e-3)
 
 
-# -- against mirror, chirp by chirp --------------------------------------------------------------------------------------
+# -- against mirror, chirp by chirp ----------------------------------------------------------------
 
 
 def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend) -> None:
@@ -237,7 +249,7 @@ def test_lengths_over_walls_are_those_of_mirror_at_every_chirp(backend: Backend)
     )
     radar = Radar.preset("paper-12ghz")
     scene = Scene(walls=box())
-    model = Multipath(radar, body, scene, variant=backend.kind)
+    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)
     chirps = np.arange(0, 2000, 41)
     echoes, at = model.echoes(chirps), chirp_poses(radar, body, chirps)
     off, strength = [], []
@@ -260,8 +272,8 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     radar = single(tx_y=2, rx_y=2)
     scene = Scene(walls=box())
     chirps = np.arange(13, 60)
-    whole = Multipath(radar, body, scene, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
-    model = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    whole = build_model("specular", radar, body, scene=scene, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
+    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
     pieces = [model.echoes(block) for block in np.split(chirps, [7, 8, 30])]
     np.testing.assert_array_equal(np.concatenate([piece.length for piece in pieces]), whole.length)
     np.testing.assert_array_equal(
@@ -269,7 +281,7 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     )
 
 
-# -- what hides and what lets through ------------------------------------------------------------------------------------
+# -- what occludes and what transmits --------------------------------------------------------------
 
 
 def test_an_empty_scene_is_specular_itself(backend: Backend) -> None:
@@ -278,7 +290,8 @@ def test_an_empty_scene_is_specular_itself(backend: Backend) -> None:
         Radar.preset("paper-12ghz"),
         np.arange(100),
     )
-    ours = Multipath(radar, body, Scene(), variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
+    alone = Specular(radar, body, variant=backend.kind)  # type: ignore[arg-type]
+    ours = RoomModel(alone, Scene(), radar, body).echoes(chirps)  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
     np.testing.assert_array_equal(ours.length, free.length)
     np.testing.assert_array_equal(ours.amplitude, free.amplitude)
@@ -295,7 +308,9 @@ def test_a_slab_before_the_radar_lets_its_square_through(backend: Backend) -> No
         material=material("plasterboard"),
         thickness_m=0.003,
     )
-    model = Multipath(radar, body, Scene(walls=(plasterboard,)), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(plasterboard,)), variant=backend.kind
+    )  # type: ignore[arg-type]
     echoes, free = (
         model.echoes(np.arange(2)),
         Specular(radar, body, variant=backend.kind).echoes(np.arange(2)),
@@ -320,25 +335,29 @@ def test_behind_metal_there_is_nothing(backend: Backend) -> None:
         edge_u_m=(0.0, 6.0, 0.0),
         edge_v_m=(0.0, 0.0, 3.0),
     )
-    model = Multipath(single(), one(), Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", single(), one(), scene=Scene(walls=(sheet,)), variant=backend.kind
+    )  # type: ignore[arg-type]
     np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
 
 
 def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
-    # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the body passes x = 0.2.
+    # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the
+    # body passes x = 0.2.
     body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
     sheet = replace(
         wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0)
     )
     radar = single()
-    model = Multipath(radar, body, Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
-    chirps = np.arange(0, 1000, anchor_step(radar, ANCHORS_S))
+    model = build_model("specular", radar, body, scene=Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
+    chirps = np.arange(0, 1000, keyframe_step(radar, KEYFRAMES_S))
     echoes = model.echoes(chirps)
     at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
     _, _, point = solve_specular_points(
         Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:]), points=True
     )
-    # Both stand equally far from the wall but for the body's surface: the share of the way by similar triangles.
+    # Both stand equally far from the wall but for the body's surface: the share of the way by
+    # similar triangles.
     tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
     meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)
     np.testing.assert_array_equal(
@@ -349,7 +368,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     # On its way in it fades: between two anchors it is neither all nor nothing.
     first = int(chirps[np.flatnonzero(seen)[0]])
     fade = np.abs(
-        model.echoes(np.arange(first - anchor_step(radar, ANCHORS_S), first + 1)).amplitude[
+        model.echoes(np.arange(first - keyframe_step(radar, KEYFRAMES_S), first + 1)).amplitude[
             0, :, 0, 1
         ]
     )
@@ -358,19 +377,23 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
 
 
 @pytest.mark.parametrize("hides", [True, False])
-def test_furniture_hides_both_legs_and_the_way_to_the_wall(hides: bool, backend: Backend) -> None:
-    # A wardrobe between radar and body; the floor before it is free, but what goes over it meets its side.
+def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
+    hides: bool, backend: Backend
+) -> None:
+    # A wardrobe between radar and body; the floor before it is free, but what goes over it meets
+    # its side.
     place = (-1.0, 1.0, 0.0) if hides else (-1.0, -6.0, 0.0)
     wardrobe = Furniture(
         name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place
     )
     scene = Scene(walls=(wall("floor"), wall("left")), furniture=(wardrobe,))
     body = one(centre=(1.0, 1.0, 1.0))
-    model = Multipath(single(), body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model("specular", single(), body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
     seen = np.abs(model.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
-    # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as well.
+    # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as
+    # well.
     np.testing.assert_array_equal(seen, not hides)
-    second = Multipath(single(), body, scene, variant=backend.kind, order=2)  # type: ignore[arg-type]
+    second = build_model("specular", single(), body, scene=scene, variant=backend.kind, order=2)  # type: ignore[arg-type]
     seen = np.abs(second.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
     number = by_name(second, "left > body > left")
     assert seen[number]
@@ -385,7 +408,9 @@ def test_another_part_hides_a_leg_over_a_wall(backend: Backend) -> None:
     body = Still(
         np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2)
     )
-    model = Multipath(radar, body, Scene(walls=(wall("left"),)), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(wall("left"),)), variant=backend.kind
+    )  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(1))
     seen = {
         (name, part): bool(abs(echoes.amplitude[0, 0, 0, 2 * i + part]) > 0)
@@ -402,13 +427,13 @@ def test_another_part_hides_a_leg_over_a_wall(backend: Backend) -> None:
     }
 
 
-# -- leaving out ----------------------------------------------------------------------------------------------------------
+# -- leaving out -----------------------------------------------------------------------------------
 
 
 def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> None:
     body, radar = one(), single(frame_duration_s=0.1)
     scene = Scene(walls=(wall("floor", "wood", 0.02), wall("left")))
-    model = Multipath(radar, body, scene, variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
     whole = model.echoes(np.arange(0, 100, 10))
     power = (np.abs(whole.amplitude) ** 2).mean(axis=(0, 1, 2))
     gain = 256 * 100
@@ -419,14 +444,16 @@ def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> No
     accounts = model.prune(100, floor * gain * 10**1.1)
     kept = model.echoes(np.arange(20))
     names = {account.path: account for account in accounts}
-    assert names["floor > body"].dropped == ("part 0",)
+    assert names["floor > body"].dropped == ["part 0"]
     assert "10 dB below" in names["floor > body"].why
     assert names["floor > body"].over_noise_db == pytest.approx(-11.0, abs=0.01)
-    assert names["left > body"].kept == ("part 0",)
+    assert names["left > body"].kept == ["part 0"]
     assert names["left > body"].why == ""
-    assert names["body"].kept == ("part 0",)
+    assert names["body"].kept == ["part 0"]
     assert kept.length.shape[2] == 3
-    again = Multipath(radar, body, scene, variant=backend.kind).echoes(np.arange(20))  # type: ignore[arg-type]
+    again = build_model("specular", radar, body, scene=scene, variant=backend.kind).echoes(
+        np.arange(20)
+    )  # type: ignore[arg-type]
     stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
     np.testing.assert_array_equal(kept.amplitude, again.amplitude[..., stay])
     np.testing.assert_array_equal(kept.length, again.length[..., stay])
@@ -439,12 +466,14 @@ def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> 
         edge_u_m=(1.0, 0.0, 0.0),
         edge_v_m=(0.0, 1.0, 0.0),
     )
-    model = Multipath(single(), one(), Scene(walls=(aside, wall("left"))), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", single(), one(), scene=Scene(walls=(aside, wall("left"))), variant=backend.kind
+    )  # type: ignore[arg-type]
     accounts = {account.path: account for account in model.prune(50, 0.0)}
-    assert accounts["floor > body"].dropped == ("part 0",)
+    assert accounts["floor > body"].dropped == ["part 0"]
     assert accounts["floor > body"].power_m2 == 0
     assert "never seen" in accounts["floor > body"].why
-    assert accounts["left > body"].kept == ("part 0",)
+    assert accounts["left > body"].kept == ["part 0"]
     assert accounts["left > body"].over_noise_db is None
     assert accounts["left > body"].row()["kept"] == ["part 0"]
 
@@ -460,18 +489,21 @@ def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> 
     ],
 )
 def test_what_has_no_meaning_is_refused(given: dict[str, object], message: str) -> None:
+    scene = Scene(walls=(wall("floor"),))
+    options = {"fidelity": "specular"} | given
     with pytest.raises(InputError, match=message) as error:
-        Multipath(single(), one(), Scene(walls=(wall("floor"),)), variant="scalar", **given)  # type: ignore[arg-type]
+        build_model(radar=single(), body=one(), scene=scene, variant="scalar", **options)  # type: ignore[arg-type]
     assert "\n" not in str(error.value)
 
 
 def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
     body, radar = one((0.1, 0.1, 0.1)), single()
     scene = Scene(walls=(wall("left"),))
-    model = Multipath(radar, body, scene, fidelity="analytic")  # type: ignore[arg-type]
+    model = build_model("analytic", radar, body, scene=scene)  # type: ignore[arg-type]
     echoes = model.echoes(np.arange(5))
     assert model.variant is None
-    # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall the field stays vertical.
+    # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall
+    # the field stays vertical.
     point = np.linalg.norm(np.array(radar.position_m) - np.array([0.0, 0.3, 1.2]))
     assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(
         np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6
@@ -484,9 +516,10 @@ def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
 
 
 def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(backend: Backend) -> None:
-    # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is not seen.
+    # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is
+    # not seen.
     walls = (wall("floor", "concrete", 0.2), wall("left", "plasterboard", 0.005))
-    model = Multipath(single(), one(), Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
+    model = build_model("specular", single(), one(), scene=Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
     amplitude = model.echoes(np.arange(3)).amplitude
     assert len(amplitude) == 3
     for name in ("body", "floor > body", "body > floor"):
@@ -506,14 +539,15 @@ def test_the_person_alone_is_specular_in_free_space(name: str, backend: Backend)
         np.arange(100),
     )
     scene = Scene(walls=(wall("floor", "concrete"),))
-    room = Multipath(radar, body, scene, variant=backend.kind, material=name)  # type: ignore[arg-type]
+    room = build_model("specular", radar, body, scene=scene, variant=backend.kind, material=name)  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
     alone = room.person.echoes(chirps)
     np.testing.assert_array_equal(alone.length, free.length)
     np.testing.assert_array_equal(alone.amplitude, free.amplitude)
     # Its direct echo in the room is the same, for the floor is beside it.
     direct = room.echoes(chirps).amplitude[1, ..., 0]
-    # In the room the reflection of skin follows the sweep and the ends of the lines, here it is that of the middle.
+    # In the room the reflection of skin follows the sweep and the ends of the lines, here it is
+    # that of the middle.
     np.testing.assert_allclose(direct, free.amplitude[0, ..., 0], rtol=2e-3)
 
 
@@ -521,10 +555,13 @@ def test_skin_over_a_wall_is_weaker_by_its_reflection(backend: Backend) -> None:
     scene, chirps = Scene(walls=(wall("left"),)), np.arange(2)
     body = one((0.2, 0.2, 0.2))
     metal, skin = (
-        Multipath(single(), body, scene, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
+        build_model(
+            "specular", single(), body, scene=scene, variant=backend.kind, material=name
+        ).echoes(chirps)  # type: ignore[arg-type]
         for name in ("perfect-conductor", "skin")
     )
-    # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand, and nearly alike.
+    # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand,
+    # and nearly alike.
     eta = material("skin").eta(metal.frequency)[0]
     ratio = skin.amplitude[0, 0, 0, 1] / metal.amplitude[0, 0, 0, 1]
     image = np.array([-4.0, 4.0, 1.0])

@@ -1,4 +1,4 @@
-"""Slabs as sums of delayed echoes: exact as sums, few where few serve, and the same in the person's echoes and in clutter."""
+"""Slabs as sums of delayed echoes: exact, few where few serve, the same for person and clutter."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +13,9 @@ from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.radar import Radar
+from rtradar.scatter import build_model
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.models.specular import Specular
-from rtradar.scatter.multipath.multipath import Multipath
 from rtradar.scatter.multipath.slab_series import Term, room_series
 from rtradar.scene import Furniture, Material, Scene, Wall, material, own_material, slab
 from rtradar.scene.slab import slab_passes
@@ -66,7 +66,7 @@ class Ball:
 def spectrum(
     length: Array, amplitude: NDArray[np.complexfloating], nodes: Array
 ) -> NDArray[np.complex128]:
-    """Sum of echoes with its phases (frequency, ...), of lengths (..., echo) and amplitudes (node, ..., echo)."""
+    """Sum of echoes with phases (frequency, ...), of amplitudes (node, ..., echo)."""
     weights = np.ones((len(FREQUENCY), len(nodes)))
     for column, node in enumerate(nodes):
         for other in np.delete(nodes, column):
@@ -79,7 +79,7 @@ def of(echoes: Echoes) -> NDArray[np.complex128]:
     return spectrum(echoes.length, echoes.amplitude, echoes.frequency)
 
 
-# -- the series ---------------------------------------------------------------------------------------------------------
+# -- the series ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("kind", ["te", "tm"])
@@ -109,7 +109,8 @@ def test_a_term_without_its_delay_turns_little() -> None:
         room_series((wall,), PRESET, most_nodes=3, enough=0.015, bounces=1).walls[0].terms
     )
     extra = first.extra_m(0.24, cosine)
-    # On a straight way through a slab of index n: n d / cos of the angle inside, less what is lost to the side.
+    # On a straight way through a slab of index n: n d / cos of the angle inside, less what is lost
+    # to the side.
     inside = np.sqrt(1 - (1 - 0.8**2) / 3.91)
     assert extra == pytest.approx(0.24 * (np.sqrt(3.91) * inside - 0.8), abs=1e-4)
     phase = np.unwrap(np.angle(first.coefficient(wall, cosine, FREQUENCY, "te")))
@@ -125,7 +126,8 @@ def test_what_is_smooth_stays_one_echo(name: str, thickness: float) -> None:
         (pane(name, thickness),), PRESET, most_nodes=3, enough=0.015, bounces=1
     )
     assert [term.whole for term in one.terms[0]] == [True]
-    # Concrete of 20 cm is as good as a half-space: one node, and what comes through, 107 dB down, asks for none.
+    # Concrete of 20 cm is as good as a half-space: one node, and what comes through, 107 dB down,
+    # asks for none.
     assert len(frequency) == {"perfect-conductor": 1, "concrete": 1, "glass": 3}[name]
     if name == "glass":
         assert [term.whole for term in one.terms[1]] == [True]
@@ -146,7 +148,7 @@ def test_thick_walls_are_held_by_few_terms_and_three_nodes() -> None:
         assert len(frequency) <= 3
 
 
-# -- the person ---------------------------------------------------------------------------------------------------------
+# -- the person ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -157,9 +159,9 @@ def test_a_sphere_behind_a_thick_wall_has_the_exact_slab(
 ) -> None:
     body, radar = Ball((0.0, 0.0, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     wall = pane(name, thickness)
-    behind = Multipath(radar, body, Scene(walls=(wall,)), variant=backend.kind, order=0).echoes(
-        np.arange(1)
-    )  # type: ignore[arg-type]
+    behind = build_model(
+        "specular", radar, body, scene=Scene(walls=(wall,)), variant=backend.kind, order=0
+    ).echoes(np.arange(1))  # type: ignore[arg-type]
     free = Specular(radar, body, variant=backend.kind).echoes(np.arange(1))  # type: ignore[arg-type]
     way = np.array([4.0, -1.0, 0.0]) - 0.0
     cosine = abs(way[0]) / np.linalg.norm(way)
@@ -178,8 +180,13 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
     backend: Backend,
 ) -> None:
     body = Ball((0.0, 0.0, 1.0), velocity=(0.5, 1.5, 0.0))
-    model = Multipath(
-        PRESET, body, Scene(walls=(pane("brick", 0.24),)), variant=backend.kind, order=0
+    model = build_model(
+        "specular",
+        PRESET,
+        body,
+        scene=Scene(walls=(pane("brick", 0.24),)),
+        variant=backend.kind,
+        order=0,
     )  # type: ignore[arg-type]
     # Between two anchors, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
@@ -202,10 +209,12 @@ def test_one_pruned_echo_list_for_all_of_a_capture(backend: Backend) -> None:
     # It walks out from behind a partition of brick.
     partition = replace(pane("brick", 0.1), corner_m=(-2.0, -3.0, -20.0), edge_v_m=(0.0, 3.5, 0.0))
     body = Ball((0.0, -0.6, 1.0), velocity=(0.0, 3.0, 0.0))
-    model = Multipath(PRESET, body, Scene(walls=(partition,)), variant=backend.kind, order=1)  # type: ignore[arg-type]
+    model = build_model(
+        "specular", PRESET, body, scene=Scene(walls=(partition,)), variant=backend.kind, order=1
+    )  # type: ignore[arg-type]
     n_chirps = int(0.9 / PRESET.chirp_duration_s)
     (direct, *_) = model.prune(n_chirps, 0.0)
-    assert direct.kept == ("ball",)
+    assert direct.kept == ["ball"]
     early, late = (
         model.echoes(np.arange(4)),
         model.echoes(np.arange(n_chirps - 400, n_chirps - 396)),
@@ -226,8 +235,13 @@ def test_ghosts_off_a_wall_whose_back_answers(
     body, radar = Ball((2.0, -0.3, 1.0)), Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0)
     found = {}
     for made, depth in ((name, thickness), ("perfect-conductor", 0.1)):
-        model = Multipath(
-            radar, body, Scene(walls=(side(made, depth),)), variant=backend.kind, order=2
+        model = build_model(
+            "specular",
+            radar,
+            body,
+            scene=Scene(walls=(side(made, depth),)),
+            variant=backend.kind,
+            order=2,
         )  # type: ignore[arg-type]
         echoes = model.echoes(np.arange(1))
         for path in ("side > body", "side > body > side"):
@@ -236,7 +250,8 @@ def test_ghosts_off_a_wall_whose_back_answers(
                 echoes.length[..., own], echoes.amplitude[..., own], echoes.frequency
             )[:, 0, 0]
     for path, power in (("side > body", 1), ("side > body > side", 2)):
-        # The image of the antenna, its leg to where the sphere is met, and so the angle on the wall.
+        # The image of the antenna, its leg to where the sphere is met, and so the angle on the
+        # wall.
         image = np.array([radar.tx[0, 0], 3.2 - radar.tx[0, 1], 1.0])
         centre, back = np.array(body.centre), radar.tx[0] if power == 1 else image
         point = centre
@@ -252,7 +267,7 @@ def test_ghosts_off_a_wall_whose_back_answers(
         assert error < 0.02, path
 
 
-# -- what is not held -----------------------------------------------------------------------------------------------------
+# -- what is not held ------------------------------------------------------------------------------
 
 
 def dispersive() -> Material:
@@ -275,7 +290,7 @@ def test_a_wall_that_is_not_followed_is_a_limit(tmp_path: Path) -> None:
     assert "pane" in limit["message"]
 
 
-# -- static clutter -------------------------------------------------------------------------------------------------------
+# -- static clutter --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -343,6 +358,7 @@ def test_clutter_that_cannot_be_followed_is_refused(backend: Backend) -> None:
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=512)
     with pytest.raises(
         InputError,
-        match=r"^clutter of scene '.*': over the sweep the return 'side' is off by .*allowed is 0\.001",
+        match=r"^clutter of scene '.*': over the sweep the return 'side' is off by .*allowed is "
+        r"0\.001",
     ):
         Clutter(radar, Scene(walls=(side(dispersive(), 3.0),)), order=1, variant=backend.kind)

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import minimize
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.scatter.multipath import image_paths
 from rtradar.scatter.multipath import wall_interaction as rw
 from rtradar.scatter.multipath.slab_series import whole_walls
 from rtradar.scene import Scene, Wall, material, own_material, slab
@@ -47,7 +48,7 @@ def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> Non
         MIDDLE + side * away * WALL.normal + [0.1 * away, 0.2, shift]
         for away, shift in ((1.5, 0.4), (0.7, -0.3))
     )
-    point, valid = rw.specular_point(WALL, tx, rx, back=back)
+    point, valid = image_paths.specular_point(WALL, tx, rx, back=back)
     corner = WALL.corners[0] - (WALL.thickness_m if back else 0) * WALL.normal
     u, v = np.array(WALL.edge_u_m), np.array(WALL.edge_v_m)
 
@@ -61,18 +62,18 @@ def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> Non
     assert valid
     # The least way is known to 1e-15 m, its place to the root of that.
     np.testing.assert_allclose(point, corner + found.x[0] * u + found.x[1] * v, atol=1e-6)
-    length = np.linalg.norm(rw.image(WALL, tx, back=back) - rx)
+    length = np.linalg.norm(image_paths.image(WALL, tx, back=back) - rx)
     np.testing.assert_allclose(length, found.fun, rtol=0, atol=1e-12)
 
 
 def test_no_specular_point_on_the_other_side_or_beside_the_rectangle() -> None:
     before, behind = MIDDLE + WALL.normal, MIDDLE - WALL.normal
     up = np.array([0, 0, 6.0])
-    _, valid = rw.specular_point(
+    _, valid = image_paths.specular_point(
         WALL, np.stack([before, behind, before]), np.stack([behind, behind, before + up])
     )
     np.testing.assert_array_equal(valid, [False, False, False])
-    _, valid = rw.specular_point(
+    _, valid = image_paths.specular_point(
         WALL, np.stack([before, behind, before]), np.stack([before, behind, behind]), back=True
     )
     np.testing.assert_array_equal(valid, [False, True, False])
@@ -84,7 +85,7 @@ def test_legs_cross_where_they_end_on_both_sides_of_the_slab() -> None:
     origins = np.stack([before, behind, before, before, before + beside, behind])
     targets = np.stack([behind, before, before + 0.1, front, behind + beside, front])
     np.testing.assert_array_equal(
-        rw.crossed(WALL, origins, targets), [True, True, False, False, False, True]
+        image_paths.crossed(WALL, origins, targets), [True, True, False, False, False, True]
     )
 
 
@@ -163,12 +164,11 @@ def test_walls_on_the_way_multiply_and_shapes_broadcast() -> None:
     origins = np.array([[-4.0, 0.0, 1.0], [-4.0, 0.3, 1.2]])
     targets = np.array([[0.0, 0.0, 1.0], [1.7, 0.0, 1.0], [6.0, 0.0, 1.0]])
     field, frequency = np.array([0.0, 0, 1.0]), np.array([12e9, 16e9])
-    setting_out = rw.setting_out(np.broadcast_to(field, (2, 3, 3)), 2)
-    (wave,) = rw.through_walls(
-        scene, whole_walls(scene.walls), 0, setting_out, origins[:, None], targets, frequency
-    )
+    walls = rw.WallResponse(scene.walls, whole_walls(scene.walls), frequency)
+    start = walls.start(np.broadcast_to(field, (2, 3, 3)))
+    (wave,) = walls.transmitted(0, start, origins[:, None], targets)
     got = wave.field
-    assert wave.met == ()
+    assert wave.passages == ()
     assert not wave.extra_m.any()
     assert got.shape == (2, 2, 3, 3)
     np.testing.assert_array_equal(got[:, :, 0], np.broadcast_to(field, (2, 2, 3)))

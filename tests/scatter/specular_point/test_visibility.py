@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from rtradar.body.body import Poses
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
-from rtradar.scatter.common.poses import ChirpPoses, anchor_step, chirp_poses
+from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
 from rtradar.scatter.specular_point import visibility
 from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
 from rtradar.scatter.specular_point.visibility import (
@@ -92,7 +93,7 @@ def test_a_fade_is_smooth_monotone_and_ends_at_the_keyframes(backend: Backend) -
     # The curtain frees the line of sight once within the second; what changes there is one interval
     # between anchors.
     radar, body = small_radar(), Curtain(3.0)
-    step = anchor_step(radar)
+    step = keyframe_step(radar)
     assert step == 10
     chirps = np.arange(100, 400)
     weight = weights(backend, radar, body, chirps)[:, 0, 0]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rtradar import Radar
-from rtradar.scatter.common.nodes import interpolation_weights, sweep_nodes
+from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 
 
 @pytest.mark.parametrize("count", [1, 2, 5, 33])

@@ -14,9 +14,9 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError, ValidityWarning
-from rtradar.pipeline.survey import Survey, survey
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
+from rtradar.scatter.link_budget import LinkBudget, link_budget
 
 Array = NDArray[np.float64]
 
@@ -66,9 +66,9 @@ class Silence:
         )
 
 
-def look(body: Balls, radar: Radar = RADAR, *, spreading: bool = True) -> Survey:
+def look(body: Balls, radar: Radar = RADAR, *, spreading: bool = True) -> LinkBudget:
     model = build_model("analytic", radar, body, spreading=spreading)  # type: ignore[arg-type]
-    return survey(model, radar, body, N_CHIRPS, spreading=spreading)  # type: ignore[arg-type]
+    return link_budget(model, radar, body, N_CHIRPS, spreading=spreading)  # type: ignore[arg-type]
 
 
 def test_power_is_that_of_the_spheres_by_hand() -> None:
@@ -91,7 +91,8 @@ def test_power_is_that_of_the_spheres_by_hand() -> None:
 
 def test_a_small_share_of_small_curvature_is_counted_without_a_warning() -> None:
     (limit,) = look(Balls()).limits  # warnings are errors in tests
-    # A needle's tip has radius a^2 / c = 1 mm and cross-section pi times its square; the ball's is pi (0.2 m)^2.
+    # A needle's tip has radius a^2 / c = 1 mm and cross-section pi times its square; the ball's is
+    # pi (0.2 m)^2.
     assert limit.name == "small_curvature"
     assert limit.share == pytest.approx((1e-3 / 0.2) ** 2, rel=0.3)
     assert "needle" in limit.message
@@ -118,7 +119,8 @@ def test_what_is_faster_than_the_radar_can_tell_is_warned_of() -> None:
 
 
 def test_what_shows_at_another_velocity_shows_in_another_direction_too() -> None:
-    # By hand: two Tx four wavelengths of 12 GHz apart that take turns, and a wavelength of 14 GHz: a sine of 12 / 14 / 8.
+    # By hand: two Tx four wavelengths of 12 GHz apart that take turns, and a wavelength of 14 GHz:
+    # a sine of 12 / 14 / 8.
     fast = dataclasses.replace(Balls(), semi_axes=np.full((2, 3), 0.1), speed=2.8)
     with pytest.warns(
         ValidityWarning, match=r"at another velocity and, ahead, 6\.2 degrees beside its direction"
@@ -165,7 +167,7 @@ def test_farther_than_that_is_allowed() -> None:
 def test_nobody_visible_is_measured_against_a_square_metre_at_the_origin(spreading: bool) -> None:
     body: Body = Balls()  # type: ignore[assignment]
     with pytest.warns(ValidityWarning, match="nobody is visible"):
-        found = survey(Silence(), RADAR, body, N_CHIRPS, spreading=spreading)
+        found = link_budget(Silence(), RADAR, body, N_CHIRPS, spreading=spreading)
     assert not found.visible
     assert (found.hidden_at == 1).all()
     assert found.power == pytest.approx(
@@ -184,7 +186,7 @@ def test_what_another_part_hides_is_counted() -> None:
 
     body = dataclasses.replace(Behind(), semi_axes=np.array([[0.3, 0.3, 0.3], [0.1, 0.1, 0.1]]))
     model = build_model("specular", RADAR, body)  # type: ignore[arg-type]
-    found = survey(model, RADAR, body, N_CHIRPS)  # type: ignore[arg-type]
+    found = link_budget(model, RADAR, body, N_CHIRPS)  # type: ignore[arg-type]
     assert not found.hidden_at[:, 0].any()
     assert (found.hidden_at[:, 1] == 1).all()
     assert found.part_power["needle"] == 0

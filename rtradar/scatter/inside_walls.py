@@ -1,4 +1,4 @@
-"""Whether a person stands in what is solid: parts inside walls and furniture, looked at block by block."""
+"""Whether a person is in what is solid: body parts inside walls and furniture."""
 
 from __future__ import annotations
 
@@ -9,27 +9,29 @@ from rtradar.body.body import Poses
 from rtradar.errors import InputError
 from rtradar.scene import Scene, Wall
 
-REFUSED_SHARE = 0.05
+REFUSED_FRACTION = 0.05
 """A part that sends more than this of the person's echo power must not be inside a wall."""
 
 _PELVIS = ("left hip", "right hip", "lower torso")
 
 _CONTACT_M = 0.02
-"""Recordings set hands and feet on the floor to within this: the centre of a part so little behind a front touches the wall."""
+"""Depth up to which the centre of a part touches a wall [m]: hands and feet in recordings do."""
 
 _FURNITURE_STEP = 10
-"""Of the instants, this many to one at which furniture is looked at: a mesh takes long."""
+"""Instants to one at which furniture is tested: a mesh takes long."""
 
 Array = NDArray[np.float64]
 
 
 class Inside:
-    """Takes instants of a capture one after the other, and keeps which parts were inside what.
+    """Record of which parts were inside walls and furniture over a capture.
 
     Parameters
     ----------
     scene : Scene
+        Walls and furniture.
     part_names : tuple of str
+        Names of the body parts.
     """
 
     def __init__(self, scene: Scene, part_names: tuple[str, ...]) -> None:
@@ -43,30 +45,28 @@ class Inside:
         self._instant = 0
 
     def look(self, times: Array, poses: Poses, power: Array) -> None:
-        """Take the next instants.
+        """Test the next instants.
 
         Parameters
         ----------
         times : (time,) float64
-            [s].
+            Instants [s].
         poses : Poses
-            Of the body at these times.
+            Poses of the body at these times.
         power : (time, part) float64
             Echo power of its parts [m^2].
 
         Raises
         ------
         InputError
-            Where the pelvis is inside a wall.
+            If the pelvis is inside a wall.
         """
+        pelvis = [part for part, name in enumerate(self._names) if name in _PELVIS]
         for number, wall in enumerate(self._scene.walls):
             self._keep(number, times, _inside_wall(wall, poses), power)
-            pelvis = [part for part, name in enumerate(self._names) if name in _PELVIS]
             found = [part for part in pelvis if np.isfinite(self._first_s[number, part])]
             if found:
-                raise self._refused(
-                    number, min(found, key=lambda part: float(self._first_s[number, part]))
-                )
+                self._refuse(number, found)
         at = np.arange(-self._instant % _FURNITURE_STEP, len(times), _FURNITURE_STEP)
         self._instant += len(times)
         for number, (_, mesh) in enumerate(self._solids, start=len(self._scene.walls)):
@@ -80,65 +80,57 @@ class Inside:
         self._power[number] += (power * held).sum(axis=0)
 
     def found(self, part_power: Array) -> list[tuple[str, float, str]]:
-        """What a run tells of it: name, power while inside [m^2] and message of each limit.
+        """Return the name, power while inside [m^2] and message of each limit.
 
         Parameters
         ----------
         part_power : (part,) float64
             Echo power of each part, over all instants [m^2].
 
-        Returns
-        -------
-        list of tuple
-            None where nothing was inside.
-
         Raises
         ------
         InputError
-            Where a part with more than 5 % of the echo power was inside a wall.
+            If a part with more than 5 % of the echo power was inside a wall.
         """
-        walls = len(self._scene.walls)
-        large = part_power > REFUSED_SHARE * part_power.sum()
+        walls, inside = len(self._scene.walls), np.isfinite(self._first_s)
+        large = part_power > REFUSED_FRACTION * part_power.sum()
         for number in range(walls):
-            parts = np.flatnonzero(large & np.isfinite(self._first_s[number]))
-            if len(parts):
-                raise self._refused(number, int(parts[np.argmin(self._first_s[number, parts])]))
+            if (parts := np.flatnonzero(large & inside[number])).size:
+                self._refuse(number, parts.tolist())
         limits = []
         for name, what, chosen in (
-            ("inside_wall", "parts inside a wall", range(walls)),
-            ("inside_furniture", "parts inside furniture", range(walls, len(self._first_s))),
+            ("inside_wall", "parts inside a wall", slice(walls)),
+            ("inside_furniture", "parts inside furniture", slice(walls, None)),
         ):
-            told = [
-                self._told(number, int(part))
-                for number in chosen
-                for part in np.flatnonzero(np.isfinite(self._first_s[number]))
+            names = self._thing_names()[chosen]
+            said = [
+                f"the {self._names[part]} in '{names[number]}' from "
+                f"{self._first_s[chosen][number, part]:.2f} s"
+                for number, part in np.argwhere(inside[chosen])
             ]
-            if told:
-                message = (
-                    f"echo power from {what}, taken as if it were not there: {', '.join(told)}"
-                )
-                limits.append((name, float(self._power[chosen].sum()), message))
+            if said:
+                message = f"echo power from {what}, taken as if it were not there: "
+                power = float(self._power[chosen].sum())
+                limits.append((name, power, message + ", ".join(said)))
         return limits
 
-    def _thing(self, number: int) -> str:
-        walls = self._scene.walls
-        return walls[number].name if number < len(walls) else self._solids[number - len(walls)][0]
+    def _thing_names(self) -> list[str]:
+        return [*(wall.name for wall in self._scene.walls), *(name for name, _ in self._solids)]
 
-    def _told(self, number: int, part: int) -> str:
-        return f"the {self._names[part]} in '{self._thing(number)}' from {self._first_s[number, part]:.2f} s"
-
-    def _refused(self, number: int, part: int) -> InputError:
-        return InputError(
-            f"scene '{self._scene.name}': at {self._first_s[number, part]:.2f} s the {self._names[part]} of the person is inside "
-            f"wall '{self._thing(number)}'; move the person (position_m, heading_deg) or the wall, or choose another interval "
-            "(--start, --duration)"
+    def _refuse(self, number: int, parts: list[int]) -> None:
+        first_s = self._first_s[number]
+        part = min(parts, key=lambda part: float(first_s[part]))
+        raise InputError(
+            f"scene '{self._scene.name}': at {first_s[part]:.2f} s the {self._names[part]} of the "
+            f"person is inside wall '{self._thing_names()[number]}'; move the person (position_m, "
+            "heading_deg) or the wall, or choose another interval (--start, --duration)"
         )
 
 
 def _inside_wall(wall: Wall, poses: Poses) -> NDArray[np.bool_]:
-    """Which parts (time, part) are: the centre is in the slab, or the slab runs through the part, half its size.
+    """Which parts (time, part) are inside: the centre is in the slab, or the slab is thinner.
 
-    The second is for slabs thinner than a part.
+    A thin slab counts where it runs through the part, of half its size.
     """
     depth = wall.depth_m(poses.centres)
     # Half the extent of an ellipsoid along the normal.

@@ -12,9 +12,9 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
-from rtradar.pipeline.rooms.inside_walls import Inside
-from rtradar.pipeline.survey import survey
 from rtradar.scatter import build_model
+from rtradar.scatter.inside_walls import Inside
+from rtradar.scatter.link_budget import link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
 from rtradar.scene.scene import scenes_folder
 
@@ -59,7 +59,10 @@ def inside(*walls: Wall, furniture: tuple[Furniture, ...] = ()) -> list[tuple[st
 )
 def test_who_stands_in_a_wall_is_refused(tmp_path: Path, x: float, thickness: float) -> None:
     scene = Scene(name="cell", walls=(wall(x, thickness),))
-    said = r"scene 'cell': at 0.\d\d s the (left hip|right hip|lower torso) of the person is inside wall 'across'; move the person"
+    said = (
+        r"scene 'cell': at 0.\d\d s the (left hip|right hip|lower torso) of the person is inside "
+        "wall 'across'; move the person"
+    )
     with pytest.raises(InputError, match=said) as caught:
         rt.run(MOTION, RADAR, scene, out=tmp_path / "out", fidelity="analytic", duration_s=0.2)
     assert "\n" not in str(caught.value)
@@ -75,9 +78,9 @@ def test_at_any_time_of_the_interval() -> None:
     model = build_model("analytic", RADAR, body)
     n_chirps = int(3.0 / RADAR.chirp_interval_s)
     with pytest.raises(InputError, match=r"at [12].\d\d s the .* is inside wall 'across'"):
-        survey(model, RADAR, body, n_chirps, scene=Scene(walls=(ahead,)))
+        link_budget(model, RADAR, body, n_chirps, scene=Scene(walls=(ahead,)))
     behind = wall(float(centres[0].max()) + 0.5, 0.3)
-    told = survey(model, RADAR, body, n_chirps, scene=Scene(walls=(behind,)))
+    told = link_budget(model, RADAR, body, n_chirps, scene=Scene(walls=(behind,)))
     assert not [limit for limit in told.limits if limit.name.startswith("inside")]
 
 
@@ -88,7 +91,8 @@ def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
         else "right hand"
     )
     reach = BODY.at(TIMES).centres[..., 0]
-    # Thick enough that the fist comes in from behind, by the back face, and stays there; nothing else reaches so far.
+    # Thick enough that the fist comes in from behind, by the back face, and stays there; nothing
+    # else reaches so far.
     others = np.delete(reach, hand, axis=1).min()
     assert reach[:, hand].min() < others - 0.1
     back = (reach[:, hand].min() + others) / 2
@@ -106,7 +110,8 @@ def test_a_part_that_matters_is_refused_and_one_that_does_not_is_told() -> None:
     solid.look(TIMES, BODY.at(TIMES), power_of_hand)
     with pytest.raises(
         InputError,
-        match=rf"at {first:.2f} s the {BODY.part_names[hand]} of the person is inside wall 'across'",
+        match=rf"at {first:.2f} s the {BODY.part_names[hand]} of the person is inside wall "
+        "'across'",
     ):
         solid.found(power_of_hand.sum(axis=0))
 

@@ -5,12 +5,12 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.pipeline.rooms.clutter_if import RoomIf
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scene import Furniture, Scene, Surface, material, room_walls
 from rtradar.signal import synthesize
+from rtradar.signal.static_clutter import RoomIf
 
 RADAR = Radar(tx_y=2, tx_z=2, rx_y=2, rx_z=2, samples_per_chirp=192)
 SIDES = ("near", "far", "right", "left", "floor", "ceiling")
@@ -53,7 +53,7 @@ def clutter() -> Clutter:
 
 
 def test_a_room_alone_is_exactly_still(clutter: Clutter) -> None:
-    samples = RoomIf(clutter).clutter_if(np.arange(5 * RADAR.n_tx))
+    samples = RoomIf(clutter.radar, clutter.cycle()).clutter_if(np.arange(5 * RADAR.n_tx))
     cycles = samples.reshape(5, RADAR.n_tx, RADAR.n_rx, -1)
     assert samples.dtype == np.complex64
     np.testing.assert_array_equal(cycles, np.broadcast_to(cycles[0], cycles.shape))
@@ -66,7 +66,7 @@ def test_a_room_alone_is_exactly_still(clutter: Clutter) -> None:
 def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: int) -> None:
     ball = Ball()
     room, shadow = (
-        RoomIf(clutter, ball, variant="scalar"),
+        RoomIf(RADAR, clutter.cycle(), ClutterShadow(clutter, ball, variant="scalar")),
         ClutterShadow(clutter, ball, variant="scalar"),
     )
     chirps = np.arange(9, 900, 37)
@@ -90,12 +90,16 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
 
 def test_a_body_that_hides_nothing_leaves_the_room_as_it_is(clutter: Clutter) -> None:
     chirps = np.arange(400)
-    still = RoomIf(clutter).clutter_if(chirps)
+    still = RoomIf(clutter.radar, clutter.cycle()).clutter_if(chirps)
     np.testing.assert_array_equal(
-        RoomIf(clutter, Ball(start=60.0), variant="scalar").clutter_if(chirps), still
+        RoomIf(
+            RADAR, clutter.cycle(), ClutterShadow(clutter, Ball(start=60.0), variant="scalar")
+        ).clutter_if(chirps),
+        still,
     )
 
 
 def test_free_space_is_silent() -> None:
-    room = RoomIf(Clutter(RADAR, Scene(), variant="scalar"), Ball(), variant="scalar")
+    clutter = Clutter(RADAR, Scene(), variant="scalar")
+    room = RoomIf(RADAR, clutter.cycle(), ClutterShadow(clutter, Ball(), variant="scalar"))
     np.testing.assert_array_equal(room.clutter_if(np.arange(3)), 0)

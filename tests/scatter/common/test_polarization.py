@@ -12,12 +12,12 @@ from rtradar.errors import InputError
 from rtradar.motion.placement import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
-from rtradar.scatter.common.body_material import (
+from rtradar.scatter.common.polarization import (
+    antenna_field,
     body_material,
     body_reflection,
     material_factor,
 )
-from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scene import material
 
 Array = NDArray[np.float64]

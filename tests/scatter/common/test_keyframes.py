@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from rtradar.scatter.common.keyframe_cache import FirstCome
+from rtradar.scatter.common.keyframes import KeyframeCache
 
 
 def test_a_second_pass_from_the_start_finds_the_first_ones_again() -> None:
-    memory: FirstCome[int, int] = FirstCome(stay=5, passing=2)
+    memory: KeyframeCache[int, int] = KeyframeCache(stay=5, passing=2)
     found: list[int] = []
 
     def look(key: int) -> int:

@@ -7,7 +7,7 @@ import pytest
 
 import rtradar as rt
 from rtradar.errors import ValidityWarning
-from rtradar.scatter.common.validity import warn_of_small_radii
+from rtradar.scatter.validity import warn_of_small_radii
 
 WAVENUMBER = np.array([100.0])
 

@@ -1,0 +1,252 @@
+"""Kernels of rooms: amplitudes and lengths of echoes over walls, and the fading of clutter."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.jit import compiled, inlined
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+class PathFactors(NamedTuple):
+    """What walls, the body's surface and occluders leave of echoes at one end of each interval.
+
+    ``factor (interval, node, line, 2, rx_end, echo)`` complex64 and ``seen (interval, line, 2,
+    rx_end, echo)`` bool, for the ends of lines of antennas.
+    """
+
+    factor: NDArray[np.complex64]
+    seen: NDArray[np.bool_]
+
+
+class Blend(NamedTuple):
+    """Where chirps are between keyframes and between the ends of lines of antennas.
+
+    Each chirp has an ``interval``, the ``fraction`` of it that is over, and a ``line``;
+    ``tx_weight (chirp, 2)`` and ``rx_weight (chirp, rx, rx_end)`` are the weights of the ends.
+    """
+
+    interval: Indices
+    fraction: Array
+    line: Indices
+    tx_weight: Array
+    rx_weight: Array
+
+
+@compiled(parallel=True, fastmath={"contract"})
+def path_amplitudes(bare, before, after, at, out):
+    """Fill ``out (node, chirp, rx, echo)`` complex64 with amplitudes of echoes over paths.
+
+    They are ``bare (chirp, rx, echo)`` times the conjugate of what is left of the echoes, given by
+    the `PathFactors` ``before`` and ``after`` each interval and the `Blend` ``at``. Factors change
+    linearly from keyframe to keyframe, visibility by `smoothstep`.
+    """
+    nodes, chirps, receivers, echoes = out.shape
+    ends = at.rx_weight.shape[2]
+    for chirp in prange(chirps):
+        which, line, fraction = at.interval[chirp], at.line[chirp], at.fraction[chirp]
+        smooth = smoothstep(fraction)
+        left = np.zeros((ends, echoes), dtype=np.float32)
+        real, imaginary = np.zeros((2, nodes, ends, echoes), dtype=np.float32)
+        fade = np.empty(echoes, dtype=np.float32)
+        # Interpolate over time and along the line of Tx, for each end of the lines of Rx.
+        for end in range(ends):
+            for side in range(2):
+                weight = at.tx_weight[chirp, side]
+                old, new = np.float32(weight * (1 - smooth)), np.float32(weight * smooth)
+                first_seen = before.seen[which, line, side, end]
+                last_seen = after.seen[which, line, side, end]
+                for echo in range(echoes):
+                    left[end, echo] += old * first_seen[echo] + new * last_seen[echo]
+                old, new = np.float32(weight * (1 - fraction)), np.float32(weight * fraction)
+                for node in range(nodes):
+                    first = before.factor[which, node, line, side, end]
+                    last = after.factor[which, node, line, side, end]
+                    for echo in range(echoes):
+                        real[node, end, echo] += old * first[echo].real + new * last[echo].real
+                        imaginary[node, end, echo] += old * first[echo].imag + new * last[echo].imag
+        for receiver in range(receivers):
+            # Interpolate visibility along the line of Rx, times the bare amplitude.
+            weights, own = at.rx_weight[chirp, receiver], bare[chirp, receiver]
+            fade[:] = 0
+            for end in range(ends):
+                weight = np.float32(weights[end])
+                for echo in range(echoes):
+                    fade[echo] += weight * left[end, echo]
+            for echo in range(echoes):
+                fade[echo] *= np.float32(own[echo])
+            # The same for the factors, node by node, and multiply.
+            for node in range(nodes):
+                target = out[node, chirp, receiver]
+                target[:] = 0
+                for end in range(ends):
+                    weight = np.float32(weights[end])
+                    if weight != 0:
+                        re, im = real[node, end], imaginary[node, end]
+                        for echo in range(echoes):
+                            kept = weight * fade[echo]
+                            target[echo] += complex(kept * re[echo], -kept * im[echo])
+
+
+def path_amplitudes_reference(bare, before, after, at):
+    """Amplitudes (node, chirp, rx, echo) of `path_amplitudes`, in plain NumPy."""
+    which, line = at.interval, at.line
+    fraction = at.fraction[:, None, None, None]
+    smooth = smoothstep(fraction)
+    seen = (1 - smooth) * before.seen[which, line] + smooth * after.seen[which, line]
+    visible = np.einsum("cs,cre,cset->crt", at.tx_weight, at.rx_weight, seen)
+    first, last = (np.moveaxis(end.factor, 1, -1)[which, line] for end in (before, after))
+    factor = (1 - fraction[..., None]) * first + fraction[..., None] * last
+    factor = np.einsum("cs,cre,csetn->ncrt", at.tx_weight, at.rx_weight, factor)
+    return bare * visible * np.conj(factor)
+
+
+class LegAntennas(NamedTuple):
+    """Images of the antennas over each leg: ``tx (leg, tx, 3)``, ``rx (leg, tx, rx, 3)`` [m]."""
+
+    tx: Array
+    rx: Array
+
+
+class PartPoints(NamedTuple):
+    """Points in the axes of their parts: ``local (chirp, echo, 3)`` [m], ``part (echo,)``."""
+
+    local: Array
+    part: Indices
+
+
+class SlabDelays(NamedTuple):
+    """Which slabs delay the columns of an echo list.
+
+    ``echo (column,)`` is the echo of each; ``legs (column, 2, 3)`` are, on the way out and back,
+    its leg, its first passage and the one after its last. ``passes (passage,)`` are the passes
+    through a slab, ``slabs (passage, 5)`` its normal, thickness [m] and squared index.
+    """
+
+    echo: Indices
+    legs: Indices
+    passes: Indices
+    slabs: Array
+
+
+@inlined()
+def _delay(antenna, place, first, last, delays):
+    """Length that the passages on a leg add to it."""
+    x, y, z = place[0] - antenna[0], place[1] - antenna[1], place[2] - antenna[2]
+    inverse = 1 / math.sqrt(x * x + y * y + z * z)
+    total = 0.0
+    for one in range(first, last):
+        slab, passes = delays.slabs[one], delays.passes[one]
+        cosine = min(abs(x * slab[0] + y * slab[1] + z * slab[2]) * inverse, 1.0)
+        total += slab[3] * passes * math.sqrt(slab[4] - 1 + cosine * cosine)
+        if passes % 2:
+            total -= slab[3] * cosine
+    return total
+
+
+@inlined()
+def _leg(row):
+    return row[0], row[1], row[2]
+
+
+@compiled(parallel=True)
+def delayed_lengths(antennas, tx_index, points, bodies, delays, length, out):
+    """Fill ``out (chirp, rx, column)`` with path lengths and the delays of slabs [m].
+
+    ``antennas`` are `LegAntennas`, ``tx_index (chirp,)`` the transmitters, ``points`` the
+    `PartPoints` towards which echoes leave the ``bodies``, which are `Ellipsoids`, ``delays``
+    `SlabDelays`, and ``length (chirp, rx, echo)`` lengths without slabs.
+    """
+    chirps, receivers, columns = out.shape
+    for chirp in prange(chirps):
+        transmitter = tx_index[chirp]
+        places = np.empty((len(points.part), 3))
+        for echo in range(len(points.part)):
+            # Find where the ray from the part's centre through the point leaves the ellipsoid.
+            part = points.part[echo]
+            axes, centre = bodies.semi_axes[part], bodies.centres[chirp, part]
+            frame, local = bodies.frames[chirp, part], points.local[chirp, echo]
+            x, y, z = local[0], local[1], local[2]
+            size = math.sqrt((x / axes[0]) ** 2 + (y / axes[1]) ** 2 + (z / axes[2]) ** 2)
+            # An echo without a specular point takes any place.
+            scale = 1 / size if size > 0 else 0.0
+            for row in range(3):
+                own = frame[row]
+                along = own[0] * x + own[1] * y + own[2] * z
+                places[echo, row] = centre[row] + scale * along
+        for column in range(columns):
+            # Add the delays on the way out, which all receivers share, and those on the way back.
+            echo = delays.echo[column]
+            place = places[echo]
+            leg, first, last = _leg(delays.legs[column, 0])
+            more = 0.0
+            if last > first:
+                more = _delay(antennas.tx[leg, transmitter], place, first, last, delays)
+            leg, first, last = _leg(delays.legs[column, 1])
+            for receiver in range(receivers):
+                whole = length[chirp, receiver, echo] + more
+                if last > first:
+                    antenna = antennas.rx[leg, transmitter, receiver]
+                    whole += _delay(antenna, place, first, last, delays)
+                out[chirp, receiver, column] = whole
+
+
+def delayed_lengths_reference(antennas, tx_index, points, bodies, delays, length):
+    """Lengths (chirp, rx, column) of `delayed_lengths`, in plain NumPy."""
+    part = points.part
+    size = np.linalg.norm(points.local / bodies.semi_axes[part], axis=-1, keepdims=True)
+    places = np.einsum("ceij,cej->cei", bodies.frames[:, part], points.local / size)
+    places += bodies.centres[:, part]
+    out = length[..., delays.echo].copy()
+    for column, legs in enumerate(delays.legs):
+        for own, (leg, first, last) in zip(
+            (antennas.tx[:, :, None], antennas.rx), legs, strict=True
+        ):
+            way = places[:, None, delays.echo[column]] - own[leg, tx_index]
+            for passes, slab in zip(
+                delays.passes[first:last], delays.slabs[first:last], strict=True
+            ):
+                cosine = np.abs(way @ slab[:3]) / np.linalg.norm(way, axis=-1)
+                inside = passes * np.sqrt(slab[4] - 1 + cosine**2)
+                out[..., column] += slab[3] * (inside - passes % 2 * cosine)
+    return out
+
+
+class Shadow(NamedTuple):
+    """What a body occludes of static clutter at one keyframe.
+
+    ``echo (n,)`` counts through the objects of the clutter, one after the other, ascending;
+    ``fraction (tx, rx, n)`` of each is occluded.
+    """
+
+    echo: Indices
+    fraction: Array
+
+
+@compiled(parallel=True)
+def add_fading(kept, changed, fraction, tx, out):
+    """Add ``kept + fraction * changed`` to IF samples ``out (chirp, rx, sample)``.
+
+    ``kept`` and ``changed (tx, rx, sample)`` are those of one cycle, ``tx (chirp,)`` says which of
+    them is meant, and ``fraction (chirp,)`` how much of the change has come.
+    """
+    for chirp in prange(len(out)):
+        own, more, part = kept[tx[chirp]], changed[tx[chirp]], fraction[chirp]
+        for receiver in range(out.shape[1]):
+            for sample in range(out.shape[2]):
+                out[chirp, receiver, sample] += (
+                    own[receiver, sample] + part * more[receiver, sample]
+                )
+
+
+def add_fading_reference(kept, changed, fraction, tx):
+    """What `add_fading` adds, in plain NumPy."""
+    return kept[tx] + fraction[:, None, None] * changed[tx]

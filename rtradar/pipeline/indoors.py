@@ -1,0 +1,93 @@
+"""A person in a room: the paths over its walls, its static clutter, and what is left out."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from rtradar.body import Body
+from rtradar.radar import Radar
+from rtradar.scatter.clutter.body_shadow import ClutterShadow
+from rtradar.scatter.clutter.static_clutter import Clutter
+from rtradar.scatter.multipath.room_model import FIELD_ERROR, RoomModel
+from rtradar.scatter.validity import Limit, warn_of
+from rtradar.scene import Scene
+from rtradar.settings import RunSettings
+from rtradar.signal.static_clutter import RoomIf
+
+
+class Indoors(NamedTuple):
+    """The person in the room: the echo model, and the IF of the room itself.
+
+    ``account`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
+    """
+
+    model: RoomModel
+    room: RoomIf
+    account: dict[str, Any]
+    limits: tuple[Limit, ...]
+
+
+def indoors(
+    model: RoomModel,
+    radar: Radar,
+    body: Body,
+    scene: Scene,
+    settings: RunSettings,
+    n_chirps: int,
+    person_power_m2: float,
+    noise_power_m2: float,
+) -> Indoors:
+    """Trace a room with a person in it, and leave out what stays below the noise.
+
+    Parameters
+    ----------
+    model : RoomModel
+        Echo model in the room; what is not worth its cost is taken out of it.
+    radar : Radar
+        Radar in the scene.
+    body : Body
+        Person in the scene.
+    scene : Scene
+        Walls and furniture.
+    settings : RunSettings
+        Settings of the run: the backend, the order of the paths, the seed of diffuse returns, and
+        whether everything is kept.
+    n_chirps : int
+        Number of chirps in the capture.
+    person_power_m2, noise_power_m2 : float
+        Mean power of the person's echoes without the room, and of noise, per IF sample [m^2].
+    """
+    noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
+    paths = model.prune(n_chirps, noise)
+    order = max(settings.order, 1)
+    clutter = Clutter(radar, scene, variant=variant, seed=settings.seed, order=order).prune(noise)
+    room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body, variant=variant))
+    ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
+    account = {
+        "paths": [path.row() for path in paths],
+        "clutter": {
+            "power_m2": room.power_m2,
+            "signal_to_clutter_db": None if ratio is None else float(10 * np.log10(ratio)),
+            "kept": [asdict(item) for item in clutter.kept],
+            "dropped": [asdict(item) for item in clutter.dropped],
+        },
+    }
+    return Indoors(model, room, account, _limits(model))
+
+
+def _limits(model: RoomModel) -> tuple[Limit, ...]:
+    """Walls that are not followed over the sweep, where they matter."""
+    fraction = max(model.not_followed.values(), default=0.0)
+    if fraction == 0:
+        return ()
+    message = (
+        f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, "
+        "because they are too dispersive or transmit too little: "
+        f"{', '.join(model.not_followed)}"
+    )
+    limit = Limit("wall_frequency_response", fraction, message)
+    warn_of(limit)
+    return (limit,)

@@ -1,0 +1,242 @@
+"""Interpolation over the sweep and over the array: nodes, and the polynomials through them.
+
+A line of Tx with the Rx lines that are kept with it is one block of channels. What changes little
+over the array is computed at a few places along each line and interpolated in between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from rtradar.radar import Radar
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+def sweep_nodes(radar: Radar, count: int) -> Array:
+    """Return the Chebyshev nodes of the sweep, zeros of the polynomial of that degree over it.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar, whose sweep is meant.
+    count : int
+        Number of nodes.
+
+    Returns
+    -------
+    (node,) float64
+        Frequencies in ascending order [Hz].
+    """
+    place = -np.cos((np.arange(count) + 0.5) * np.pi / count)
+    return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * place)
+
+
+def interpolation_weights(nodes: Array, places: Array) -> Array:
+    """Compute the values at some places of the Lagrange polynomials of nodes.
+
+    Their product with values at the nodes is the polynomial through these. SciPy's barycentric form
+    takes the nodes in a random order: its last bits would change from one run to the next.
+
+    Parameters
+    ----------
+    nodes : (node,) float64
+        Nodes, all different, in any unit.
+    places : (place,) float64
+        Positions at which to interpolate, in the unit of the nodes.
+
+    Returns
+    -------
+    (place, node) float64
+    """
+    others = ~np.eye(len(nodes), dtype=bool)
+    columns = [
+        np.prod((places[:, None] - nodes[own]) / (node - nodes[own]), axis=1)
+        for node, own in zip(nodes, others, strict=True)
+    ]
+    return np.stack(columns, axis=1)
+
+
+# -- lines of antennas -----------------------------------------------------------------------------
+
+
+def _lines(count_y: int, count: int) -> list[Indices]:
+    """Indices of the antennas on the y-line and on the z-line, without empty lines."""
+    lines = np.arange(count_y), np.arange(count_y, count)
+    return [line for line in lines if len(line)]
+
+
+def _tx_lines(radar: Radar) -> list[tuple[Indices, list[Indices]]]:
+    """Each line of Tx with the lines of the Rx that are kept with it, as indices among these."""
+    found = []
+    for line in _lines(radar.tx_y, radar.n_tx):
+        kept = radar.rx_of_tx[line[0]]
+        groups = np.flatnonzero(kept < radar.rx_y), np.flatnonzero(kept >= radar.rx_y)
+        found.append((line, [group for group in groups if len(group)]))
+    return found
+
+
+def _evenly(count: int) -> Array:
+    """Places from 0 to 1 along a line; a single one is in the middle."""
+    return np.linspace(0, 1, count) if count > 1 else np.array([0.5])
+
+
+def _straight(count: int) -> Array:
+    """Weights (antenna, 2) of both ends of a line in each of its antennas."""
+    fraction = np.linspace(0.0, 1.0, count)
+    return np.column_stack([1 - fraction, fraction])
+
+
+@dataclass(frozen=True)
+class ArrayEnds:
+    """Ends of the lines of a radar, for linear interpolation in between.
+
+    A line is a line of Tx with the Rx that are kept with it.
+
+    Parameters
+    ----------
+    line_of_tx : (tx,) int64
+        Line of each Tx.
+    tx, rx : (line, 2, 3), (line, rx_end, 3) float64
+        Ends [m]: two of the Tx, and two for each line of Rx.
+    tx_middle, rx_middle : (line, 3) float64
+        Mean positions [m].
+    tx_weight : (tx, 2) float64
+        Weight of each end in each Tx.
+    rx_weight : (tx, rx, rx_end) float64
+        Weight of each end in each Rx that is kept with that Tx.
+    """
+
+    line_of_tx: Indices
+    tx: Array
+    rx: Array
+    tx_middle: Array
+    rx_middle: Array
+    tx_weight: Array
+    rx_weight: Array
+
+    @classmethod
+    def of(cls, radar: Radar) -> ArrayEnds:
+        """Return the ends of the lines of this radar."""
+        lines = _tx_lines(radar)
+        line_of_tx = np.repeat(np.arange(len(lines)), [len(line) for line, _ in lines])
+        rx = [radar.rx[radar.rx_of_tx[line[0]]] for line, _ in lines]
+        weights = np.zeros((len(lines), radar.n_rx, 2 * len(lines[0][1])))
+        for weight, (_, groups) in zip(weights, lines, strict=True):
+            for column, group in enumerate(groups):
+                weight[group, 2 * column : 2 * column + 2] = _straight(len(group))
+        ends = [
+            np.concatenate([kept[group[[0, -1]]] for group in groups])
+            for kept, (_, groups) in zip(rx, lines, strict=True)
+        ]
+        return cls(
+            line_of_tx,
+            tx=np.array([radar.tx[line[[0, -1]]] for line, _ in lines]),
+            rx=np.array(ends),
+            tx_middle=np.array([radar.tx[line].mean(axis=0) for line, _ in lines]),
+            rx_middle=np.array([kept.mean(axis=0) for kept in rx]),
+            tx_weight=np.concatenate([_straight(len(line)) for line, _ in lines]),
+            rx_weight=weights[line_of_tx],
+        )
+
+
+def shadow_nodes(radar: Radar) -> tuple[Array, Array, Array]:
+    """Return the ends of the lines of Tx and the middles of the lines of Rx.
+
+    Returns
+    -------
+    places : (node, 3) float64
+        Positions of the nodes, world [m].
+    tx_weight, rx_weight : (tx, node), (rx, node) float64
+        Weight of each node in each antenna.
+    """
+    blocks = []
+    for antennas, along_y, ends in ((radar.tx, radar.tx_y, 2), (radar.rx, radar.rx_y, 1)):
+        for line in _lines(along_y, len(antennas)):
+            if ends == 1 or len(line) == 1:
+                blocks.append((antennas[line].mean(axis=0)[None], np.ones((len(line), 1))))
+            else:
+                blocks.append((antennas[line[[0, -1]]], _straight(len(line))))
+    weights = np.split(block_diag(*(weight for _, weight in blocks)), [radar.n_tx])
+    return np.concatenate([places for places, _ in blocks]), weights[0], weights[1]
+
+
+class ArrayNodes(NamedTuple):
+    """Places for interpolation over the array.
+
+    ``antennas (antenna, 3)`` are world positions [m]; ``pairs (pair, 2)`` are Tx and Rx among them;
+    ``weights (tx, rx, pair)`` are those of each pair for each Tx and each Rx kept with it.
+    """
+
+    antennas: Array
+    pairs: Indices
+    weights: Array
+
+
+class _Block(NamedTuple):
+    """A line of Tx with one of Rx: indices, ends, and places of the nodes from 0 to 1 along each.
+
+    The Rx are counted among those kept with these Tx; ``ends (tx or rx, first or last, 3)`` [m].
+    """
+
+    tx: Indices
+    rx: Indices
+    ends: Array
+    tx_nodes: Array
+    rx_nodes: Array
+
+
+def _blocks(radar: Radar, along: tuple[int, int]) -> Iterator[_Block]:
+    for tx_line, rx_lines in _tx_lines(radar):
+        kept = radar.rx[radar.rx_of_tx[tx_line[0]]]
+        for rx_line in rx_lines:
+            ends = np.stack([radar.tx[tx_line[[0, -1]]], kept[rx_line[[0, -1]]]])
+            counts = np.minimum(along, (len(tx_line), len(rx_line)))
+            yield _Block(tx_line, rx_line, ends, *(_evenly(int(count)) for count in counts))
+
+
+def array_nodes(radar: Radar, along_tx: int, along_rx: int) -> ArrayNodes:
+    """Spread nodes evenly from end to end of each line, for polynomials in between.
+
+    There are ``along_tx`` nodes of Tx times ``along_rx`` of Rx for each two lines. A line with
+    fewer antennas than that has a node at each; a single node is in the middle.
+    """
+    places: list[Array] = []
+    blocks = list(_blocks(radar, (along_tx, along_rx)))
+    count = sum(len(block.tx_nodes) * len(block.rx_nodes) for block in blocks)
+    weights = np.zeros((radar.n_tx, radar.n_rx, count))
+    done = 0
+    for block in blocks:
+        tx, rx = (
+            ends[0] + nodes[:, None] * (ends[1] - ends[0])
+            for ends, nodes in zip(block.ends, (block.tx_nodes, block.rx_nodes), strict=True)
+        )
+        places.append(np.stack([np.repeat(tx, len(rx), axis=0), np.tile(rx, (len(tx), 1))], axis=1))
+        own = _product_weights(block, _evenly(len(block.tx)), _evenly(len(block.rx)))
+        shape = len(block.tx), len(block.rx), own.shape[1]
+        chosen = np.ix_(block.tx, block.rx, np.arange(done, done + shape[2]))
+        weights[chosen] = own.reshape(shape)
+        done += shape[2]
+    pairs = np.concatenate(places)
+    antennas, where = np.unique(pairs.reshape(-1, 3), axis=0, return_inverse=True)
+    return ArrayNodes(antennas, where.reshape(-1, 2), weights)
+
+
+def spread_nodes(radar: Radar, few: tuple[int, int], many: tuple[int, int]) -> Array:
+    """Compute weights (pair of many, pair of few) from a coarse `array_nodes` to a fine one."""
+    blocks = zip(_blocks(radar, few), _blocks(radar, many), strict=True)
+    weights = (_product_weights(a, b.tx_nodes, b.rx_nodes) for a, b in blocks)
+    return np.asarray(block_diag(*weights))
+
+
+def _product_weights(block: _Block, tx: Array, rx: Array) -> Array:
+    """Weights (pair, pair of nodes) of a block at pairs of places along both lines."""
+    own = interpolation_weights(block.tx_nodes, tx), interpolation_weights(block.rx_nodes, rx)
+    return np.asarray(np.kron(*own), dtype=np.float64)

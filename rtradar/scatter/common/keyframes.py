@@ -1,0 +1,72 @@
+"""Keyframes: the instants at which slow quantities are computed, and a cache of what was found."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
+
+from rtradar.radar import Radar
+
+_Key = TypeVar("_Key", bound=Hashable)
+_Value = TypeVar("_Value")
+
+
+def keyframe_step(radar: Radar, apart_s: float = 10e-3) -> int:
+    """Return the number of chirps between keyframes.
+
+    Visibility and power are evaluated at keyframes, 10 ms apart: a limb at 5 m/s moves 5 cm in
+    that time.
+    """
+    return max(1, round(apart_s / radar.chirp_interval_s))
+
+
+class KeyframeCache(Generic[_Key, _Value]):
+    """Values of keyframes: the first that come stay, later ones pass through.
+
+    A recording is processed twice from its start, once for its power and once for its signal. If
+    the last values were kept, a recording a little longer than this cache would find nothing left
+    of them when it starts again.
+
+    Parameters
+    ----------
+    stay : int
+        Number of values that stay.
+    passing : int
+        Number of later values that are held at a time, the last that were asked for.
+    """
+
+    def __init__(self, stay: int, passing: int) -> None:
+        self.stay, self._passing = stay, passing
+        self._staying: dict[_Key, _Value] = {}
+        self._later: OrderedDict[_Key, _Value] = OrderedDict()
+
+    def __contains__(self, key: object) -> bool:
+        return key in self._staying or key in self._later
+
+    def __getitem__(self, key: _Key) -> _Value:
+        if key in self._staying:
+            return self._staying[key]
+        self._later.move_to_end(key)
+        return self._later[key]
+
+    def get(self, key: _Key, find: Callable[[], _Value]) -> _Value:
+        """Return the value of a key, which is found now if it is not known."""
+        if key not in self:
+            self.keep(key, find())
+        return self[key]
+
+    def keep(self, key: _Key, value: _Value) -> None:
+        """Keep the value of a key that is not known."""
+        if len(self._staying) < self.stay:
+            self._staying[key] = value
+        else:
+            self._later[key] = value
+            if len(self._later) > self._passing:
+                self._later.popitem(last=False)
+
+    def replace(self, new: Callable[[_Value], _Value]) -> None:
+        """Replace every value by a new one."""
+        for values in (self._staying, self._later):
+            for key, value in values.items():
+                values[key] = new(value)

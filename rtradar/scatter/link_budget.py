@@ -1,0 +1,185 @@
+"""Link budget: the power of a person's echoes over time, and the limits of validity they meet."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.conventions import MINIMUM_KA
+from rtradar.echoes import Echoes
+from rtradar.errors import InputError, ValidityWarning
+from rtradar.radar import Radar
+from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.common.poses import EchoModel
+from rtradar.scatter.inside_walls import Inside
+from rtradar.scatter.validity import (
+    Limit,
+    folded_angle_deg,
+    refuse_too_near,
+    sampled,
+    small_curvature,
+    too_fast,
+    warn_of,
+)
+from rtradar.scene import Scene
+from rtradar.system.row_files import FileBackedRows, release_pages
+
+Array = NDArray[np.float64]
+
+_CHIRPS_AT_ONCE = 64
+
+
+@dataclass(frozen=True)
+class LinkBudget:
+    """Echo power of a person over a capture, and limits of validity.
+
+    Parameters
+    ----------
+    power : float
+        Sum of |amplitude|^2 over the visible echoes of the person, averaged over rx and one chirp
+        every 10 ms [m^2].
+    visible : bool
+        Whether there is any echo at all.
+    part_power : dict
+        The same power by name of body part [m^2].
+    times : (time,) float64
+        Instants evaluated, since the start of the capture [s].
+    power_at : (time, part) float64
+        The same power by instant and part [m^2].
+    hidden_at : (time, part) float64
+        Fraction of the channels that do not see the part, 0 to 1.
+    limits : tuple of Limit
+        Limits of validity that were met.
+    """
+
+    power: float
+    visible: bool
+    part_power: dict[str, float]
+    times: Array
+    power_at: Array
+    hidden_at: Array
+    limits: tuple[Limit, ...]
+
+
+def link_budget(
+    model: EchoModel,
+    radar: Radar,
+    body: Body,
+    n_chirps: int,
+    *,
+    spreading: bool = True,
+    scene: Scene | None = None,
+) -> LinkBudget:
+    """Evaluate the echoes of one chirp every 10 ms.
+
+    Parameters
+    ----------
+    model : EchoModel
+        Echo model of this body and radar.
+    radar : Radar
+        Radar in the scene.
+    body : Body
+        Person in the scene.
+    n_chirps : int
+        Number of chirps in the capture.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2); it counts only for the reference of an invisible body.
+    scene : Scene, optional
+        Walls and furniture in which the person must not be; nothing if left out.
+
+    Raises
+    ------
+    InputError
+        If a part comes within 0.3 m of an antenna, nothing of the person is ever within the
+        radar's range, or the pelvis, or a part with more than 5 % of the echo power, is inside a
+        wall.
+
+    Warns
+    -----
+    ValidityWarning
+        If more than 5 % of the echo power is concerned by a limit, or nobody is visible.
+    """
+    chirps = np.arange(0, n_chirps, keyframe_step(radar))
+    powers, fractions = FileBackedRows(), FileBackedRows()
+    solid = Inside(scene or Scene(), body.part_names)
+    concerned = dict.fromkeys(("small_curvature", "velocity_ambiguous", "beyond_range"), 0.0)
+    small_parts = np.zeros(len(body.part_names), dtype=bool)
+    ever_sampled = False
+    for first in range(0, len(chirps), _CHIRPS_AT_ONCE):
+        chosen = chirps[first : first + _CHIRPS_AT_ONCE]
+        times = np.minimum(radar.centres_of(chosen), body.duration_s)
+        refuse_too_near(radar, body, times)
+        echoes = model.echoes(chosen)
+        inside = sampled(echoes.length, radar)
+        ever_sampled |= bool(inside.any())
+        by_part, hidden, beyond = _by_part(echoes, inside, len(body.part_names))
+        powers.append(by_part)
+        fractions.append(hidden)
+        solid.look(times, body.at(times), by_part)
+        concerned["beyond_range"] += beyond
+        small = by_part * small_curvature(radar, body, times)
+        concerned["small_curvature"] += float(small.sum())
+        small_parts |= small.any(axis=0)
+        concerned["velocity_ambiguous"] += float((by_part * too_fast(radar, body, times)).sum())
+    if not ever_sampled:
+        raise InputError(
+            f"the person is never within the range of radar '{radar.name}', "
+            f"{radar.max_range_m:.2f} m; place the radar nearer (position_m) or raise "
+            "samples_per_chirp"
+        )
+    power_at, hidden_at = powers.rows(), fractions.rows()
+    part_power = dict(zip(body.part_names, power_at.mean(axis=0).tolist(), strict=True))
+    power = float(power_at.sum())
+    in_solids = solid.found(power_at.sum(axis=0))
+    release_pages(power_at)
+    kept = part_power, radar.centres_of(chirps), power_at, hidden_at
+    if power == 0:
+        return LinkBudget(_reference_power(radar, spreading), False, *kept, ())
+    names = [name for name, small in zip(body.part_names, small_parts, strict=True) if small]
+    messages = _messages(radar, names)
+    found = [(name, value, messages[name]) for name, value in concerned.items() if value > 0]
+    limits = tuple(Limit(name, own / power, text) for name, own, text in [*found, *in_solids])
+    for limit in limits:
+        warn_of(limit)
+    return LinkBudget(power / len(chirps), True, *kept, limits)
+
+
+def _by_part(echoes: Echoes, inside: NDArray[np.bool_], n_parts: int) -> tuple[Array, Array, float]:
+    """Power (chirp, part), fraction of the channels that see nothing, and power out of band."""
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)
+    by_part = np.zeros((len(power), n_parts))
+    np.add.at(by_part.T, echoes.part, power.mean(axis=1).T)
+    seen = np.zeros((*power.shape[:2], n_parts), dtype=bool)
+    for echo, part in enumerate(echoes.part):
+        seen[..., part] |= power[..., echo] > 0
+    beyond = float((power * ~inside).sum(axis=-1).mean(axis=1).sum())
+    return by_part, 1 - seen.mean(axis=1), beyond
+
+
+def _reference_power(radar: Radar, spreading: bool) -> float:
+    """Power of a point of 1 m^2 at the world's origin, for an invisible person [m^2]."""
+    warnings.warn(
+        "nobody is visible: the signal-to-noise ratio is relative to a point of 1 m^2 at the "
+        "origin",
+        ValidityWarning,
+        stacklevel=3,
+    )
+    return float(np.linalg.norm(radar.position_m)) ** -4 if spreading else 1.0
+
+
+def _messages(radar: Radar, small_parts: list[str]) -> dict[str, str]:
+    angle_deg, beside = folded_angle_deg(radar), ""
+    if angle_deg > 0:
+        beside = f" and, ahead, {angle_deg:.1f} degrees beside its direction, more to the sides"
+    return {
+        "small_curvature": "echo power from places whose wavenumber times radius of curvature is "
+        f"below {MINIMUM_KA:g}, where optics is off by decibels: {', '.join(small_parts)}",
+        "velocity_ambiguous": "echo power from parts faster than the unambiguous "
+        f"{radar.max_velocity_mps:.2f} m/s: it shows at another velocity{beside}",
+        "beyond_range": f"echo power from beyond {radar.max_range_m:.2f} m, removed by the ideal "
+        "IF low-pass",
+    }
