@@ -148,25 +148,15 @@ def about(**angles: Array | float) -> Rotation:
 def offsets(height_m: float) -> dict[str, Array]:
     """Bone vectors of the standing figure [m], by node."""
     spine = (NECK_BASE - ROOT) / 3
-    bones: dict[str, tuple[float, float, float]] = {
-        "root": (0.0, 0.0, 0.0),
-        "lowerback": (0.0, 0.0, spine),
-        "upperback": (0.0, 0.0, spine),
-        "thorax": (0.0, 0.0, spine),
-        "neck": (0.0, 0.0, HEAD_BASE - NECK_BASE),
-        "head": (0.0, 0.0, 1 - HEAD_BASE),
-    }
+    up = {"root": 0.0, "lowerback": spine, "upperback": spine, "thorax": spine}
+    up |= {"neck": HEAD_BASE - NECK_BASE, "head": 1 - HEAD_BASE}
+    down = {"knee": THIGH, "ankle": SHANK, "elbow": UPPER_ARM, "wrist": FOREARM, "hand": HAND}
+    bones = {node: (0.0, 0.0, length) for node, length in up.items()}
     for side, sign in SIDES.items():
-        bones |= {
-            f"{side}_hip": (0.0, sign * HIP_Y, HIP - ROOT),
-            f"{side}_knee": (0.0, 0.0, -THIGH),
-            f"{side}_ankle": (0.0, 0.0, -SHANK),
-            f"{side}_toe": (TOE_X, 0.0, TOE_HEIGHT - ANKLE),
-            f"{side}_shoulder": (0.0, sign * SHOULDER_Y, SHOULDER - NECK_BASE),
-            f"{side}_elbow": (0.0, 0.0, -UPPER_ARM),
-            f"{side}_wrist": (0.0, 0.0, -FOREARM),
-            f"{side}_hand": (0.0, 0.0, -HAND),
-        }
+        bones |= {f"{side}_{node}": (0.0, 0.0, -length) for node, length in down.items()}
+        bones[f"{side}_hip"] = 0.0, sign * HIP_Y, HIP - ROOT
+        bones[f"{side}_toe"] = TOE_X, 0.0, TOE_HEIGHT - ANKLE
+        bones[f"{side}_shoulder"] = 0.0, sign * SHOULDER_Y, SHOULDER - NECK_BASE
     return {node: height_m * np.array(bones[node]) for node in NODES}
 
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
@@ -131,65 +130,52 @@ def walk(duration_s: float, subject: Subject) -> PosesAt:
     headings = np.array([step.heading for step in steps])
     across = np.stack([-np.sin(headings), np.cos(headings)], axis=1)
     sway = 0.3 * subject.track_m * np.array([SIDES[step.side] for step in steps])
-    course = _Course(
-        path=CubicSpline(over, middles + sway[:, None] * across),
-        heading=CubicSpline(over, headings),
-        vigour=partial(keyed, times=over, values=np.array([step.vigour for step in steps])),
-        first_left_s=next(step.time for step in steps if step.side == "l"),
-        feet={
-            side: _foot([step for step in steps if step.side == side], subject) for side in SIDES
-        },
-    )
-    return partial(_walk, subject, course)
-
-
-@dataclass(frozen=True)
-class _Course:
-    """The path of a walk over time: the root on the floor, the heading, step lengths, and feet."""
-
-    path: Callable[[Array], Array]
-    heading: Callable[[Array], Array]
-    vigour: Callable[[Array], Array]
-    first_left_s: float
-    feet: Mapping[str, Callable[[Array], tuple[Array, Array, Array]]]
-
-
-def _walk(subject: Subject, course: _Course, t: Array) -> Pose:
+    path_at = CubicSpline(over, middles + sway[:, None] * across)
+    heading_at = CubicSpline(over, headings)
+    vigour_at = partial(keyed, times=over, values=[step.vigour for step in steps])
+    first_left_s = next(step.time for step in steps if step.side == "l")
+    foot_at = {
+        side: _foot([step for step in steps if step.side == side], subject) for side in SIDES
+    }
     height = subject.height_m
-    path, heading, vigour = course.path(t), course.heading(t), course.vigour(t)
-    phase = 2 * np.pi * (t - course.first_left_s) / subject.cycle_s  # 0 where the left foot lands
-    bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
-    z = height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob))
-    pelvis = about(
-        z=heading - math.radians(5) * vigour * np.cos(phase),
-        x=math.radians(3) * vigour * np.sin(phase),
-        y=math.radians(3),
-    )
-    thorax = about(
-        z=heading + math.radians(6) * vigour * np.cos(phase),
-        y=math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase),
-    )
-    ankles, feet, arms = {}, {}, {}
-    for side, sign in SIDES.items():
-        ankle, pitch, yaw = course.feet[side](t)
-        ankles[side], feet[side] = ankle, about(z=yaw, y=pitch)
-        # Each arm swings with the other leg.
-        beat = -sign * np.cos(phase - math.radians(15))
-        swing = math.radians(20) * subject.amplitude * subject.uneven[side] * vigour
-        arms[side] = swing_arm(
-            thorax,
-            side,
-            forward=math.radians(3) + swing * beat,
-            outward=math.radians(9),
-            elbow=math.radians(22) + math.radians(12) * vigour * (1 + beat) / 2,
+
+    def poses(t: Array) -> Pose:
+        path, heading, vigour = path_at(t), heading_at(t), vigour_at(t)
+        phase = 2 * np.pi * (t - first_left_s) / subject.cycle_s  # 0 where the left foot lands
+        bob = np.cos(2 * (phase - 2 * np.pi * MIDSTANCE))
+        z = height * (ROOT - 0.006 - vigour * (0.010 - 0.011 * bob))
+        pelvis = about(
+            z=heading - math.radians(5) * vigour * np.cos(phase),
+            x=math.radians(3) * vigour * np.sin(phase),
+            y=math.radians(3),
         )
-    return Pose(
-        root=xyz(path[:, 0], path[:, 1], z),
-        pelvis=pelvis,
-        thorax=thorax,
-        head=about(z=heading, y=math.radians(4)),
-        ankles=ankles,
-        feet=feet,
-        left=about(z=heading).apply(LEFT),
-        arms=arms,
-    )
+        thorax = about(
+            z=heading + math.radians(6) * vigour * np.cos(phase),
+            y=math.radians(4) + math.radians(1) * vigour * np.cos(2 * phase),
+        )
+        ankles, feet, arms = {}, {}, {}
+        for side, sign in SIDES.items():
+            ankle, pitch, yaw = foot_at[side](t)
+            ankles[side], feet[side] = ankle, about(z=yaw, y=pitch)
+            # Each arm swings with the other leg.
+            beat = -sign * np.cos(phase - math.radians(15))
+            swing = math.radians(20) * subject.amplitude * subject.uneven[side] * vigour
+            arms[side] = swing_arm(
+                thorax,
+                side,
+                forward=math.radians(3) + swing * beat,
+                outward=math.radians(9),
+                elbow=math.radians(22) + math.radians(12) * vigour * (1 + beat) / 2,
+            )
+        return Pose(
+            root=xyz(path[:, 0], path[:, 1], z),
+            pelvis=pelvis,
+            thorax=thorax,
+            head=about(z=heading, y=math.radians(4)),
+            ankles=ankles,
+            feet=feet,
+            left=about(z=heading).apply(LEFT),
+            arms=arms,
+        )
+
+    return poses
