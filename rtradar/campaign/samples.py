@@ -43,7 +43,7 @@ SPATIAL_POINTS = 3000
 _ID_DIGITS = 20  # 80 bits: two of a million samples share an id once in 2e12 collections
 _SPATIAL_STREAM = 2  # differs from the random streams of noise and RDT cloud with the same seed
 _SYNTHETIC_LICENCE = "none: made by rtradar"
-_PATIENCE_S = 2.0  # what lasts longer shows a progress bar
+_SLOW_BAR: Any = {"unit": "interval", "disable": None, "leave": False, "delay": 2.0}
 _BODY = ("build", "height_m")  # drawn once for each synthetic subject
 _LATER_FIELDS = (
     "multiplexing", "carrier_step_hz", "doppler_bands", "transmit_power_dbm", "noise_figure_db",
@@ -121,8 +121,8 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     """
     intervals = [interval for actor in spec.actors for interval in _takes(spec, actor)]
     # Reading takes a second for a long recording.
-    reading = {"desc": "reading recordings", "unit": "file"}
-    for recorded in tqdm(spec.recordings, disable=None if spec.recordings else True, **reading):
+    hide = None if spec.recordings else True
+    for recorded in tqdm(spec.recordings, "reading recordings", unit="file", disable=hide):
         motion = load_motion(recorded.path, skeleton=recorded.skeleton)
         count = len(intervals) + recorded.intervals.count(motion.duration_s)
         check_samples(count, len(spec.combinations))
@@ -133,14 +133,7 @@ def plan_samples(spec: Spec) -> list[SamplePlan]:
     common = json.loads(json.dumps(common)) | {"version": __version__}  # tuples become lists
     planned = [
         _plan(interval, combination, common)
-        for interval in tqdm(
-            intervals,
-            desc="planning samples",
-            unit="interval",
-            disable=None,
-            leave=False,
-            delay=_PATIENCE_S,
-        )
+        for interval in tqdm(intervals, "planning samples", **_SLOW_BAR)
         for combination in spec.combinations
     ]
     identities = Counter(plan.identity for plan in planned)

@@ -49,21 +49,12 @@ __all__ = [
     "train_network",
     "train_study",
 ]
-_NAMES = {
-    "baselines": ("evaluate_baselines",),
-    "outcomes": ("Outcome",),
-    "pointnet": ("PointNet",),
-    "prepare": ("stack_clouds",),
-    "recipes": ("LEAN", "PAPER", "Recipe"),
-    "splits": ("Split", "make_splits"),
-    "study": ("Study", "load_network", "load_study", "train_study"),
-    "training": ("Examples", "predict", "train_network"),
-}
-_HOME = {name: module for module, names in _NAMES.items() for name in names}
+_MODULES = "recipes splits outcomes prepare pointnet training study baselines"
 
 
 def __getattr__(name: str) -> Any:
-    """Load the module that defines a name when it is used, as recipes and splits need no torch."""
-    if name in __all__:
-        return getattr(import_module(f"rtradar.classify.{_HOME[name]}"), name)
+    """Load the modules in turn until one defines the name, as recipes and splits need no torch."""
+    for module in _MODULES.split() if name in __all__ else ():
+        if hasattr(found := import_module(f"rtradar.classify.{module}"), name):
+            return getattr(found, name)
     raise AttributeError(f"module 'rtradar.classify' has no attribute '{name}'")

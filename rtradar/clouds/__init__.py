@@ -2,13 +2,7 @@
 
 from rtradar.clouds.dataset_store import Collection, Sample
 from rtradar.clouds.files import RDT_AXES, RDT_UNITS, save_cloud_npz, save_ply, save_spatial_npz
-from rtradar.clouds.rdt import (
-    RdtCloud,
-    RdtCloudResult,
-    UniformSample,
-    rdt_isosurface,
-    sample_centres,
-)
+from rtradar.clouds.rdt import RdtCloud, RdtCloudResult, UniformSample, rdt_isosurface
 from rtradar.clouds.spatial import SpatialCloud, spatial_points
 
 __all__ = [
@@ -21,7 +15,6 @@ __all__ = [
     "SpatialCloud",
     "UniformSample",
     "rdt_isosurface",
-    "sample_centres",
     "save_cloud_npz",
     "save_ply",
     "save_spatial_npz",

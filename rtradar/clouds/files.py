@@ -96,15 +96,8 @@ def save_ply(path: str | os.PathLike[str], points: ArrayLike) -> None:
 
     Parameters
     ----------
-    path : path
-        Output file, which is replaced if it exists.
-    points : (n, 3) float
-        Time [s], range [m] and velocity [m/s] of each point; n may be 0.
-
-    Raises
-    ------
-    InputError
-        If the shape is wrong, a coordinate is not finite, or the file cannot be written.
+    path, points
+        Output file and points: see `save_cloud_npz`, which raises the same errors.
     """
     write_ply(Path(path), _rdt_table(points))
 

@@ -242,38 +242,6 @@ def _checked(cells: NDArray[np.bool_], name: str, axes: tuple[str, ...]) -> NDAr
     return cells
 
 
-def sample_centres(
-    vertices: ArrayLike, faces: ArrayLike, n_points: int = 3000, seed: int = 0
-) -> NDArray[np.float64]:
-    """Draw a uniform random sample of triangle centres, as `RdtCloud` does.
-
-    Parameters
-    ----------
-    vertices : (vertex, 3) float
-        Positions of the corners.
-    faces : (triangle, 3) int
-        Indices into ``vertices``.
-    n_points : int
-        Number of points, drawn with replacement if there are fewer triangles.
-    seed : int
-        Seed of the random sample.
-
-    Returns
-    -------
-    (point, 3) float64
-        ``n_points`` centres, or none if there are no triangles.
-
-    Raises
-    ------
-    InputError
-        If ``n_points`` or ``seed`` is out of its range.
-    """
-    sample = UniformSample(n_points, seed)
-    places = np.asarray(vertices, dtype=np.float64).reshape(-1, 3)
-    sample.add(places[np.asarray(faces, dtype=np.int64).reshape(-1, 3)].mean(axis=1))
-    return sample.filled()
-
-
 def _surface(
     cells: NDArray[np.bool_], times: NDArray[np.float64], radar: Radar
 ) -> tuple[NDArray[np.float64], NDArray[np.int64]]:

@@ -6,11 +6,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import chisquare
 
-from rtradar.clouds import RdtCloud, rdt_isosurface, sample_centres
+from rtradar.clouds import RdtCloud, UniformSample, rdt_isosurface
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 
 RADAR = Radar.preset("paper-12ghz")
+
+
+def sample_centres(
+    vertices: np.ndarray, faces: np.ndarray, n_points: int = 3000, seed: int = 0
+) -> np.ndarray:
+    """A sample of the centres of triangles, as of `RdtCloud`."""
+    sample = UniformSample(n_points, seed)
+    sample.add(np.asarray(vertices)[np.asarray(faces)].mean(axis=1))
+    return sample.filled()
 
 
 def random_volume(

@@ -123,7 +123,7 @@ _NEAREST_BINS = 4.0  # a point of the cloud farther from any echo belongs to non
 class RunView:
     """Data of a run that the view page and its still pictures show.
 
-    ``snapshots`` are snapshots of body and echoes, and ``radar`` is at its position in the scene.
+    ``snapshots`` show body and echoes, and ``radar`` is at its position in the scene.
     ``range_doppler`` has one map, the mean of the channels, for each snapshot; ``spectrogram`` one
     map, time across and velocity up, without columns if the capture is too short. ``rdt_points``
     (point, 3) are time [s], range [m] and velocity [m/s], and ``rdt_power_db`` (point,) the power
@@ -166,12 +166,8 @@ class RunView:
     @property
     def fastest_mps(self) -> float:
         """Largest range rate of the colour scale [m/s]."""
-        rates = [
-            *np.abs(self.snapshots.velocity_mps[self.seen]),
-            *np.abs(self.rdt_points[:, 2]),
-            0.1,
-        ]
-        return float(max(rates))
+        rates = [self.snapshots.velocity_mps[self.seen], self.rdt_points[:, 2], [0.1]]
+        return float(np.abs(np.concatenate(rates)).max())
 
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
@@ -219,10 +215,8 @@ class RunView:
 def _controls(colour: str) -> str:
     chosen = {name: " selected" if name == colour else "" for name in COLOURS}
     options = "".join(f'<option value="{n}"{mark}>{n}</option>' for n, mark in chosen.items())
-    tints = (
-        f'<span><i style="background:{tint}"></i>{name}</span>' for name, tint in GROUPS.items()
-    )
-    legend = "".join(tints)
+    style = '<span><i style="background:{}"></i>{}</span>'
+    legend = "".join(style.format(tint, name) for name, tint in GROUPS.items())
     return player(
         f'<label>Colour by <select id="colour">{options}</select></label>'
         '<label>Paths <select id="paths"><option value="all">all</option>'
@@ -262,9 +256,12 @@ def view_data(run_view: RunView) -> dict[str, Any]:
     snapshots, radar = run_view.snapshots, run_view.radar
     figure = posed_figure(snapshots.part_names.tolist(), snapshots.times, snapshots.poses, radar)
     figure["ranges"] = _with_room(figure["ranges"], snapshots)
-    group = run_view.rdt_group()
     shown = rdt_data(run_view.rdt_points)
     every = -(-shown["count"] // max(shown["shown"], 1)) or 1
+    points = {
+        "power_db": packed_floats(run_view.rdt_power_db[::every]),
+        "group": run_view.rdt_group()[::every].tolist(),
+    }
     return {
         "figure": figure,
         "echoes": {
@@ -298,20 +295,15 @@ def view_data(run_view: RunView) -> dict[str, Any]:
         "max_velocity_mps": radar.max_velocity_mps,
         "map": run_view.range_doppler.packed() | {"box": run_view.shown_box()},
         "spectrogram": run_view.spectrogram.packed(),
-        "rdt": shown
-        | {
-            "power_db": packed_floats(run_view.rdt_power_db[::every]),
-            "group": group[::every].tolist(),
-        },
+        "rdt": shown | points,
         "spatial": spatial_data(run_view.spatial),
     }
 
 
 def _with_room(ranges: list[list[float]], snapshots: Snapshots) -> list[list[float]]:
     """Extend the limits of the axes to walls and furniture, rounded to half metres."""
-    places = np.concatenate(
-        [snapshots.walls.reshape(-1, 3), snapshots.furniture_vertices, np.array(ranges).T]
-    )
+    walls, furniture = snapshots.walls.reshape(-1, 3), snapshots.furniture_vertices
+    places = np.concatenate([walls, furniture, np.array(ranges).T])
     low = np.floor(2 * places.min(axis=0) - 1e-6) / 2
     high = np.ceil(2 * places.max(axis=0) + 1e-6) / 2
     low[2] = 0.0 if low[2] > -0.6 else low[2]
