@@ -177,9 +177,8 @@ def _takes(spec: Spec, actor: Actor) -> Iterator[_Interval]:
             "seed": seed,
         }
         for start_s, duration_s in spec.intervals.of(name, take_s):
-            yield _Interval(
-                actor.label, {**motion, "start_s": start_s, "duration_s": duration_s}, drawn, None
-            )
+            parameters = {**motion, "start_s": start_s, "duration_s": duration_s}
+            yield _Interval(actor.label, parameters, drawn, None)
 
 
 def _intervals(spec: Spec, recorded: Recorded, motion: Motion) -> Iterator[_Interval]:

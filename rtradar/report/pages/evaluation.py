@@ -221,7 +221,7 @@ def draw_confusion(
         [f"{count}\n{value:.0f} %" for count, value in zip(*row, strict=True)]
         for row in zip(counts, percent, strict=True)
     ]
-    labels = "Answered", "Shown", "Share of the clouds that show it [%]"
+    labels = "Answered", "Shown", "Fraction of the clouds that show it [%]"
     _draw_matrix(path, percent, cells, classes, labels, title)
 
 

@@ -197,18 +197,14 @@ def mapping_table(values: Mapping[str, Any]) -> str:
 
 def limits_table(radar: Radar) -> str:
     """Make the paper's Table 2, the measurement limits, for this radar at its centre frequency."""
-    bin_cm, turn = f"{100 * radar.range_bin_m:.3f} cm", _text(radar.cycle_duration_s, "s")
+    bin_cm, bin_mps = f"{100 * radar.range_bin_m:.3f} cm", f"{radar.velocity_bin_mps:.4f} m/s"
+    turn, beam = _text(radar.cycle_duration_s, "s"), f"{radar.angle_resolution_deg:.2f}°"
     channels = f"{radar.n_tx} × {radar.n_rx} = {radar.n_channels}"
-    beam = f"{radar.angle_resolution_deg:.2f}°"
     rows = (
         ("r_max", "Maximum detectable range", f"{radar.max_range_m:.3f} m"),
         ("r_dis", "Minimum distinguishable distance, one range bin", bin_cm),
         ("v_max", "Maximum unambiguous velocity", f"±{radar.max_velocity_mps:.3f} m/s"),
-        (
-            "v_dis",
-            "Minimum distinguishable velocity, one Doppler bin",
-            f"{radar.velocity_bin_mps:.4f} m/s",
-        ),
+        ("v_dis", "Minimum distinguishable velocity, one Doppler bin", bin_mps),
         ("A_range", "Unambiguous azimuth and elevation", f"±{radar.max_angle_deg:.1f}°"),
         ("A_dis", "Beam width, -3 dB, uniform line, far field", beam),
         ("λ", "Wavelength at the centre of the sweep", f"{1000 * radar.wavelength_m:.3f} mm"),
@@ -238,8 +234,9 @@ def limits_box(limits: Sequence[Mapping[str, Any]]) -> str:
         return f'<aside class="box fine"><p>{text}</p></aside>'
     items = []
     for limit in limits:
-        share = float(limit.get("share", 0.0))
-        message = f"{share:.1%} of the {limit['message']}" if share > 0 else str(limit["message"])
+        fraction, message = float(limit.get("share", 0.0)), str(limit["message"])
+        if fraction > 0:
+            message = f"{fraction:.1%} of the {message}"
         items.append(f"<li>{escape(message)} <code>{escape(str(limit['name']))}</code></li>")
     title = "<h2>Limits of this result</h2>"
     return f'<aside class="box warn">{title}<ul>{"".join(items)}</ul></aside>'
