@@ -1,7 +1,7 @@
-"""Files of IF samples: MATLAB version 7.3, netCDF-4, and whole numbers of 16 bits as radar boards.
+"""Files of IF samples: MATLAB version 7.3, netCDF-4, and the 16-bit integers of radar boards.
 
-Both of the first two are HDF5, of any size. Readers raise errors of many types if a file is none of
-theirs; `rtradar.exchange.read_if` makes one line of them.
+MATLAB 7.3 and netCDF-4 are HDF5, of any size. Readers raise errors of many types if a file is none
+of theirs; `rtradar.exchange.read_if` makes one line of them.
 """
 
 from __future__ import annotations

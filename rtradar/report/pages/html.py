@@ -67,7 +67,7 @@ class Titles(NamedTuple):
 def player(more: str = "") -> str:
     """Make the HTML of the time controls of a figure, with ``more`` beside them."""
     return f"""<div class="player" id="player"><button type="button" id="play">Play</button>
-<input type="range" id="moment" min="0" value="0" step="1" aria-label="Moment of the recording">
+<input type="range" id="moment" min="0" value="0" step="1" aria-label="Time in the recording">
 <output id="clock" for="moment"></output>
 <label>Speed <select id="speed"><option value="0.1">× 0.1</option>
 <option value="0.25">× 0.25</option><option value="0.5">× 0.5</option>
