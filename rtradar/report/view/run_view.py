@@ -166,8 +166,8 @@ class RunView:
     @property
     def fastest_mps(self) -> float:
         """Largest range rate of the colour scale [m/s]."""
-        rates = [self.snapshots.velocity_mps[self.seen], self.rdt_points[:, 2], [0.1]]
-        return float(np.abs(np.concatenate(rates)).max())
+        rates = np.append(self.snapshots.velocity_mps[self.seen], self.rdt_points[:, 2])
+        return float(np.abs(rates).max(initial=0.1))
 
     def shown_box(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Return the limits in velocity [m/s] and range [m] of echoes and points, with a margin."""
