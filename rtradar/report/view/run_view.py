@@ -26,14 +26,9 @@ COLOURS = ("part", "power", "velocity")
 """Quantities that colours may show."""
 
 VELOCITY_COLOURS = (
-    (0.0, "#0b2e6b"),
-    (0.25, "#1f6fd6"),
-    (0.44, "#79b4f0"),
-    (0.5, "#9a9aa2"),
-    (0.56, "#f0a184"),
-    (0.75, "#d9371f"),
-    (1.0, "#6b0f0f"),
-)
+    (0.0, "#0b2e6b"), (0.25, "#1f6fd6"), (0.44, "#79b4f0"), (0.5, "#9a9aa2"),
+    (0.56, "#f0a184"), (0.75, "#d9371f"), (1.0, "#6b0f0f"),
+)  # fmt: skip
 """Colour scale from approaching to receding, in which slow motion differs clearly from rest."""
 
 _BODY = """<div class="linked">

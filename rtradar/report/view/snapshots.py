@@ -1,9 +1,9 @@
 """Snapshots of body, room and echoes, the file ``view.npz`` that ``rtradar view`` needs."""
 
+# ruff: noqa: RUF009 - the calls in the dataclass make its fields
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -18,31 +18,16 @@ _MAX_BYTES = 200_000_000  # far more than the 2 MB that a run writes
 
 _LARGEST = 1e9
 
-_FIELDS: Mapping[str, tuple[str, tuple[str | int, ...]]] = {
-    "times": ("f8", ("step",)),
-    "window": ("i8", ("step",)),
-    "part_names": ("U", ("part",)),
-    "poses": ("f4", ("step", "part", 4, 3)),
-    "path_names": ("U", ("path",)),
-    "echo_path": ("i8", ("echo",)),
-    "echo_part": ("i8", ("echo",)),
-    "echo_bounces": ("i8", ("echo",)),
-    "range_m": ("f8", ("step", "echo")),
-    "velocity_mps": ("f8", ("step", "echo")),
-    "power_m2": ("f8", ("step", "echo")),
-    "corners": ("f4", ("step", "echo", "corner", 3)),
-    "wall_names": ("U", ("wall",)),
-    "walls": ("f8", ("wall", 4, 3)),
-    "furniture_names": ("U", ("piece",)),
-    "furniture_vertices": ("f4", ("vertex", 3)),
-    "furniture_faces": ("i8", ("face", 3)),
-    "furniture_piece": ("i8", ("vertex",)),
-}
 _MAY_BE_NAN = ("corners",)
 _POINTS_INTO = {
     "echo_path": "path", "echo_part": "part",
     "furniture_faces": "vertex", "furniture_piece": "piece",
 }  # fmt: skip
+
+
+def _array(kind: str, *axes: str | int) -> Any:
+    """Field of `Snapshots`: NumPy's code of its type, and the names or lengths of its axes."""
+    return field(metadata={"kind": kind, "axes": axes})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,29 +77,30 @@ class Snapshots:
         If the shapes do not fit each other, a value is not finite, or an index is out of range.
     """
 
-    times: NDArray[np.float64]
-    window: NDArray[np.int64]
-    part_names: NDArray[np.str_]
-    poses: NDArray[np.float32]
-    path_names: NDArray[np.str_]
-    echo_path: NDArray[np.int64]
-    echo_part: NDArray[np.int64]
-    echo_bounces: NDArray[np.int64]
-    range_m: NDArray[np.float64]
-    velocity_mps: NDArray[np.float64]
-    power_m2: NDArray[np.float64]
-    corners: NDArray[np.float32]
-    wall_names: NDArray[np.str_]
-    walls: NDArray[np.float64]
-    furniture_names: NDArray[np.str_]
-    furniture_vertices: NDArray[np.float32]
-    furniture_faces: NDArray[np.int64]
-    furniture_piece: NDArray[np.int64]
+    times: NDArray[np.float64] = _array("f8", "step")
+    window: NDArray[np.int64] = _array("i8", "step")
+    part_names: NDArray[np.str_] = _array("U", "part")
+    poses: NDArray[np.float32] = _array("f4", "step", "part", 4, 3)
+    path_names: NDArray[np.str_] = _array("U", "path")
+    echo_path: NDArray[np.int64] = _array("i8", "echo")
+    echo_part: NDArray[np.int64] = _array("i8", "echo")
+    echo_bounces: NDArray[np.int64] = _array("i8", "echo")
+    range_m: NDArray[np.float64] = _array("f8", "step", "echo")
+    velocity_mps: NDArray[np.float64] = _array("f8", "step", "echo")
+    power_m2: NDArray[np.float64] = _array("f8", "step", "echo")
+    corners: NDArray[np.float32] = _array("f4", "step", "echo", "corner", 3)
+    wall_names: NDArray[np.str_] = _array("U", "wall")
+    walls: NDArray[np.float64] = _array("f8", "wall", 4, 3)
+    furniture_names: NDArray[np.str_] = _array("U", "piece")
+    furniture_vertices: NDArray[np.float32] = _array("f4", "vertex", 3)
+    furniture_faces: NDArray[np.int64] = _array("i8", "face", 3)
+    furniture_piece: NDArray[np.int64] = _array("i8", "vertex")
 
     def __post_init__(self) -> None:
         sizes: dict[str, int] = {}
-        for name in _FIELDS:
-            object.__setattr__(self, name, _checked(name, getattr(self, name), sizes))
+        for one in fields(self):
+            array = _checked(one.name, getattr(self, one.name), sizes, **one.metadata)
+            object.__setattr__(self, one.name, array)
         if not sizes["step"] or not sizes["part"]:
             raise InputError(
                 "view: there is no snapshot or no body part; at least one of each is needed"
@@ -139,9 +125,10 @@ class Snapshots:
         return int(np.abs(self.times - time_s).argmin())
 
 
-def _checked(name: str, values: Any, sizes: dict[str, int]) -> NDArray[Any]:
+def _checked(
+    name: str, values: Any, sizes: dict[str, int], kind: str, axes: tuple[str | int, ...]
+) -> NDArray[Any]:
     """Return a field as an array of its type; ``sizes`` collects the lengths of named axes."""
-    kind, axes = _FIELDS[name]
     array = np.asarray(values)
     if kind == "U" and array.size == 0:
         array = array.astype("U")  # an empty list has no string type
@@ -171,9 +158,8 @@ def _checked(name: str, values: Any, sizes: dict[str, int]) -> NDArray[Any]:
 
 def save_snapshots(path: str | Path, snapshots: Snapshots) -> None:
     """Write snapshots as a NumPy archive; InputError if the file cannot be written."""
-    arrays = {name: getattr(snapshots, name) for name in _FIELDS}
     with atomic_file(path) as file:
-        np.savez_compressed(file, format=np.array(_FORMAT), **arrays)
+        np.savez_compressed(file, format=np.array(_FORMAT), **vars(snapshots))
 
 
 def load_snapshots(path: str | Path) -> Snapshots:
@@ -181,7 +167,8 @@ def load_snapshots(path: str | Path) -> Snapshots:
     mend = "make it anew with: rtradar run"
     try:
         arrays = read_arrays(Path(path), _MAX_BYTES)
-        found: dict[str, Any] = {name: arrays[name] for name in ("format", *_FIELDS)}
+        names = ("format", *(one.name for one in fields(Snapshots)))
+        found: dict[str, Any] = {name: arrays[name] for name in names}
     except FileNotFoundError:
         raise InputError(f"'{path}' is not there; {mend}") from None
     except (OSError, ValueError, KeyError) as error:
