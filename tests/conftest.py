@@ -1,4 +1,4 @@
-"""What tests share: a repeatable hypothesis, one run per ray-tracing backend, the recordings."""
+"""Fixtures that tests share: repeatable hypothesis, each ray-tracing backend, the recordings."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ import rtradar as rt
 from rtradar.system import threads
 from rtradar.trace.backends.backend import Backend, available, select, use
 
-# The same examples every time, and no limit of time for one: kernels are compiled when they are first met.
+# The same examples every time, and no limit of time, because kernels are compiled when first used.
 hypothesis.settings.register_profile("rtradar", deadline=None, derandomize=True, database=None)
-# New examples in every run, those that failed before first, and more of them: `make test-fresh`.
+# New examples in every run, former failures first, and more of them: `make test-fresh`.
 hypothesis.settings.register_profile("fresh", deadline=None, derandomize=False, print_blob=True)
 hypothesis.settings.load_profile(os.environ.get("RTRADAR_HYPOTHESIS", "rtradar"))
 _MORE = float(os.environ.get("RTRADAR_EXAMPLES", "1"))
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Give every property test ``RTRADAR_EXAMPLES`` times as many examples as it has, also where it names their number."""
+    """Give every property test ``RTRADAR_EXAMPLES`` times as many examples as it asks for."""
     if _MORE == 1:
         return
     for test in {
@@ -45,14 +45,14 @@ def _available() -> tuple[str, ...]:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """Run a test that asks for ``backend`` once on each that works here; without such tests nothing is probed."""
+    """Run a test that takes ``backend`` once on each backend that works here."""
     if "backend" in metafunc.fixturenames:
         metafunc.parametrize("backend", _available(), indirect=True)
 
 
 @pytest.fixture
 def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
-    """A backend, in use: ``rtradar.trace.backends.backend.use(backend)`` gives Mitsuba. Its memory is released after."""
+    """A backend in use, of which `use` gives Mitsuba; its memory is released afterwards."""
     chosen = select(request.param)
     use(chosen)
     yield chosen
@@ -65,7 +65,7 @@ def backend(request: pytest.FixtureRequest) -> Iterator[Backend]:
 
 @pytest.fixture
 def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Threads of `rtradar.system.threads`, however many cores there are."""
+    """Four threads in `rtradar.system.threads`, whatever the number of cores."""
     monkeypatch.setenv(threads.THREADS_VARIABLE, "4")
     threads._pool.cache_clear()
     yield
@@ -74,7 +74,7 @@ def four_threads(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 @pytest.fixture(scope="session")
 def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
-    """A small radar, and a scene of one metal wall on its left: few echoes, direct and over the wall."""
+    """A small radar, and a scene with one metal wall on its left: few echoes on each path."""
     from rtradar.scene import Wall, material
 
     radar = rt.Radar(
@@ -100,7 +100,7 @@ def beside_a_wall() -> tuple[rt.Radar, rt.Scene]:
 
 @pytest.fixture(scope="session")
 def mocap() -> Path:
-    """The folder of real recordings."""
+    """Folder of real recordings."""
     named = os.environ.get("RTRADAR_MOCAP")
     if not named:
         pytest.skip("RTRADAR_MOCAP is not set: it names the folder of real recordings")

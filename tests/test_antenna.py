@@ -1,4 +1,4 @@
-"""Antenna patterns against closed forms, and what they do to echoes."""
+"""Antenna patterns against closed forms, and their effect on echoes."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ def test_cosine(exponent: float) -> None:
         ahead = math.cos(math.radians(azimuth)) * math.cos(math.radians(elevation))
         assert antenna.relative(towards(azimuth, elevation), "v") == pytest.approx(ahead**exponent)
     assert antenna.relative(towards(120, 0), "v") == 0
-    # Without losses gain averages to 1 over the sphere.
+    # Without losses, the gain has the mean 1 over the sphere.
     power, _ = quad(lambda t: math.cos(t) ** exponent * math.sin(t) / 2, 0, math.pi / 2)
     assert antenna.peak_gain * power == pytest.approx(1)
 
@@ -154,13 +154,14 @@ def test_an_isotropic_antenna_is_the_same_all_round() -> None:
 )
 def test_what_has_no_meaning_is_refused(fields: dict[str, Any], said: str) -> None:
     with pytest.raises(rt.InputError, match=f"tx_antenna: antenna: .*{said}"):
-        rt.Radar(tx_antenna=fields)  # type: ignore[arg-type]
+        rt.Radar(tx_antenna=fields)
 
 
 def test_from_a_file(tmp_path: Path) -> None:
     path = tmp_path / "patch.toml"
     path.write_text(
-        'tx_y = 1\n[tx_antenna]\npattern = "cosine"\nexponent = 2\n[rx_antenna]\npattern = "dipole"\ngain_dbi = 1.5\n'
+        'tx_y = 1\n[tx_antenna]\npattern = "cosine"\nexponent = 2\n'
+        '[rx_antenna]\npattern = "dipole"\ngain_dbi = 1.5\n'
     )
     radar = rt.Radar.load(path)
     assert radar.tx_antenna == Antenna(pattern="cosine", exponent=2.0)
@@ -202,8 +203,8 @@ def test_each_leg_of_an_echo_has_the_gain_of_its_direction(fidelity: str) -> Non
 def test_directions_are_those_of_the_specular_points() -> None:
     radar = rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0, position_m=(-4.0, 1.0, 1.0))
     at = chirp_poses(radar, BODY, np.arange(2))
-    # The length over the exact specular point is the least of all ways over the surface's near side; one over a point beside it
-    # is longer by the square of how far beside.
+    # The path over the exact specular point is the shortest over the near side of the surface; over
+    # a point beside it the path is longer by the square of the distance between them.
     points = specular_points(at)
     ways = np.linalg.norm(points - at.tx[:, None, None], axis=-1) + np.linalg.norm(
         points - at.rx[:, :, None], axis=-1

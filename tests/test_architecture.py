@@ -1,4 +1,4 @@
-"""ARCHITECTURE.md: its picture is that of the code."""
+"""ARCHITECTURE.md: its picture is drawn from the code."""
 
 from __future__ import annotations
 
@@ -9,8 +9,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 pytest.importorskip(
-    "grimp",
-    reason="the picture of the imports needs grimp: pip install -c constraints.txt --editable '.[dev]'",
+    "grimp", reason="the picture of the imports needs grimp: pip install --editable '.[dev]'"
 )
 DRAWN = runpy.run_path(str(ROOT / "docs" / "draw_architecture.py"))
 
@@ -21,7 +20,7 @@ def test_the_picture_is_that_of_the_code() -> None:
 
 
 def test_data_flow_down_the_picture() -> None:
-    """Every flow, also those that are not drawn, goes from an earlier row to a later one."""
+    """Every flow, drawn or not, goes from an earlier row to a later one."""
     rows = DRAWN["order"]()
     assert [
         edge for edge in DRAWN["flows"]().edges if rows.index(edge[0]) >= rows.index(edge[1])

@@ -1,4 +1,4 @@
-"""The command line: what it writes, and how it says no."""
+"""The command line: what it writes, and its error messages."""
 
 from __future__ import annotations
 
@@ -146,7 +146,8 @@ def test_the_cloud_in_the_room_is_about_the_person(walked: Path) -> None:
         == len(cloud["time"])
         > 500
     )
-    # The body walks from x = 0.1 m to -0.1 m, 0.2 m to either side of y = 0, and is 1.8 m high; a beam is 0.13 m wide.
+    # The body walks from x = 0.1 m to -0.1 m, within 0.2 m of y = 0, and is 1.8 m high; the beam is
+    # 0.13 m wide.
     x, y, z = np.median(cloud["points"], axis=0)
     assert abs(x) < 0.4
     assert abs(y) < 0.2

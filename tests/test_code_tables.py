@@ -70,7 +70,7 @@ def test_tables_from_the_code_are_complete() -> None:
     assert "| `paper-12ghz` |" in TABLES["radar-limits"]()
 
 
-def allowed(read, text: str, path: Path) -> set[str]:  # type: ignore[no-untyped-def]
+def allowed(read, text: str, path: Path) -> set[str]:
     """Keys of the last table of a file, as the message about an unknown one lists them."""
     path.write_text(f"{text}no_such_key = 1\n")
     with pytest.raises(InputError, match="unknown key 'no_such_key'; allowed: ") as caught:

@@ -1,4 +1,4 @@
-"""Everything public says what it takes, of what shape and unit, and what it returns; and the pages of it can be built."""
+"""Public things document their parameters, shapes, units and results, and their pages build."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def public() -> Iterator[tuple[str, Any]]:
 
 
 def members(thing: type) -> dict[str, Any]:
-    """Of a class, those that it has from others of the package among them."""
+    """Public members of a class, with those inherited from classes of the package."""
     owners = [owner for owner in reversed(thing.__mro__) if owner.__module__.startswith("rtradar")]
     return {name: value for owner in owners for name, value in vars(owner).items()}
 
@@ -49,13 +49,13 @@ THINGS = dict(public())
 
 
 def section(text: str, title: str) -> str:
-    """The lines under a numpydoc title."""
+    """Lines below a title of numpydoc."""
     found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)
     return found.group(1) if found else ""
 
 
-def told(text: str, title: str) -> set[str]:
-    """Names that a section tells of."""
+def named(text: str, title: str) -> set[str]:
+    """Names that a section documents."""
     lines = [
         line for line in section(text, title).splitlines() if line and not line.startswith(" ")
     ]
@@ -63,7 +63,7 @@ def told(text: str, title: str) -> set[str]:
 
 
 def fillers(text: str) -> set[str]:
-    """Names of parameters whose text says nothing: none, a unit alone, the name again, or the rest of a phrase."""
+    """Names of parameters whose text says nothing: none, a unit, the name, or half a phrase."""
     found = set()
     entries = re.split(r"^(?=\S)", section(text, "Parameters"), flags=re.MULTILINE)
     for entry in filter(str.strip, entries):
@@ -79,7 +79,7 @@ def fillers(text: str) -> set[str]:
 
 
 def own_fillers() -> set[str]:
-    """Fillers of everything public, as ``name: parameter``; what a class inherits counts for the class that has it."""
+    """Fillers of everything public, as ``name: parameter``; inherited ones count once."""
     found, seen = set(), set()
     for name, thing in THINGS.items():
         owner, _, member = name.rpartition(".")
@@ -99,7 +99,7 @@ def options_of(thing: Any) -> set[str]:
 
 
 def takes(thing: Any) -> set[str]:
-    """Names of what a function takes, or a class that is not told what by its kind: protocols, exceptions, tuples."""
+    """Names of the parameters of a function or class; none for protocols, exceptions and tuples."""
     if isinstance(thing, type) and (
         getattr(thing, "_is_protocol", False) or issubclass(thing, Exception | tuple)
     ):
@@ -123,10 +123,12 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
     text = inspect.getdoc(thing) or ""
     assert text.strip(), "no docstring"
     names = takes(thing)
-    assert names <= told(text, "Parameters"), f"not told of: {names - told(text, 'Parameters')}"
+    assert names <= named(text, "Parameters"), (
+        f"not documented: {names - named(text, 'Parameters')}"
+    )
     if options := options_of(thing):
         assert "rtradar.RunSettings" in section(text, "Parameters")
-        assert options == told(inspect.getdoc(rt.RunSettings) or "", "Parameters")
+        assert options == named(inspect.getdoc(rt.RunSettings) or "", "Parameters")
     if inspect.isfunction(thing) and names and thing.__annotations__.get("return") != "None":
         assert (section(text, "Returns") + section(text, "Yields")).strip(), (
             "it does not say what it returns"
@@ -135,14 +137,14 @@ def test_it_has_a_docstring_that_says_all(name: str) -> None:
 
 def test_a_gap_is_found() -> None:
     text = inspect.getdoc(THINGS["rtradar.run"]) or ""
-    assert takes(THINGS["rtradar.run"]) == told(text, "Parameters")
+    assert takes(THINGS["rtradar.run"]) == named(text, "Parameters")
     assert "pfa" in options_of(THINGS["rtradar.run"])
-    assert "motion" not in told(text.replace("motion : Motion", "film : Motion"), "Parameters")
+    assert "motion" not in named(text.replace("motion : Motion", "film : Motion"), "Parameters")
     assert not section(text.replace("Returns\n---", "Gives\n---"), "Returns").strip()
 
 
 def test_texts_of_parameters_are_no_fillers() -> None:
-    """Those of the list are known; it may lose lines and never gain one. ``python tests/test_docstrings.py`` drops what is mended."""
+    """The list of known fillers may only shrink; ``python tests/test_docstrings.py`` updates it."""
     known = set(KNOWN_FILLERS.read_text(encoding="utf-8").splitlines())
     assert len(known) <= MOST_FILLERS
     new = own_fillers() - known
@@ -172,7 +174,7 @@ def test_a_filler_is_found() -> None:
     find_spec("sphinx_gallery") is None, reason="pages are built by what the extra docs brings"
 )
 def test_the_pages_can_be_built(tmp_path: Path) -> None:
-    """All but the gallery's pictures, which `test_gallery` asks for; a warning is an error."""
+    """All pages but the gallery's pictures, which `test_gallery` draws; a warning is an error."""
     words = [
         "-q",
         "--fail-on-warning",

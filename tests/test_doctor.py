@@ -113,12 +113,12 @@ def test_the_report_goes_to_the_terminal_and_to_json(
 
 
 def _memory(file: Path) -> dict[str, float]:
-    """The one thing that may change between two looks."""
+    """The one value that may change between two reports."""
     return {"memory_available_mb": json.loads(file.read_text())["memory_available_mb"]}
 
 
 def test_this_machine() -> None:
-    """Whatever it has, a backend that works is found, and the figures make sense."""
+    """Whatever the machine has, a working backend is found, and the figures make sense."""
     found = doctor.examine()
     assert found.exit_status == 0
     assert found.cores >= 1

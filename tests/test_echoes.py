@@ -75,7 +75,7 @@ def test_amplitudes_keep_their_precision() -> None:
     ],
 )
 def test_shapes_that_do_not_fit_are_refused(field: str, shape: tuple[int, ...]) -> None:
-    # Where frequency is wrong, amplitude is named where it follows frequency: either tells where to look.
+    # A wrong frequency may be reported as an amplitude that does not fit it.
     with pytest.raises(ValueError, match=rf"Echoes\.({field}|amplitude) has shape") as caught:
         Echoes(**fields(**{field: np.ones(shape)}))
     assert "\n" not in str(caught.value)

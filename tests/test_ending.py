@@ -15,7 +15,7 @@ from rtradar.cli import ending
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="POSIX signals")
 
-SOON_S = 10.0  # two seconds on a quiet machine, which validation/robustness/interruptions.py holds it to; tests share theirs
+SOON_S = 10.0  # validation/robustness/interruptions.py asks 2 s of a quiet machine; tests share one
 
 
 @pytest.mark.slow
@@ -63,7 +63,7 @@ def test_a_run_ends_soon_in_one_line_and_leaves_the_folder_as_it_was(
 
 
 def runs(process: int) -> bool:
-    """Whether a process is there that has not ended; where nobody asks for its end, the system keeps its number."""
+    """Whether a process exists that has not ended; a zombie has ended."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
@@ -108,7 +108,8 @@ def test_children_files_and_folders_go_too(tmp_path: Path) -> None:
 FIRST_THREAD_ENDS = """
 import ctypes, platform, threading
 threading.Thread(target=ctypes.CDLL(None).sleep, args=(600,)).start()
-ctypes.CDLL(None).syscall({"x86_64": 60, "aarch64": 93}[platform.machine()], 0)  # exit, of this thread alone
+exit_thread = {"x86_64": 60, "aarch64": 93}[platform.machine()]
+ctypes.CDLL(None).syscall(exit_thread, 0)
 """
 
 
@@ -125,7 +126,7 @@ def test_a_child_runs_until_its_last_thread_has_ended() -> None:
         assert child.pid in ending._descendants()
     finally:
         child.kill()
-    # Until somebody asks how it ended, the system keeps its number, without threads.
+    # Until its exit status is read, the system keeps its number, without threads.
     until = time.monotonic() + 60
     while child.pid in ending._descendants():
         assert time.monotonic() < until

@@ -40,7 +40,7 @@ def files_of_the_how_to() -> dict[str, str]:
 
 
 def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None = None) -> None:
-    """What pip leaves of a package: its modules, and beside them its name and entry points."""
+    """What pip installs of a package: its modules, and beside them its name and entry points."""
     folder.mkdir()
     project = tomllib.loads(files["pyproject.toml"])["project"]
     about = folder / f"{project['name']}-{project['version']}.dist-info"
@@ -58,7 +58,7 @@ def install(folder: Path, files: dict[str, str], changes: dict[str, str] | None 
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., None]]:
-    """Installs the package for this process, as `install` does for another."""
+    """Install the package for this process, as `install` does for another."""
 
     def put(folder: Path, changes: dict[str, str] | None = None) -> None:
         install(folder, files_of_the_how_to(), changes)
@@ -292,12 +292,12 @@ def test_an_account_that_no_file_can_hold(registered: None) -> None:
     body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.1))
     model = build_model("wrong", rt.Radar(tx_y=2, tx_z=0, rx_y=2, rx_z=0), body, spoil="nothing")
     with pytest.raises(rt.ExtensionError, match="'wrong' failed: TypeError"):
-        model.account()  # type: ignore[attr-defined]
+        model.account()
 
 
 @pytest.fixture
 def registered() -> Iterator[None]:
-    """Takes out again what a test registers."""
+    """Remove again what a test registers."""
     before = [dict(registry._registered) for registry in REGISTRIES]
     yield
     for registry, known in zip(REGISTRIES, before, strict=True):
@@ -318,11 +318,11 @@ def test_a_running_program_adds_its_own() -> None:
     with pytest.raises(rt.InputError, match="there already"):
         rt.register_radar("mine", rt.Radar)
     with pytest.raises(rt.InputError, match="cannot be called"):
-        rt.register_radar("yours", 3)  # type: ignore[arg-type]
+        rt.register_radar("yours", 3)
 
 
 class Wrong:
-    """A model that spoils what `analytic` gives."""
+    """A model that changes the result of `analytic`."""
 
     def __init__(self, radar: rt.Radar, body: rt.Body, *, spreading: bool, spoil: str) -> None:
         self._model, self._spoil = build_model("analytic", radar, body, spreading=spreading), spoil

@@ -1,4 +1,4 @@
-"""Extremes: the cases of ``validation/robustness/extremes.py``, each of which gives the right finite answer, a refusal or a warning."""
+"""Extremes of ``validation/robustness/extremes.py``: right finite answers, refusals or warnings."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ FOLDER = Path(__file__).resolve().parents[1] / "validation" / "robustness"
 
 
 def load(name: str) -> ModuleType:
-    """A script of the validation folder, which finds its neighbours as if it were run there."""
+    """A script of the validation folder, which finds its neighbours as if it ran there."""
     sys.path.insert(0, str(FOLDER))
     try:
         spec = importlib.util.spec_from_file_location(f"validation_{name}", FOLDER / f"{name}.py")

@@ -57,7 +57,8 @@ def test_a_run_into_such_a_folder_and_its_page(tmp_path: Path) -> None:
     radar = put(
         folder,
         b".toml",
-        "tx_y = 2\nrx_y = 2\ntx_z = 0\nrx_z = 0\nchirp_duration_s = 250e-6\nframe_duration_s = 0.05\n",
+        "tx_y = 2\nrx_y = 2\ntx_z = 0\nrx_z = 0\n"
+        "chirp_duration_s = 250e-6\nframe_duration_s = 0.05\n",
     )
     out, page = (os.path.join(folder, NAME + ending) for ending in (b"", b".html"))
     run = [

@@ -14,7 +14,13 @@ from rtradar.cli import main
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, check_place, write_json
 
-WRITE = "import sys; from rtradar.system.files import write_json; print('before'); write_json(sys.argv[1], {'a': 1}); print('after')"
+WRITE = """
+import sys
+from rtradar.system.files import write_json
+print('before')
+write_json(sys.argv[1], {'a': 1})
+print('after')
+"""
 
 
 @pytest.mark.skipif(not Path("/proc/self/fd").is_dir(), reason="needs /proc")
@@ -51,7 +57,7 @@ def test_what_is_no_file_is_not_replaced_by_one(tmp_path: Path) -> None:
 def test_a_place_where_no_json_can_be_is_found_out_before_the_work(
     tmp_path: Path, name: str, says: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # There is no such folder of clouds either, which would be told next.
+    # There is no such folder of clouds either, which would be reported next.
     for command in (
         ["doctor"],
         ["view", "nowhere"],

@@ -21,7 +21,7 @@ def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def ran(name: str, out: Path, cwd: Path, **more: str) -> tuple[str, Path]:
-    """What a script said, and its picture; only ``more`` says where recordings are."""
+    """Output of a script, and its picture; only ``more`` names a folder of recordings."""
     own = {key: value for key, value in os.environ.items() if key != "RTRADAR_MOCAP"}
     own |= {
         "MPLBACKEND": "agg",
@@ -42,7 +42,7 @@ def ran(name: str, out: Path, cwd: Path, **more: str) -> tuple[str, Path]:
 
 
 def is_blank(picture: Path) -> bool:
-    """Paper, axes and letters are grey, what is drawn has colour: a five-hundredth of the picture or more."""
+    """Paper, axes and letters are grey, and data are coloured: 0.2 % of the picture or more."""
     channels = np.asarray(Image.open(picture).convert("RGB"), dtype=np.int64)
     return bool((np.ptp(channels, axis=-1) > 40).mean() < 1 / 500)
 

@@ -1,4 +1,4 @@
-"""Folders that come from somebody else: whatever they hold, commands change nothing but what they write."""
+"""Folders from others: whatever they contain, commands change nothing but what they write."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def whole_run(
 
 @pytest.fixture
 def home(whole_run: Path, tmp_path: Path) -> Path:
-    """Somebody's home with documents, and in its downloads the folder of a run."""
+    """A home with documents, and the folder of a run among its downloads."""
     documents = tmp_path / "Documents"
     (documents / "thesis").mkdir(parents=True)
     (documents / "thesis" / "chapter.tex").write_text("years of work")
@@ -54,7 +54,7 @@ def home(whole_run: Path, tmp_path: Path) -> Path:
 
 
 def snapshot(folder: Path) -> dict[str, tuple[object, ...]]:
-    """Everything below a folder: what it is, what is in it, and which file of the disk it is."""
+    """Everything below a folder: its kind, its content, and its file on the disk."""
     found: dict[str, tuple[object, ...]] = {}
     for parent, folders, files in os.walk(folder):
         for name in (*folders, *files):
@@ -140,7 +140,7 @@ PLANTED = [plant_patterns, plant_link, plant_damage, plant_linked_work, plant_li
 def test_commands_that_read_change_nothing(
     home: Path, plant: object, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    plant(home / "Downloads" / "run")  # type: ignore[operator]
+    plant(home / "Downloads" / "run")
     before = snapshot(home)
     elsewhere = tmp_path_factory.mktemp("elsewhere")
     for words in reading_commands(home / "Downloads" / "run", elsewhere):
@@ -151,7 +151,7 @@ def test_commands_that_read_change_nothing(
 @pytest.mark.parametrize("plant", PLANTED)
 def test_a_run_into_such_a_folder_touches_nothing_outside(home: Path, plant: object) -> None:
     run = home / "Downloads" / "run"
-    plant(run)  # type: ignore[operator]
+    plant(run)
     before = snapshot(home / "Documents")
     planted = {name: what for name, what in snapshot(run).items() if name.startswith(".rtradar")}
     assert small_run(run) == 0

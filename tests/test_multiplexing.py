@@ -41,7 +41,7 @@ def radar(multiplexing: str, **changes: Any) -> rt.Radar:
         "channels": "all" if multiplexing == "ddm" else "pairs",
         "position_m": (0.0, 0.0, 0.0),
     }
-    made = rt.Radar(multiplexing=multiplexing, **(fields | changes))  # type: ignore[arg-type]
+    made = rt.Radar(multiplexing=multiplexing, **(fields | changes))
     return rt.Radar(**{**vars_of(made), "frame_duration_s": 192 * made.cycle_duration_s})
 
 
@@ -52,7 +52,7 @@ def vars_of(made: rt.Radar) -> dict[str, Any]:
 def point(
     made: rt.Radar, place: tuple[float, float, float], rate: float, amplitude: float = 1.0
 ) -> NDArray[np.complexfloating]:
-    """Rows of one window of a point that is at ``place`` in its middle and recedes at ``rate``; exact lengths."""
+    """Echoes of one frame of a point that is at ``place`` in its middle and recedes at ``rate``."""
     chirps = np.arange(made.chirps_per_frame)
     # Written out: when each chirp is on the air is what is tested.
     slots = chirps if made.multiplexing == "tdm" else chirps // made.n_tx
@@ -77,14 +77,14 @@ def echo(length: NDArray[np.float64], tx: NDArray[np.int64], amplitude: float = 
 
 
 def window(made: rt.Radar, rows: NDArray[np.complexfloating]) -> NDArray[np.complexfloating]:
-    """Through the receiver, and as the cube of one window."""
+    """The echoes through the receiver, as the cube of one frame."""
     spectra = range_spectrum(separate(receive(rows, made, 0), made, 0), made)
     return spectra.reshape(-1, made.n_tx, *spectra.shape[1:])
 
 
 @pytest.mark.parametrize("bands", [5, 8])
 def test_the_unambiguous_velocity(bands: int) -> None:
-    # lambda / (4 T), T the time until the same Tx transmits again: 62.5 us, times four under TDM.
+    # lambda / (4 T), where T is the time until a Tx transmits again: 62.5 us, or 4 times that.
     quarter = SPEED_OF_LIGHT_MPS / 14e9 / 4
     found = [radar("tdm"), radar("fdm"), radar("ddm", doppler_bands=bands)]
     assert [made.max_velocity_mps for made in found] == pytest.approx(
@@ -115,7 +115,7 @@ def test_a_moving_point_has_its_range_velocity_and_direction(
     assert velocity == pytest.approx(rate, abs=0.51 * made.velocity_bin_mps)
     parted = separate(receive(rows, made, 0), made, 0)
     found = angle(parted, made, made.range_m[row], velocity)
-    # A tenth of the beam of these short lines, some 7 degrees.
+    # A tenth of the beam of these short lines, about 7 degrees.
     assert np.degrees(found) == pytest.approx([14, -9], abs=0.7)
 
 
@@ -136,16 +136,16 @@ def test_what_is_too_fast_for_tdm_folds_there_and_nowhere_else(
 @pytest.mark.parametrize("multiplexing", ALL)
 def test_power_adds_up_over_the_channels(multiplexing: str) -> None:
     made = radar(multiplexing, tx_z=0, rx_z=0)
-    # On the middle of a bin of range and of velocity, broadside, so far off that no channel leaves the bin; at rest, for it
-    # would leave it too.
+    # In the middle of a bin of range and velocity, broadside, so far away that no channel leaves
+    # the bin; and at rest, because a moving point would leave it.
     place, amplitude = (128 * made.range_bin_m, 0.0, 0.0), 0.3
     rows = point(made, place, 0.0, amplitude)
     power = power_map(window(made, rows), made)
-    # Coherent gain 1 in every channel; 0.5 % for lengths that are not all quite those of the bin.
+    # Coherent gain 1 in every channel; 0.5 % because not all lengths are exactly those of the bin.
     assert power.max() == pytest.approx(made.n_channels * amplitude**2, rel=5e-3)
     row, column = np.unravel_index(power.argmax(), power.shape)
     assert (row, column - power.shape[1] // 2) == (128, 0)
-    # Beyond the skirts of the echo nothing is left: no copy.
+    # Beyond the skirts of the echo nothing is left, so there is no copy.
     beside = np.abs(np.arange(power.shape[1]) - column) > 12
     assert power[:, beside].max() < 1e-5 * power.max()
 
@@ -160,7 +160,7 @@ def test_the_sum_that_doppler_division_receives() -> None:
         cycle, tx = divmod(chirp, made.n_tx)
         expected[cycle] += np.exp(2j * np.pi * tx * (cycle + 5) / 7) * row
     np.testing.assert_allclose(received, expected, atol=1e-6)
-    # Of one Tx alone its row is what it sent, whatever the others would be.
+    # For one Tx alone, its row is what it sent, whatever the others would be.
     for tx in range(made.n_tx):
         alone = np.where((np.arange(len(rows)) % made.n_tx == tx)[:, None, None], rows, 0)
         again = separate(receive(alone, made, first), made, first)
@@ -263,7 +263,7 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
         chirp_duration_s=100e-6,
         samples_per_chirp=128,
         frame_duration_s=0.05,
-        multiplexing=multiplexing,  # type: ignore[arg-type]
+        multiplexing=multiplexing,
     )
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
     result = rt.run(motion, made, out=tmp_path / "out", fidelity="analytic", save_if=True, pfa=1e-9)
@@ -276,7 +276,8 @@ def test_a_run(tmp_path: Path, multiplexing: str) -> None:
             open_recording(tmp_path / "out")
     else:
         assert open_recording(tmp_path / "out").shape == (2000, 4, 4, 128)
-    # A walk's limbs, in a map that reaches to 54 m/s; where four Tx fade against each other, a copy may be taken for the echo.
+    # The limbs of a walk, in a map up to 54 m/s; where four Tx fade against each other, a copy may
+    # be taken for the echo.
     assert (np.abs(result.points[:, 2]) < 6.0).mean() > 0.99
 
 
@@ -319,7 +320,7 @@ def test_clutter_removal_is_refused_where_it_would_leave_copies() -> None:
 @pytest.mark.parametrize("multiplexing", ALL)
 def test_range_time_is_the_mean_power_of_a_channel(multiplexing: str) -> None:
     made = radar(multiplexing, tx_z=0, rx_z=0)
-    # At rest in the middle of bin 128, broadside; moving from chirp to chirp would spread what the Tx of DDM add up to.
+    # At rest in the middle of bin 128, broadside; motion between chirps would spread DDM.
     cube = window(made, point(made, (128 * made.range_bin_m, 0.0, 0.0), 0.0, 0.3))
     power, times = range_time(cube.reshape(-1, *cube.shape[2:]), made, step_s=made.frame_duration_s)
     assert power[0, 128] == pytest.approx(0.3**2, rel=5e-3)

@@ -1,6 +1,7 @@
-"""Every file that the command line is given, or finds in a folder that it is given, may be anything: one line says what is wrong.
+"""Every file that the command line reads may be anything: one line says what is wrong.
 
-Each input meets each kind of file that is none, or not the one that is meant. Nothing may wait, take all memory or show a
+This holds for files that are named and for those in folders that are named. Each input meets each
+kind of file that is none, or not the one that is meant. Nothing may wait, take all memory or show a
 traceback.
 """
 
@@ -31,19 +32,19 @@ from rtradar.system.files import open_regular, read_bytes
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="needs POSIX")
 
 HANGS_S = 30.0
-"""The slowest takes a second, most of it imports."""
+"""The slowest takes a second, most of it for imports."""
 
 Make = Callable[[Path], None]
 Words = list[str | Path]
 
 
 class Waits(BaseException):
-    """Not an error that a reader could take for one of its own, as TimeoutError is an OSError."""
+    """An error that no reader takes for one of its own, as TimeoutError is an OSError."""
 
 
 @contextmanager
 def guarded() -> Iterator[None]:
-    """What waits for ever is ended."""
+    """End what waits for ever."""
 
     def end(number: int, frame: FrameType | None) -> None:
         raise Waits(f"for more than {HANGS_S} s")
@@ -108,7 +109,7 @@ NAMES: dict[str, Callable[[str], str]] = {
 
 
 def one_line(words: Words, capfd: pytest.CaptureFixture[str]) -> str:
-    """What the command says of bad input."""
+    """Message of the command for bad input."""
     with guarded():
         status = main([os.fspath(word) for word in words])
     err = capfd.readouterr().err
@@ -116,7 +117,7 @@ def one_line(words: Words, capfd: pytest.CaptureFixture[str]) -> str:
     return err
 
 
-# -- files that the command line names --------------------------------------------------------------------------------
+# -- files that the command line names -------------------------------------------------------------
 
 GIVEN: dict[str, tuple[str, Callable[[str], Words]]] = {
     "a BVH": (".bvh", lambda path: ["run", path, "--out", "out"]),
@@ -162,7 +163,7 @@ end
 
 @pytest.fixture(scope="module")
 def imported() -> None:
-    """What is slow to import is, before time is taken."""
+    """Import what is slow to import before time is measured."""
     for name in (
         "torch",
         "matplotlib.pyplot",
@@ -174,7 +175,7 @@ def imported() -> None:
 
 @pytest.fixture
 def there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, imported: None) -> Iterator[Path]:
-    """An empty folder to be in, which stays as it is."""
+    """An empty working folder, which stays as it is."""
     (tmp_path / "good.asf").write_text(ASF)
     monkeypatch.chdir(tmp_path)
     yield tmp_path
@@ -208,12 +209,12 @@ def test_a_given_path_that_no_file_has(
     one_line(words(NAMES[name](ending)), capfd)
 
 
-# -- files in folders that the command line names ---------------------------------------------------------------------
+# -- files in folders that the command line names --------------------------------------------------
 
 
 @pytest.fixture(scope="module")
 def folders(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What commands read: a run, a scene with meshes, a data set, clouds and trainings."""
+    """Everything that commands read: a run, a scene, a data set, clouds and trainings."""
     pytest.importorskip("torch")
     from rtradar.classify.outcomes import HISTORY, Outcome, save_outcome
     from rtradar.classify.recipes import RECIPES
@@ -318,7 +319,7 @@ FINE = {
     ("set/scene.toml", "byte order mark"),
     ("set/radar.toml", "no bytes"),
     ("set/radar.toml", "byte order mark"),
-    # A part of the samples that is not there is zero, as zarr has it.
+    # A missing part of the samples is zero, as in zarr.
     ("run/if.zarr/c/0/0/0", "nothing"),
     ("run/if.zarr/c/0/0/0", "directory"),
 }
@@ -351,7 +352,7 @@ def test_a_checkpoint_that_is_something_else(tmp_path: Path, kind: str) -> None:
     assert len(str(caught.value).splitlines()) == 1
 
 
-# -- what they all use ------------------------------------------------------------------------------------------------
+# -- what they all use -----------------------------------------------------------------------------
 
 
 def test_what_is_opened_counts_not_what_had_the_name(

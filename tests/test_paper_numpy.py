@@ -1,4 +1,4 @@
-"""The paper's method in plain NumPy does the same work as the model `analytic-paper`, and as our CFAR with its multiplier."""
+"""The paper's method in plain NumPy against `analytic-paper` and our CFAR with its multiplier."""
 
 from __future__ import annotations
 

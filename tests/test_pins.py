@@ -1,4 +1,4 @@
-"""Versions are pinned: every package that rtradar brings, with all its extras, stands in constraints.txt."""
+"""Versions are pinned: constraints.txt has every package that rtradar and its extras need."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def plain(name: str) -> str:
 
 
 def needed() -> set[str]:
-    """All that is installed of what rtradar needs, and of what that needs."""
+    """All installed packages that rtradar needs, and those that they need."""
     found: set[str] = set()
     waiting = [("rtradar", "all")]
     while waiting:

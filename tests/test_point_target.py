@@ -1,8 +1,8 @@
-"""A point echo at a known place and velocity reads back: from lengths through IF and spectra to a cell of the map.
+"""A point echo at a known place and velocity reads back: from path lengths to a cell of the map.
 
-Where the power of all channels is summed, range and velocity are read as its centroid: in 0.1 s a point at 2 m/s goes
-through five range bins, and through as many Doppler bins from the low to the high end of the sweep, so the map has a
-plateau there and no peak to speak of.
+Where the power of all channels is summed, range and velocity are read as its centroid. In 0.1 s a
+point at 2 m/s crosses five range bins, and as many Doppler bins from the low to the high end of the
+sweep, so the map has a plateau there and no distinct peak.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ class Reading(NamedTuple):
 
 
 def point(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> tuple[Echoes, Radar, Array]:
-    """One window of a point that is at ``place`` in its middle; every length is exact at the centre of its chirp."""
+    """One frame of a point that is at ``place`` in its middle; lengths are exact at each chirp."""
     chirps = radar.chirps_per_frame
     times = radar.chirp_times(chirps)
     tx = radar.tx_of_chirp(np.arange(chirps))
@@ -69,16 +69,16 @@ def spectra(radar: Radar, place: ArrayLike, velocity: ArrayLike) -> Array:
 
 
 def centroid(power: Array, reach: int) -> float:
-    """Mean bin of the power within ``reach`` of its peak, across the ends of the axis where need be."""
+    """Mean bin of the power within ``reach`` bins of its peak; the axis is cyclic."""
     bins = power.argmax() + np.arange(-reach, reach + 1)
     weights = power[bins % len(power)]
     return float(weights @ bins / weights.sum())
 
 
 def read(radar: Radar, power: Array, range_m: float, velocity: float) -> Reading:
-    """Errors of a map (range, velocity) against this truth."""
+    """Errors of a map (range, velocity)."""
     cycles = radar.cycles_per_frame
-    # 12 bins beside the plateau: a Hann-windowed tone has 1e-6 of its power beyond.
+    # 12 bins beside the plateau: a tone with a Hann window has 1e-6 of its power beyond.
     reach = 12 + int(abs(velocity) * radar.frame_duration_s / radar.range_bin_m)
     true_range = range_m / radar.range_bin_m
     true_velocity = velocity / radar.velocity_bin_mps + cycles // 2
@@ -103,12 +103,13 @@ CASES += [(HIGH, TORSO, 0.0), (HIGH, TORSO, 2.0), (HIGH, LEFT, -2.0)]
 def test_a_point_reads_back(radar: Radar, place: tuple[float, ...], speed: float) -> None:
     range_m, direction = sight(radar, place)
     reading = read(radar, spectra(radar, place, speed * direction).sum(axis=2), range_m, speed)
-    # Measured 0.03 to 0.09 bins at 12 GHz, under 0.01 at 77 GHz: the mean way over an array of 0.5 m is longer than the
-    # one over its centre, and the middle of a DFT-even window lies half a cycle late.
+    # Measured 0.03 to 0.09 bins at 12 GHz, below 0.01 at 77 GHz: the mean path over an array of
+    # 0.5 m is longer than the one over its centre, and a DFT-even window's middle is half a cycle
+    # late.
     assert abs(reading.range_error) < 0.1
-    # Measured under 0.02 bins: the array again, and the wave that comes back is lower by the beat frequency (1e-4).
+    # Measured below 0.02 bins: the array, and the beat frequency, by which it is lower (1e-4).
     assert abs(reading.velocity_error) < 0.03
-    # The highest cell: the nearest one where the point stands, somewhere on the plateau of 5 bins where it moves.
+    # The highest cell is the nearest one for a point at rest, else on the plateau of 5 bins.
     assert abs(reading.peak_range_error) < (0.6 if speed == 0 else 1.1)
     assert abs(reading.peak_velocity_error) < 0.6
 
@@ -125,7 +126,7 @@ def test_a_walker_toward_the_radar_off_the_line_of_sight(radar: Radar) -> None:
 
 
 def test_every_channel_reads_the_way_of_its_own_antennas() -> None:
-    # A point that stands: half the path of that Tx and Rx, 96 different ones. 1e-3: beyond the ends of the centroid.
+    # A point at rest: half the path of its Tx and Rx, 96 different ones. 1e-3: the centroid's ends.
     place = np.array(LEFT)
     power = spectra(LOW, place, np.zeros(3))
     there, back = (np.linalg.norm(places - place, axis=1) for places in (LOW.tx, LOW.rx))
@@ -136,13 +137,13 @@ def test_every_channel_reads_the_way_of_its_own_antennas() -> None:
 
 
 def test_phases_of_the_channels_are_those_of_their_ways() -> None:
-    # At a range bin the phase belongs to the sweep centre; a sign or an order wrong anywhere in the array shows here.
+    # At a range bin the phase belongs to the sweep centre; any wrong sign or order shows here.
     place = np.array(LEFT)
     echoes, _, times = point(LOW, place, np.zeros(3))
     values = range_doppler(synthesize(echoes, LOW, times), LOW).values
     cell = np.unravel_index((np.abs(values) ** 2).sum(axis=2).argmax(), values.shape[:2])
     length = echoes.length[:12, :, 0].ravel()
-    # The window is even about sample 128, at the sweep centre; its bin turns by pi a bin from the first sample to there.
+    # The window is even about sample 128, at the sweep centre; before it, the phase is pi a bin.
     turns = length * LOW.centre_frequency_hz - length**2 * LOW.slope_hz_per_s / 2 / 299_792_458.0
     expected = np.exp(2j * np.pi * turns / 299_792_458.0)
     ratio = values[cell] / expected
@@ -152,7 +153,7 @@ def test_phases_of_the_channels_are_those_of_their_ways() -> None:
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
 @pytest.mark.parametrize("speed", [8.0, -8.0])
 def test_too_fast_aliases_to_its_known_place(radar: Radar, speed: float) -> None:
-    # A kick. 12 GHz: 8 - 2 x 7.14 = -6.28 m/s; 77 GHz: 8 - 2 x 6.32 = -4.65 m/s: receding reads as approaching.
+    # A kick at 12 GHz: 8 - 2 x 7.14 = -6.28 m/s; at 77 GHz: 8 - 2 x 6.32 = -4.65 m/s: approaching.
     range_m, direction = sight(radar, TORSO)
     seen = speed - np.sign(speed) * 2 * radar.max_velocity_mps
     assert seen == pytest.approx(
@@ -163,5 +164,5 @@ def test_too_fast_aliases_to_its_known_place(radar: Radar, speed: float) -> None
     cycles = radar.cycles_per_frame
     wrapped = (reading.velocity_error + cycles / 2) % cycles - cycles / 2
     assert abs(wrapped) < 0.1  # measured 0.05: four times that at 2 m/s
-    # In range it is where it is, over the 21 bins that it goes through: measured 0.13 bins, half a cycle late.
+    # Its range is right over the 21 bins that it crosses: measured 0.13 bins, half a cycle late.
     assert abs(reading.range_error) < 0.2

@@ -1,4 +1,4 @@
-"""The radar against the paper's Tables 1 and 2, by the physics and as the paper has them; its array and schedule."""
+"""The radar against the paper's Tables 1 and 2, by physics and as in the paper; its schedule."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from rtradar.radar import Radar
 
 LOW, HIGH = Radar.preset("paper-12ghz"), Radar.preset("paper-77ghz")
 ROUNDING = 1e-12
-"""Relative: a handful of float64 operations."""
+"""Relative error of a handful of float64 operations."""
 
 
 def approx(value: float, rel: float = ROUNDING) -> Any:
     return pytest.approx(value, rel=rel, abs=0)
 
 
-# -- the paper's tables ----------------------------------------------------------------------------------------------
+# -- the paper's tables ----------------------------------------------------------------------------
 
 
 def test_table_1() -> None:
@@ -77,24 +77,24 @@ def test_table_2_by_the_physics(
     assert radar.velocity_bin_mps == approx(bin_mps, digits)
     assert radar.angle_resolution_deg == approx(beam_deg, digits)
     assert radar.max_angle_deg == approx(angle_deg, digits)
-    # Range knows the bandwidth only: 3.75 cm and 9.6 m.
+    # Range depends on the bandwidth only: 3.75 cm and 9.6 m.
     assert radar.range_bin_m == approx(0.037474, digits)
     assert radar.max_range_m == approx(9.5934, digits)
 
 
 def test_table_2_as_the_paper_has_it() -> None:
-    # The paper: c = 3e8, the start wavelength, and 0.1 s for the time of 133 cycles (its eqs 1 to 6).
+    # The paper: c = 3e8, the start wavelength, and 0.1 s for 133 cycles (its eqs 1 to 6).
     c, start_hz, chirp_s, frame_s, virtual = 3e8, 12e9, 62.5e-6, 0.1, 48
     wavelength = c / start_hz
     rounded = 2e-3  # the paper's two or three digits
     assert c * 4.096e6 / (2 * 6.4e13) == approx(9.6, rounded)
     assert wavelength / (4 * 12 * chirp_s) == approx(8.33, rounded)
     assert wavelength / (2 * frame_s) == approx(0.125, rounded)
-    # 2 asin(1/48) is 2.387; the paper cuts off and writes 2.38.
+    # 2 asin(1/48) is 2.387; the paper truncates it to 2.38.
     assert math.degrees(2 * math.asin(wavelength / (2 * virtual * (wavelength / 2)))) == approx(
         2.38, 5e-3
     )
-    # Ours from theirs: the sweep centre instead of its start, and the whole cycles instead of 0.1 s.
+    # Ours from theirs: the centre of the sweep instead of its start, whole cycles instead of 0.1 s.
     exact_c = SPEED_OF_LIGHT_MPS / c
     centre = exact_c * 12 / 14
     assert LOW.max_range_m == approx(exact_c * 9.6)
@@ -103,7 +103,7 @@ def test_table_2_as_the_paper_has_it() -> None:
     assert LOW.velocity_bin_mps == approx(
         centre * wavelength / (2 * frame_s) * frame_s / (133 * 12 * chirp_s)
     )
-    # The paper's +-90 deg needs half a wavelength between receivers; at the centre of the sweep it is 0.583.
+    # The paper's +-90 deg needs half a wavelength between receivers; at mid-sweep it is 0.583.
     assert math.sin(math.radians(LOW.max_angle_deg)) == approx(12 / 14)
 
 
@@ -115,7 +115,7 @@ def test_a_single_channel_has_no_angle_resolution() -> None:
     assert Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=1).angle_resolution_deg == 180.0
 
 
-# -- the array -------------------------------------------------------------------------------------------------------
+# -- the array -------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
@@ -205,7 +205,7 @@ def test_pairs_of_other_arrays(lines: dict[str, int], expected: list[list[int]])
     assert radar.n_rx == len(expected[0])
 
 
-# -- the schedule ----------------------------------------------------------------------------------------------------
+# -- the schedule ----------------------------------------------------------------------------------
 
 
 def test_chirp_times_are_centres() -> None:
@@ -222,7 +222,8 @@ def test_transmitters_take_turns() -> None:
 @pytest.mark.parametrize(
     ("radar", "chirps", "cycles_per_hop", "last_start"),
     [
-        # 3 s. 12 GHz: 4000 cycles of 0.75 ms, 133 a window, so the last may start at 3867; 116 x 33.33 = 3866.7 does.
+        # 3 s at 12 GHz: 4000 cycles of 0.75 ms, 133 a frame, so the last may start at 3867, and
+        # 116 x 33.33 = 3866.7 does.
         # 77 GHz: 20 000 cycles of 0.15 ms, 666 a window: 19 334; 116 x 166.67 = 19 333.3 does.
         (LOW, 48_000, Fraction(100, 3), 3867),
         (HIGH, 240_000, Fraction(500, 3), 19_333),

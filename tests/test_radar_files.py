@@ -1,4 +1,4 @@
-"""Radars from files and by name, and values that mean nothing: refused in one line."""
+"""Radars from files and by name; values without meaning are refused in one line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from rtradar.radar import PRESETS, Radar
 
 
 def refusal(call: Any, *args: Any, **values: Any) -> str:
-    """What an `InputError` says, which is one line."""
+    """Message of an `InputError`, which is one line."""
     with pytest.raises(InputError) as caught:
         call(*args, **values)
     message = str(caught.value)
@@ -199,12 +199,13 @@ def test_values_far_outside_are_refused_in_one_short_line(
 
 
 def test_numpy_scalars_do_as_well() -> None:
-    radar = Radar(bandwidth_hz=np.float32(2e9), tx_y=np.int64(3), position_m=np.array([-4, 1, 1]))  # type: ignore[arg-type]
+    lengths = {"bandwidth_hz": np.float32(2e9), "position_m": np.array([-4, 1, 1])}
+    radar = Radar(tx_y=np.int64(3), **lengths)
     assert (type(radar.bandwidth_hz), type(radar.tx_y)) == (float, int)
     assert radar.position_m == (-4.0, 1.0, 1.0)
     assert all(type(value) is float for value in radar.position_m)
-    fdm = Radar(multiplexing="fdm", carrier_step_hz=np.float32(5e6))  # type: ignore[arg-type]
-    ddm = Radar(multiplexing="ddm", channels="all", doppler_bands=np.int64(16))  # type: ignore[arg-type]
+    fdm = Radar(multiplexing="fdm", carrier_step_hz=np.float32(5e6))
+    ddm = Radar(multiplexing="ddm", channels="all", doppler_bands=np.int64(16))
     assert (type(fdm.carrier_step_hz), type(ddm.doppler_bands)) == (float, int)
 
 

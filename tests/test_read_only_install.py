@@ -1,4 +1,4 @@
-"""Where neither the package nor a home can be written, all commands work, and one line says what it costs."""
+"""Where neither the package nor a home can be written, all commands work, with a line of advice."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ if __name__ == "__main__":
 
 @pytest.fixture
 def read_only(tmp_path: Path) -> Command:
-    """Python from a copy of the package, by somebody who may write neither it nor a home, but the folder he is in."""
+    """Python from a copy of the package, by a user who may write to his working folder alone."""
     install, work = tmp_path / "install", tmp_path / "work"
     shutil.copytree(
         Path(rtradar.__file__).parent,
@@ -63,7 +63,7 @@ def read_only(tmp_path: Path) -> Command:
     for folder in [install, *(path for path in install.rglob("*") if path.is_dir())]:
         folder.chmod(0o555)
     (work / "compiles_two.py").chmod(0o444)
-    # Root writes everywhere, unless he gives up the right to.
+    # Root may write everywhere, unless he gives up this right.
     right = "-dac_override,-dac_read_search"
     without = (
         ["setpriv", f"--bounding-set={right}", f"--inh-caps={right}"]

@@ -42,7 +42,7 @@ def test_settings_cannot_be_changed_and_keep_a_copy_of_the_model_options() -> No
     options["shadow_rays"] = 1
     assert settings.model_options == {"shadow_rays": 256}
     with pytest.raises(dataclasses.FrozenInstanceError):
-        settings.pfa = 0.5  # type: ignore[misc]
+        settings.pfa = 0.5
 
 
 def test_the_summary_lists_every_setting_but_those_that_it_has_one_level_up() -> None:

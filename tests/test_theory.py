@@ -1,4 +1,4 @@
-"""The page of theory and the docstrings: what is cited exists, what stands there is cited, and the code holds to it."""
+"""The page of theory and the docstrings: citations exist and are used, and the code agrees."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ RADAR = rt.Radar(tx_y=2, tx_z=0, rx_y=3, rx_z=0, samples_per_chirp=64)
 
 @cache
 def citations() -> Counter[str]:
-    """Labels that docstrings of the package cite, and how often."""
+    """Labels that docstrings of the package cite, with their number."""
     cited: Counter[str] = Counter()
     for path in (ROOT / "rtradar").rglob("*.py"):
         source = path.read_text(encoding="utf-8")
@@ -49,12 +49,12 @@ def test_every_equation_is_cited() -> None:
     assert sorted(set(LABELS) - set(citations())) == []
 
 
-# The equations as the page has them, written down once more and asked of the code. What has a closed form elsewhere in the tests
-# is not asked again.
+# The equations of the page, written down once more and compared with the code, except for those
+# whose closed form other tests have.
 
 
 def test_if_signal_and_its_spectrum() -> None:
-    """(if-signal) from (chirp): the sweep times the conjugate of itself, late; (received-spectrum) has the conjugate phase."""
+    """(if-signal) from (chirp): sweep times delayed conjugate; (received-spectrum): conjugate."""
     length, amplitude = 3.1, 0.4 - 0.3j
     echoes = rt.Echoes(
         length=np.full((1, 1, 1), length),
@@ -122,7 +122,7 @@ def test_radii_and_cross_section_of_an_ellipsoid() -> None:
 
 
 def test_mirror_return_of_a_sphere_near_by() -> None:
-    """(mirror-matrix) of a sphere and one antenna: both entries 2/R + 2/a, as the curvature of the wave and of the sphere."""
+    """(mirror-matrix) of a sphere and one antenna: 2/R + 2/a, curvatures of wave and sphere."""
     radius, distance = 0.3, 2.0
     sphere = rt.Ellipsoids(np.zeros((1, 3)), np.eye(3)[None], np.full((1, 3), radius))
     antenna, k = np.array([[distance, 0.0, 0.0]]), 2 * np.pi * 77e9 / SPEED_OF_LIGHT_MPS
@@ -132,7 +132,7 @@ def test_mirror_return_of_a_sphere_near_by() -> None:
         2 * np.sqrt(np.pi) / h * (distance / way) ** 2 * np.exp(-1j * k * (2 * way - 2 * distance))
     )
     got = rt.scattering_length(sphere, antenna, antenna, 77e9, "specular", variant="scalar")
-    # A phase of 1000 radians, of which a double keeps 1e-13; the visibility is that of a mesh, and 1 here.
+    # A phase of 1000 radians, of which float64 keeps 1e-13; the visibility of the mesh is 1.
     assert got[0] == pytest.approx(expected, rel=1e-9)
 
 
@@ -152,7 +152,7 @@ def test_spheres(method: str, tolerance: float) -> None:
 
 
 def test_mean_of_a_phase_over_a_triangle() -> None:
-    """(facet) against quadrature over the triangle: what the facets' code sums is judged in its own tests."""
+    """(facet) against quadrature over the triangle; the sum over facets has tests of its own."""
     phases = np.array([0.3, 2.1, -1.7])
     others = [[1, 2], [0, 2], [0, 1]]
     closed = 2 * sum(

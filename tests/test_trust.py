@@ -1,4 +1,4 @@
-"""Files of strangers: nothing in them is run, leads elsewhere, or takes more than it may."""
+"""Files from strangers: nothing in them runs, leads elsewhere, or takes more than it may."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from rtradar.scene import Scene
 SOURCES = sorted(Path(rtradar.__file__).parent.rglob("*.py"))
 SAMPLE = Sample(np.arange(6.0).reshape(2, 3), "walk", {"subject": "she"})
 
-# -- pickles -----------------------------------------------------------------------------------------------------------
+# -- pickles ---------------------------------------------------------------------------------------
 
 
 def calls_of(tree: ast.AST) -> list[tuple[str, dict[str, Any]]]:
@@ -160,7 +160,7 @@ def test_a_pickle_for_a_checkpoint_is_not_run(tmp_path: Path) -> None:
     assert not harm.exists()
 
 
-# -- sizes -------------------------------------------------------------------------------------------------------------
+# -- sizes -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("shape", [(10**12, 3), (2**62, 3), (1, 3, 10**9)])
@@ -232,9 +232,17 @@ def test_deep_nesting_is_refused(tmp_path: Path, name: str) -> None:
         reader(tmp_path if name == "collection.json" else tmp_path / name)
 
 
-# -- ways out of the folder ----------------------------------------------------------------------------------------------
+# -- paths out of the folder -----------------------------------------------------------------------
 
-SPEC = '[windows]\nduration_s = 0.1\n[[recordings]]\nfile = "{file}"\nlabel = "walk"\nsubject = "she"\nlicence = "CC0"\n'
+SPEC = """
+[windows]
+duration_s = 0.1
+[[recordings]]
+file = "{file}"
+label = "walk"
+subject = "she"
+licence = "CC0"
+"""
 
 
 @pytest.mark.parametrize("identity", ["../b", "/etc/passwd", "a/b", "", ".", "a\\b", "a.b"])
@@ -286,7 +294,7 @@ def test_an_environment_variable_allows_its_folder_and_no_other(
             read_spec(path)
 
 
-# -- whatever the bytes ----------------------------------------------------------------------------------------------------
+# -- whatever the bytes ----------------------------------------------------------------------------
 
 BVH = (
     BVH_HEAD
@@ -295,8 +303,10 @@ BVH = (
 )
 AMC = ":DEGREES\n1\nroot 1 2 3 0 0 0\nfirst 0 0 0\n2\nroot 1 2 3 0 90 0\nfirst 0 0 450\n"
 ASF = (
-    ":units\nlength 0.45\nangle deg\n:root\norder TX TY TZ RX RY RZ\naxis XYZ\nposition 0 0 0\norientation 0 0 0\n:bonedata\n"
-    "begin\nname first\ndirection 0 1 0\nlength 10\naxis 0 0 0 XYZ\ndof rx ry rz\nend\n:hierarchy\nbegin\nroot first\nend\n"
+    ":units\nlength 0.45\nangle deg\n:root\norder TX TY TZ RX RY RZ\naxis XYZ\n"
+    "position 0 0 0\norientation 0 0 0\n"
+    ":bonedata\nbegin\nname first\ndirection 0 1 0\nlength 10\naxis 0 0 0 XYZ\ndof rx ry rz\nend\n"
+    ":hierarchy\nbegin\nroot first\nend\n"
 )
 TOML = 'name = "x"\nsamples_per_chirp = 128\nposition_m = [-4.0, 1.0, 1.0]\n'
 HOSTILE = st.sampled_from(

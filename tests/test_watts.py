@@ -1,6 +1,6 @@
 """Powers in watts against the radar equation, written out, and noise against kTBF.
 
-Powers are far below the absolute tolerance that `pytest.approx` has unless told otherwise, so all name ``abs=0``.
+Powers are far below the default absolute tolerance of `pytest.approx`, so all tests set ``abs=0``.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def test_noise_is_ktbf() -> None:
 def test_the_receiver_adds_its_noise_whatever_the_antennas_see(
     figure_db: float, antenna_k: float
 ) -> None:
-    # The definition of the noise figure: the receiver adds F - 1 times the noise of a source at 290 K (Friis 1944).
+    # The noise figure is defined for a source of 290 K: the receiver adds F - 1 (Friis 1944).
     radar = dataclasses.replace(RADAR, noise_figure_db=figure_db, noise_temperature_k=antenna_k)
     received = 1.380649e-23 * antenna_k * 512e3
     added = 1.380649e-23 * 290 * (10 ** (figure_db / 10) - 1) * 512e3
@@ -114,7 +114,8 @@ def test_a_run_by_watts(tmp_path: Path) -> None:
     assert second["noise_power_m2"] == pytest.approx(first["noise_power_m2"] / 10, rel=1e-12, abs=0)
     with h5py.File(tmp_path / "a" / "maps.h5") as file:
         floor = float(np.median(file["range_doppler"][0])) * RADAR.watts_per_m2
-    # Hann in both transforms, four channels: 1.5^2 / (128 samples x 200 cycles); the median of Gamma(4) is 0.918 of its mean.
+    # Hann in both transforms, four channels: 1.5^2 / (128 samples x 200 cycles); the median of
+    # Gamma(4) is 0.918 of its mean.
     expected = 4 * RADAR.noise_power_w * 1.5**2 / (128 * 200) * 0.918
     assert floor == pytest.approx(expected, rel=0.05, abs=0)
 
@@ -153,4 +154,4 @@ def test_what_is_missing_is_said_before_the_work(
 )
 def test_powers_without_meaning(field: str, value: object) -> None:
     with pytest.raises(rt.InputError, match=f"{field} = .*must lie between"):
-        rt.Radar(**{field: value})  # type: ignore[arg-type]
+        rt.Radar(**{field: value})

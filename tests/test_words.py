@@ -1,4 +1,4 @@
-"""Texts and names use the words of the field, not the home-made words that this project once had."""
+"""Texts and names use the words of the field, and not words that this project once made up."""
 
 from __future__ import annotations
 
