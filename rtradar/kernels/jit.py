@@ -1,8 +1,7 @@
-"""How Numba compiles loops: on first use, kept on disk for every later one, and no slower than need be."""
+"""How Numba compiles loops: on first use, and kept on disk for every later one."""
 
 from __future__ import annotations
 
-import gc
 import multiprocessing
 import warnings
 from collections.abc import Callable
@@ -11,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numba import njit, types
-from numba.core import event
 from numba.core.caching import CompileResultCacheImpl, IndexDataCacheFile, NullCache
 from numba.extending import register_jitable
 
@@ -21,7 +19,7 @@ _Function = Callable[..., Any]
 
 
 class CacheWarning(UserWarning):
-    """Compiled code cannot be kept on disk: what is done is right, but the next process compiles again."""
+    """Compiled code cannot be kept on disk: results are right, but every process compiles again."""
 
 
 def compiled(
@@ -29,20 +27,16 @@ def compiled(
 ) -> Callable[[_Function], _Function]:
     """Compile a function that Python calls.
 
-    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code is loaded again for as long as
-    all that went into it is the same, functions and constants of other modules included. Where it cannot be kept, a
-    `CacheWarning` says so once.
+    It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code
+    is loaded again as long as all that went into it is the same, functions and constants of other
+    modules included. Where it cannot be kept, a `CacheWarning` says so once.
 
     Parameters
     ----------
     parallel : bool
-        Whether Numba shares its ``prange`` among threads.
+        Whether Numba distributes its ``prange`` among threads.
     fastmath : bool or set of str
         Liberties that LLVM may take with floating point: all of them, or those named.
-
-    Returns
-    -------
-    decorator
     """
     numba_decorator: Callable[[_Function], Any] = njit(
         nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
@@ -52,26 +46,17 @@ def compiled(
         dispatcher = numba_decorator(function)
         if hasattr(dispatcher, "compile"):  # not so with NUMBA_DISABLE_JIT
             dispatcher._cache = _CodeOnDisk(dispatcher)
-            dispatcher.compile = _with_room(dispatcher.compile)
         return dispatcher
 
     return decorator
 
 
 def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Function]:
-    """Have a function compiled into each compiled one that calls it; called by Python it is plain Python.
+    """Compile a function into each compiled one that calls it; called by Python it is plain Python.
 
-    Nothing is made that only Python or a later process would use, which takes time. And only what is taken in rounds alike
-    whether its caller was just compiled or comes from disk.
-
-    Parameters
-    ----------
-    fastmath : bool or set of str
-        As of `compiled`, for what this function does.
-
-    Returns
-    -------
-    decorator
+    Nothing is compiled that only Python or a later process would use. And only inlined code rounds
+    alike whether its caller was just compiled or comes from disk. ``fastmath`` is that of
+    `compiled`, for what this function does.
     """
     options = {"forceinline": True, "error_model": "numpy", "fastmath": fastmath}
     numba_decorator: Callable[[_Function], _Function] = register_jitable(**options)
@@ -87,38 +72,21 @@ def inlined(*, fastmath: bool | set[str] = False) -> Callable[[_Function], _Func
 def on_cache_lines(count, like):
     """An array (count,) of the kind of ``like`` that begins where a cache line does.
 
-    From elsewhere, every load of 64 bytes would touch two lines.
+    From elsewhere, every load of 64 bytes would touch two lines: the prime-factor DFT then takes
+    1.17 to 1.34 times as long, the tone sum 1.11 to 1.25 (`validation/cost/alignment.py`).
     """
     store = np.empty(count + 64 // like.itemsize, dtype=like.dtype)
     begin = (-store.ctypes.data % 64) // like.itemsize
     return store[begin : begin + count]
 
 
-_ROOM = 2**16 + 2**10
-"""Places of a frame: with a few more than half a megabyte it gets a chunk of one, and leaves the rest to what it calls."""
-
-
-def _with_room(call: _Function) -> _Function:
-    """Call it where Python has room for the frames of what it calls.
-
-    CPython keeps frames in chunks of 16 KB. A recursion to and fro across the end of one, as that of Numba's compiler, has the
-    next chunk mapped and unmapped by the system each time; a frame too large for such a chunk gets a larger one.
-    """
-
-    def in_a_chunk_of_its_own(*arguments: Any) -> Any:
-        return call(*arguments)
-
-    in_a_chunk_of_its_own.__code__ = in_a_chunk_of_its_own.__code__.replace(co_stacksize=_ROOM)
-    return in_a_chunk_of_its_own
-
-
 class _CodeOnDisk(NullCache):
-    """Machine code of one function on disk. Numba asks for it before it compiles, and hands over what it has compiled.
+    """Machine code of one function on disk, which Numba loads from here and saves here.
 
-    Numba's own cache looks only at the file in which a function stands, not at what the function takes in from others. Here code
-    is kept under the function's stamp (`code_stamp`), taken whenever code is needed. Places and formats are Numba's.
-
-    Whatever goes wrong, be it a damaged file, a full disk or a Numba that does this otherwise, the function is compiled.
+    Numba's own cache checks only the file of a function, not what is inlined into it from others.
+    Here code is kept under the function's stamp (`code_stamp`), taken whenever code is needed, in
+    the folders and formats of Numba. Whatever goes wrong, be it a damaged file, a full disk or
+    another version of Numba, the function is compiled.
     """
 
     def __init__(self, dispatcher: Any) -> None:
@@ -129,13 +97,12 @@ class _CodeOnDisk(NullCache):
 
     @cached_property
     def _format(self) -> Any:
-        """Where this function's code is kept, and how it is written; None where no folder can be written."""
+        """Folder and format of this function's code; None where no folder can be written."""
         try:
             return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
         except Exception as error:
-            self._tell(
-                "no folder for it can be written" if "no locator available" in str(error) else error
-            )
+            no_folder = "no locator available" in str(error)
+            self._warn("no folder for it can be written" if no_folder else error)
             return None
 
     @property
@@ -149,13 +116,11 @@ class _CodeOnDisk(NullCache):
             found = None if file is None else file.load(self._key(sig))
             if found is None:
                 return None
-            # Processes that compile for other arguments, or from another text, may have written the same file at the same time.
+            # Processes that compile for other arguments, or another text, may have written it, too.
             stamp, arguments, code = found
-            return (
-                self._format.rebuild(target_context, code)
-                if (stamp, arguments) == (self._stamp, sig)
-                else None
-            )
+            if (stamp, arguments) != (self._stamp, sig):
+                return None
+            return self._format.rebuild(target_context, code)
         except Exception:  # a damaged file raises almost anything
             return None
 
@@ -174,10 +139,10 @@ class _CodeOnDisk(NullCache):
                 file.flush()
                 file.save(self._key(sig), entry)
         except Exception as error:
-            self._tell(error)
+            self._warn(error)
 
     def has_code(self) -> bool:
-        """Whether there is code of the function as it stands now."""
+        """Whether there is code of the function as it is now."""
         file = self._take_stamp()
         try:
             return file is not None and bool(file._load_index())
@@ -185,7 +150,7 @@ class _CodeOnDisk(NullCache):
             return False
 
     def _take_stamp(self) -> Any:
-        """File of the function as it stands now; None where it has none."""
+        """File of the function as it is now; None where it has none."""
         self._file = None
         if self._format is not None:
             try:
@@ -196,51 +161,43 @@ class _CodeOnDisk(NullCache):
                     source_stamp=self._stamp,
                 )
             except Exception as error:
-                self._tell(error)
+                self._warn(error)
         return self._file
 
     def _key(self, sig: Any) -> Any:
         return sig, self._dispatcher.targetctx.codegen().magic_tuple()
 
-    def _tell(self, why: object) -> None:
-        """Tell once a process that code is not kept. Of workers, the process that starts them tells."""
-        global _told
-        told = why.strerror if isinstance(why, OSError) and why.strerror else str(why)
-        self.trouble = " ".join(told.split()) or type(why).__name__
-        if not _told and multiprocessing.parent_process() is None:
-            _told = True
-            warnings.warn(
-                f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}",
-                CacheWarning,
-                stacklevel=2,
-            )
+    def _warn(self, why: object) -> None:
+        """Warn once that code is not kept, in the process that starts workers and not in them."""
+        global _warned
+        text = why.strerror if isinstance(why, OSError) and why.strerror else str(why)
+        self.trouble = " ".join(text.split()) or type(why).__name__
+        if not _warned and multiprocessing.parent_process() is None:
+            _warned = True
+            text = f"compiled code is not kept ({self.trouble}); {CACHE_ADVICE}"
+            warnings.warn(text, CacheWarning, stacklevel=2)
 
 
-_told = False
+_warned = False
 
-CACHE_ADVICE = "every process compiles anew, for a minute or so: name a folder that can be written in NUMBA_CACHE_DIR"
+CACHE_ADVICE = (
+    "every process compiles anew, for a minute or so: name a folder that can be written in "
+    "NUMBA_CACHE_DIR"
+)
 """What it means that compiled code is not kept, and what helps."""
 
 
 def is_on_disk(function: _Function) -> bool:
-    """Whether any process here has compiled it before, or none can do so for this one.
+    """Whether any process here has compiled a function before, or none can do so for this one.
 
-    Parameters
-    ----------
-    function : callable
-        Made by `compiled`.
-
-    Returns
-    -------
-    bool
-        True, too, where code is not kept and where nothing is compiled (``NUMBA_DISABLE_JIT``).
+    True, too, where code is not kept and where nothing is compiled (``NUMBA_DISABLE_JIT``).
     """
     cache = getattr(function, "_cache", None)
     return not isinstance(cache, _CodeOnDisk) or cache.cache_path is None or cache.has_code()
 
 
 def check_cache() -> None:
-    """Tell by a `CacheWarning` where no folder for compiled code can be written: before workers start, which tell nothing."""
+    """Warn where no folder for compiled code can be written, before workers start, which do not."""
     is_on_disk(compiled()(_increment))
 
 
@@ -249,10 +206,8 @@ def try_cache() -> tuple[str, str]:
 
     Returns
     -------
-    finding : str
-        Where code is kept, or why it is not.
-    advice : str
-        What to do about it; empty where all is well.
+    finding, advice : str
+        Where code is kept, or why it is not; and what to do about it, empty where all is well.
     """
     dispatcher: Any = compiled()(_increment)
     if not hasattr(dispatcher, "compile"):
@@ -275,28 +230,3 @@ def try_cache() -> tuple[str, str]:
 
 def _increment(number):
     return number + 1
-
-
-class _CollectorAtRest(event.Listener):
-    """Python's garbage collector rests while Numba compiles.
-
-    Compiling makes so many objects that the collector would go through all of Numba's own again and again.
-    """
-
-    def __init__(self) -> None:
-        self._depth, self._was_on = 0, False
-
-    # One thread compiles at a time, by Numba's lock; what a function calls is compiled meanwhile.
-    def on_start(self, _: event.Event) -> None:
-        if self._depth == 0:
-            self._was_on = gc.isenabled()
-            gc.disable()
-        self._depth += 1
-
-    def on_end(self, _: event.Event) -> None:
-        self._depth -= 1
-        if self._depth == 0 and self._was_on:
-            gc.enable()
-
-
-event.register("numba:compile", _CollectorAtRest())  # type: ignore[no-untyped-call]

@@ -1,20 +1,16 @@
-"""How loops are compiled: zero as NumPy divides by it, functions that are taken in, and Python's collector meanwhile."""
+"""How loops are compiled: division by zero, inlined functions, and code that is kept on disk."""
 
 import errno
-import gc
 import math
 import os
-import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numba import config
-from numba.core import event
 from numba.core.caching import NullCache
-from numba.core.errors import TypingError
 
 import rtradar.kernels.jit as compiling
 from rtradar.kernels.jit import (
@@ -41,13 +37,6 @@ def uncached(function: Callable[..., Any]) -> Any:
     made: Any = compiled()(function)
     made._cache = NullCache()
     return made
-
-
-@pytest.fixture(params=[True, False])
-def collector(request: pytest.FixtureRequest) -> Iterator[bool]:
-    (gc.enable if request.param else gc.disable)()
-    yield request.param
-    gc.enable()
 
 
 def test_dividing_by_zero_raises_nothing() -> None:
@@ -85,7 +74,7 @@ def test_trouble_with_the_disk_is_told_once(
         )
 
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling, "_warned", False)
     monkeypatch.setattr(compiling.IndexDataCacheFile, "save", full)
     with pytest.warns(
         CacheWarning,
@@ -103,7 +92,7 @@ def test_another_numba_may_keep_code_otherwise(
         raise TypeError("an argument is missing")
 
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
-    monkeypatch.setattr(compiling, "_told", False)
+    monkeypatch.setattr(compiling, "_warned", False)
     monkeypatch.setattr(compiling, part, changed)
     with pytest.warns(CacheWarning, match="an argument is missing"):
         assert compiled()(double)(2.0) == 4.0
@@ -116,59 +105,3 @@ def test_the_cache_is_tried(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert (finding.startswith(f"kept, for one in {tmp_path}"), advice) == (True, "")
     monkeypatch.setattr(compiling.IndexDataCacheFile, "load", lambda *_: None)
     assert try_cache()[0] == "not kept: what was written could not be loaded again"
-
-
-def test_the_collector_is_afterwards_as_it_was(collector: bool) -> None:
-    uncached(lambda number: half(number) + 1)(3.0)
-    assert gc.isenabled() == collector
-
-
-def test_the_collector_is_as_it_was_after_what_cannot_be_compiled(collector: bool) -> None:
-    with pytest.raises(TypingError):
-        uncached(lambda number: half(number).nothing)(3.0)
-    assert gc.isenabled() == collector
-
-
-def test_the_collector_rests_meanwhile() -> None:
-    runs: list[str] = []
-
-    def note(phase: str, _: object) -> None:
-        runs.append(phase)
-
-    gc.collect()
-    gc.callbacks.append(note)
-    try:
-        uncached(lambda number: max(half(number), number * 3) + 2)(3.0)
-    finally:
-        gc.callbacks.remove(note)
-    # Thousands of objects are made, and every 700 would start it; afterwards it starts once.
-    assert runs.count("start") <= 1
-
-
-def test_compiling_has_room_for_frames() -> None:
-    resource = pytest.importorskip("resource")
-
-    def faults_of_calls_from(depth: int) -> int:
-        """Pages that the system maps while a function is called a thousand times from under so many frames."""
-        if depth:
-            return faults_of_calls_from(depth - 1)
-        before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
-        for _ in range(1000):
-            double(1.0)
-        return int(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
-
-    found: list[int] = []
-
-    class Watch(event.Listener):
-        def on_start(self, _: event.Event) -> None:
-            found.extend(faults_of_calls_from(depth) for depth in range(200))
-
-        def on_end(self, _: event.Event) -> None: ...
-
-    # A thread's frames begin in a chunk of their own; otherwise its end is at one of these depths, where each call maps a page.
-    with event.install_listener("numba:compile", Watch()):
-        compiling = threading.Thread(target=uncached(double), args=(2.0,))
-        compiling.start()
-        compiling.join()
-    assert len(found) == 200
-    assert max(found) < 1000
