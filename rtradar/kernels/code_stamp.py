@@ -31,7 +31,7 @@ _LIBRARIES = {"builtins", "cmath", "math", "numba", "numpy"}
 each file that of Python."""
 
 _FLAGS = "OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML"
-"""Settings of Numba, by environment variables, that change its code and that its cache overlooks."""
+"""Settings of Numba, by environment variables, that change its code but not its cache."""
 
 _CODE = (
     *("co_argcount", "co_kwonlyargcount", "co_varnames", "co_names", "co_freevars", "co_cellvars"),

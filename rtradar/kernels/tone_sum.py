@@ -234,7 +234,7 @@ def _take(tones, chirp, receiver, store, received):
 
 @compiled(fastmath={"contract"})
 def add_tones(begin, end, tones, tables, out):
-    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, as precise as the tables."""
+    """Fill ``out (chirp, rx, sample)`` from chirp ``begin`` to ``end``, with the tables' digits."""
     receivers, samples = out.shape[1:]
     nodes, echoes = tones.amplitude.shape[0], tones.length.shape[2]
     # The last pair of blocks may go beyond the last sample, and the last tones that are added

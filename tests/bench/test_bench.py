@@ -203,7 +203,8 @@ def test_the_baseline_is_timed_in_a_process_of_its_own(
     folder.mkdir()
     (folder / "paper_numpy.py").write_text(
         "import json, sys\n"
-        "assert sys.argv[1:5] == ['--radar', 'paper-77ghz', '--repeats', '2'] and '--cycles' in sys.argv\n"
+        "assert sys.argv[1:5] == ['--radar', 'paper-77ghz', '--repeats', '2']\n"
+        "assert '--cycles' in sys.argv\n"
         "frames = [{'echoes and IF': 1.0, 'cfar': 0.5}, {'echoes and IF': 3.0, 'cfar': 0.5}]\n"
         "found = {'cycles': 12, 'cycles_per_frame': 133, 'frames': frames}\n"
         "open(sys.argv[sys.argv.index('--json') + 1], 'w').write(json.dumps(found))\n"
@@ -245,7 +246,8 @@ def test_a_process_has_caches_of_its_own_and_gives_its_summary(
 ) -> None:
     (tmp_path / "summary.json").write_text(json.dumps(summary(2.0)))
     # The last word is the file for the summary.
-    script = f'env > {tmp_path}/env; echo "$@" > {tmp_path}/words; for last; do :; done; cp {tmp_path}/summary.json "$last"'
+    script = f'env > {tmp_path}/env; echo "$@" > {tmp_path}/words; for last; do :; done; '
+    script += f'cp {tmp_path}/summary.json "$last"'
     monkeypatch.setattr(runs.sys, "executable", stand_in(tmp_path, script))
     folder = tmp_path / "caches"
     folder.mkdir()

@@ -1,4 +1,5 @@
-"""Compiled code is never stale: it is loaded from disk while all that went into it is the same, and compiled anew after that."""
+"""Compiled code is never stale: it is loaded from disk while all that went into it is the same, and
+compiled anew after that."""
 
 from __future__ import annotations
 
@@ -70,11 +71,13 @@ def unused(number):
     return number * 7.0
 """,
 }
-"""Modules of a package: a compiled function, what it takes in from a second one, and what that takes in from a third."""
+"""Modules of a package: a compiled function, what it takes in from a second one, and what that
+takes in from a third."""
 
 
 class Estate:
-    """The package in a folder: edited so that neither size nor time of a file tell, and imported as by another process."""
+    """The package in a folder: edited so that neither size nor time of a file tell, and imported as
+    by another process."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder / "estate"
@@ -302,7 +305,7 @@ def test_settings_of_numba_go_into_it(monkeypatch: pytest.MonkeyPatch, setting: 
     assert stamp_of(add_noise) != before
 
 
-# -- functions of the package -----------------------------------------------------------------------------------------
+# -- functions of the package ----------------------------------------------------------------------
 
 
 def compiled_functions() -> dict[str, Any]:
@@ -365,7 +368,8 @@ def test_stamps_of_the_package_have_what_is_inlined(
 
 
 def test_nothing_is_kept_by_numba_itself() -> None:
-    """It would not see what other files bring in, and fails on import where no folder can be written."""
+    """It would not see what other files bring in, and fails on import where no folder can be
+    written."""
     root = Path(rtradar.__file__).parents[1]
     files = [file for folder in ("rtradar", "validation") for file in (root / folder).rglob("*.py")]
     assert len(files) > 200

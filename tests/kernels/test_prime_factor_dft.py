@@ -76,14 +76,16 @@ BOUNDS = """
 import numpy as np
 from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 for n_cycles in (2 * 37, 38 * 37, 39 * 37, 40 * 37):
-    spectra, power = np.ones((n_cycles, 1, 3), dtype=np.complex64), np.zeros((n_cycles, 3), dtype=np.float32)
-    add_doppler_power(spectra, range(1), np.ones(n_cycles, dtype=np.float32), prime_factor_dft(n_cycles), power)
+    spectra, power = np.ones((n_cycles, 1, 3), np.complex64), np.zeros((n_cycles, 3), np.float32)
+    weights, dft = np.ones(n_cycles, np.float32), prime_factor_dft(n_cycles)
+    add_doppler_power(spectra, range(1), weights, dft, power)
 """
 
 
 @pytest.mark.slow
 def test_the_longest_tables_have_room(tmp_path: Path) -> None:
-    # What is read beyond an array is times 0 here, and most often a number: only checked code is sure to tell.
+    # What is read beyond an array is times 0 here, and most often a number: only checked code is
+    # sure to tell.
     environment = {**os.environ, "NUMBA_BOUNDSCHECK": "1", "NUMBA_CACHE_DIR": str(tmp_path)}
     done = subprocess.run(
         [sys.executable, "-c", BOUNDS], env=environment, capture_output=True, text=True, check=False
@@ -117,5 +119,6 @@ def test_what_is_no_number_stays_in_its_range_bin() -> None:
 def test_its_multiply_adds_are_counted() -> None:
     dft = prime_factor_dft(35)
     assert dft is not None
-    # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and five of seven; of both parts.
+    # Seven sums of five terms, folded to two even and two odd ones, for two frequencies each, and
+    # five of seven; of both parts.
     assert dft.multiply_adds == 2 * (7 * (2 * 2 + 2 * 2) + 5 * (3 * 3 + 3 * 3))

@@ -1,4 +1,5 @@
-"""Each compiled kernel against its plain reference, on the cases of `rtradar bench --only kernels`."""
+"""Each compiled kernel against its plain reference, on the cases of `rtradar bench --only
+kernels`."""
 
 from __future__ import annotations
 

@@ -46,7 +46,8 @@ def place_of(range_m: float, azimuth_deg: float, elevation_deg: float) -> Array:
 
 
 def echo(radar: Radar, place: Array, velocity: float = 0.0) -> NDArray[np.complex64]:
-    """IF of one window, in whose middle the point is at ``place``; a length is that at the centre of its chirp."""
+    """IF of one window, in whose middle the point is at ``place``; a length is that at the centre
+    of its chirp."""
     chirps = np.arange(radar.chirps_per_frame)
     away = velocity * (
         (chirps + 0.5) * radar.chirp_duration_s - len(chirps) * radar.chirp_duration_s / 2
@@ -84,7 +85,8 @@ def test_a_point_at_four_metres(direction: tuple[float, float], speed: float) ->
 @pytest.mark.parametrize(("direction", "speed"), [((-14.0, 25.0), -3.0), ((60.0, 0.0), 2.0)])
 def test_a_point_at_77_ghz(direction: tuple[float, float], speed: float) -> None:
     found = np.degrees(angle(echo(HIGH, place_of(4.0, *direction), speed), HIGH, 4.0, speed))
-    # Measured 0.01 at -14 degrees, 0.13 at 60, where half a degree of angle is a quarter of a degree of its sine.
+    # Measured 0.01 at -14 degrees, 0.13 at 60, where half a degree of angle is a quarter of a
+    # degree of its sine.
     np.testing.assert_allclose(found, direction, atol=0.2)
 
 
@@ -103,14 +105,16 @@ def test_any_point_in_view(azimuth: float, elevation: float, range_m: float, bin
     speed = bins * SHORT.velocity_bin_mps
     found = angle(echo(SHORT, place_of(range_m, azimuth, elevation), speed), SHORT, range_m, speed)
     back = math.sin(found[0]) * math.cos(found[1]), math.sin(found[1])
-    # In sines, for the azimuth of a high elevation is a small difference of large numbers. A beam is 0.03 wide.
+    # In sines, for the azimuth of a high elevation is a small difference of large numbers. A beam
+    # is 0.03 wide.
     np.testing.assert_allclose(back, sines, atol=2e-3)
 
 
 def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
-    # Between two Tx, 4 wavelengths of the start (0.0999 m) apart, the way grows by 2 v T: as from the sine -2 v T / 0.0999 =
-    # -0.003753. The Rx know nothing of it: a straight line through all phases has the share of the Tx in the spread of
-    # the virtual line, 46.67 / (46.67 + 1.31) wavelengths squared. So a sign turned round shows as twice 0.2 degrees.
+    # Between two Tx, 4 wavelengths of the start (0.0999 m) apart, the way grows by 2 v T: as from
+    # the sine -2 v T / 0.0999 = -0.003753. The Rx know nothing of it: a straight line through all
+    # phases has the share of the Tx in the spread of the virtual line, 46.67 / (46.67 + 1.31)
+    # wavelengths squared. So a sign turned round shows as twice 0.2 degrees.
     x = echo(LOW, place_of(4.0, 0.0, 0.0), 3.0)
     cube = range_spectrum(x, LOW).reshape(-1, 12, 8, 256)
     values = cell_spectra(cube, LOW, [107], [66 + 28])
@@ -124,7 +128,8 @@ def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
 def test_an_echo_that_is_folded_shows_beside_its_direction(
     radar: Radar, beside: float, side: int
 ) -> None:
-    # One Tx is 1 / 12 of a turn after the other, which is a sine of lambda / (12 x 4 lambda of the start).
+    # One Tx is 1 / 12 of a turn after the other, which is a sine of lambda / (12 x 4 lambda of the
+    # start).
     assert folded_angle_deg(radar) == pytest.approx(beside, abs=0.005)
     fast, unambiguous = 1.2 * side * radar.max_velocity_mps, 2 * radar.max_velocity_mps
     found = np.degrees(
@@ -173,7 +178,8 @@ def test_an_echo_of_amplitude_one_reads_one() -> None:
 def test_excess_path_by_hand() -> None:
     line = virtual_lines(LOW)[0]
     assert line is not None
-    # Element 0: Tx at -0.25 m (10 wavelengths of 24.98 mm), Rx at -0.0437 m; point at 2 m, 30 degrees to the left.
+    # Element 0: Tx at -0.25 m (10 wavelengths of 24.98 mm), Rx at -0.0437 m; point at 2 m, 30
+    # degrees to the left.
     t, q = -10 * C / 12e9, -1.75 * C / 12e9
     x, y = 2 * math.cos(math.pi / 6), 1.0
     expected = math.hypot(x, y - t) + math.hypot(x, y - q) - 4
@@ -305,14 +311,16 @@ def test_peaks_of_hand_made_spectra() -> None:
         ]
     )
     peaks = find_peaks(sines, (power + 1e-6).astype(np.float32))
-    # The second spectrum's weaker hill is 13 dB down: no peak. A parabola through logarithms is exact on a Gaussian.
+    # The second spectrum's weaker hill is 13 dB down: no peak. A parabola through logarithms is
+    # exact on a Gaussian.
     np.testing.assert_array_equal(peaks.real, [[True, True, False], [True, False, False]])
     np.testing.assert_allclose(peaks.sine[0, :2], [0.303, -0.41], atol=1e-5)
     np.testing.assert_allclose(peaks.power[0, :2], [1.0, 0.4], rtol=1e-4)
 
 
 def test_a_spectrum_of_noise_has_one_peak_mostly() -> None:
-    # Exponential power, as of noise in 4-fold oversampled beams of 48 channels; an echo 14 dB above it, just detected.
+    # Exponential power, as of noise in 4-fold oversampled beams of 48 channels; an echo 14 dB above
+    # it, just detected.
     random = np.random.default_rng(1)
     noise = (
         np.abs(
@@ -330,8 +338,8 @@ def test_a_spectrum_of_noise_has_one_peak_mostly() -> None:
         .any(axis=1)
         .mean()
     )
-    # Law: median 0.69 of the mean, 11 dB above it 8.7 means, exp(-8.7) in each of 48 beams: 0.8 %, about twice that between
-    # the beams too.
+    # Law: median 0.69 of the mean, 11 dB above it 8.7 means, exp(-8.7) in each of 48 beams: 0.8 %,
+    # about twice that between the beams too.
     assert extra < 0.03
 
 

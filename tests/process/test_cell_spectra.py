@@ -85,8 +85,8 @@ def test_no_cells() -> None:
     ("radar", "walk"), [(LOW, 4), (Radar.preset("paper-77ghz"), 1)], ids=["12 GHz", "77 GHz"]
 )
 def test_range_walk_by_hand(radar: Radar, walk: int) -> None:
-    # End elements: 10 + 1.75 wavelengths of the start off the middle, half of it one way, 12 GHz: 0.1468 m x sin(59 deg) =
-    # 0.126 m = 3.4 bins; 77 GHz: 0.0229 m x sin(77 deg) = 0.6 bins.
+    # End elements: 10 + 1.75 wavelengths of the start off the middle, half of it one way, 12 GHz:
+    # 0.1468 m x sin(59 deg) = 0.126 m = 3.4 bins; 77 GHz: 0.0229 m x sin(77 deg) = 0.6 bins.
     assert range_walk(radar) == walk
 
 

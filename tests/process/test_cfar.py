@@ -1,4 +1,5 @@
-"""CFAR detectors against sorting and averaging cell by cell, and against the masks of the paper's own code."""
+"""CFAR detectors against sorting and averaging cell by cell, and against the masks of the paper's
+own code."""
 
 import math
 import os

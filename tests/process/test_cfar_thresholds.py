@@ -32,7 +32,8 @@ def gamma_density(x, shape: int):
 
 
 def os_pfa(alpha: float, n: int, k: int, looks: int) -> float:
-    """P(k-th of n cells < x / alpha) averaged over the cell under test: no order statistic is inverted."""
+    """P(k-th of n cells < x / alpha) averaged over the cell under test: no order statistic is
+    inverted."""
     f = lambda x: gamma_density(x, looks) * betainc(k, n - k + 1, gammainc(looks, x / alpha))  # noqa: E731
     return integral(f, alpha * 3 * looks + 60 + 10 * math.sqrt(looks))
 
@@ -55,7 +56,8 @@ def test_one_look_is_rohlings_product(n: int, quantile: float, log_pfa: float) -
     pfa = math.exp(log_pfa)
     k = order_rank(n, quantile)
     alpha = os_scale(n, quantile, pfa)
-    # alpha is solved to 1e-12; the rate is at most 28 times as steep, and ill-conditioned near 1 where alpha is tiny.
+    # alpha is solved to 1e-12; the rate is at most 28 times as steep, and ill-conditioned near 1
+    # where alpha is tiny.
     assert log_rohling(alpha, n, k) == pytest.approx(math.log(pfa), abs=1e-9)
     # The integral that serves many looks gives the same for one.
     assert _log_os_pfa(alpha, n, k, 1) == pytest.approx(math.log(pfa), abs=1e-9)

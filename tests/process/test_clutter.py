@@ -44,7 +44,8 @@ def noise(n_cycles: int, seed: int = 0, radar: Radar = RADAR) -> np.ndarray:
 
 
 def tone(n_cycles: int, turns_per_cycle: float, seed: int = 0, radar: Radar = RADAR) -> np.ndarray:
-    """A pure Doppler frequency in all channels and range bins, each with an amplitude of its own: (chirp, rx, range)."""
+    """A pure Doppler frequency in all channels and range bins, each with an amplitude of its own:
+    (chirp, rx, range)."""
     amplitude = noise(1, seed, radar)
     phase = np.exp(2j * np.pi * turns_per_cycle * np.arange(n_cycles))
     return (phase[:, None, None, None] * amplitude).reshape(-1, *amplitude.shape[1:])
@@ -148,11 +149,13 @@ def test_mean_leaves_a_moving_echo_outside_the_lobe_about_zero(turns: float) -> 
     lobe = np.arange(zero - 1, zero + 2)
     outside = np.setdiff1d(np.arange(CYCLES), lobe)
     peak = powers[0].max()
-    # A constant fills three bins of a Hann window and no other; what differs is rounding of float64.
+    # A constant fills three bins of a Hann window and no other; what differs is rounding of
+    # float64.
     np.testing.assert_allclose(
         powers[1][:, outside], powers[0][:, outside], rtol=0, atol=1e-13 * peak
     )
-    # At zero it leaves the mean of the tone as a ghost: sin(pi d) / (N sin(pi d / N)), halved in the bins beside it.
+    # At zero it leaves the mean of the tone as a ghost: sin(pi d) / (N sin(pi d / N)), halved in
+    # the bins beside it.
     mean = abs(np.exp(2j * np.pi * turns / CYCLES * np.arange(CYCLES)).mean())
     assert mean == pytest.approx(
         abs(math.sin(math.pi * turns) / (CYCLES * math.sin(math.pi * turns / CYCLES))), abs=1e-12

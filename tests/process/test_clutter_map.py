@@ -1,4 +1,5 @@
-"""Clutter-map CFAR: its law against closed forms and integrals, its map against sums by hand, its schedule."""
+"""Clutter-map CFAR: its law against closed forms and integrals, its map against sums by hand, its
+schedule."""
 
 import math
 
@@ -113,7 +114,8 @@ def test_map_against_weights_by_hand(data: st.DataObject) -> None:
     starts = radar.window_starts(10_000)
     for window in range(n):
         found = clutter.push(power[window])
-        # Windows that end before this one begins; of 5.4 cycles' hop the third may just miss it by the rounding.
+        # Windows that end before this one begins; of 5.4 cycles' hop the third may just miss it by
+        # the rounding.
         lag = math.ceil(16 / (hop / 1e-3))
         past = window - lag + 1
         if past < 1:
@@ -167,7 +169,8 @@ def test_multipliers_fall_as_the_map_grows_and_then_stay(radar: Radar) -> None:
         if clutter._count:
             scales.append(clutter._multiplier())
     steps = np.diff(scales)
-    # Rounded starts could make the rate of one count differ from the next; here the hop is a whole number of cycles.
+    # Rounded starts could make the rate of one count differ from the next; here the hop is a whole
+    # number of cycles.
     assert (steps <= 1e-9).all()
     assert scales[-1] == scales[-100]
     share = 1 - math.exp(-1 / 20)
@@ -179,7 +182,8 @@ def test_multipliers_fall_as_the_map_grows_and_then_stay(radar: Radar) -> None:
 
 
 def test_overlapping_windows_by_brute_force() -> None:
-    # 9 windows in the map, 75 % overlap; the level is simulated from white noise, the tested cell by its survival function.
+    # 9 windows in the map, 75 % overlap; the level is simulated from white noise, the tested cell
+    # by its survival function.
     radar, n, hop, count = OVERLAPPING, 16, 4, 9
     rng = np.random.default_rng(1)
     x = rng.standard_normal((200_000, n + hop * (count - 1), 2)).view(np.complex128)[..., 0]

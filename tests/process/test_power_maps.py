@@ -1,4 +1,5 @@
-"""Doppler division: what is summed over bands is summed over neighbouring bands, around the Doppler axis."""
+"""Doppler division: what is summed over bands is summed over neighbouring bands, around the Doppler
+axis."""
 
 from __future__ import annotations
 

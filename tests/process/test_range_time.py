@@ -1,4 +1,5 @@
-"""The range-time map without static clutter: against means written out, and the same in any pieces."""
+"""The range-time map without static clutter: against means written out, and the same in any
+pieces."""
 
 from __future__ import annotations
 
@@ -89,7 +90,8 @@ def test_a_room_goes_and_a_walker_stays() -> None:
     cycles = np.arange(40 * STEP)
     room, walker = np.zeros(8), np.zeros(8)
     room[2], walker[5] = 1000.0, 1.0
-    # At 1 m/s the phase turns by 4 pi v T / lambda: 9 Doppler bins of the window, far from zero Doppler.
+    # At 1 m/s the phase turns by 4 pi v T / lambda: 9 Doppler bins of the window, far from zero
+    # Doppler.
     turns = np.exp(4j * math.pi * 1.0 * cycles * RADAR.cycle_duration_s / RADAR.wavelength_m)
     both = room + turns[:, None] * walker
     spectra = np.broadcast_to(
@@ -97,13 +99,15 @@ def test_a_room_goes_and_a_walker_stays() -> None:
     ).reshape(-1, RADAR.n_rx, 8)
     power, _ = streamed(spectra.astype(np.complex64), "mean", len(spectra))
     assert power[:, 2].max() < 1e-12 * 1000**2  # what complex64 leaves
-    # A still window takes sinc(d) of an echo d = 4.67 bins fast, at most 1 / (pi d): 7 % of its amplitude.
+    # A still window takes sinc(d) of an echo d = 4.67 bins fast, at most 1 / (pi d): 7 % of its
+    # amplitude.
     bins = 1.0 / RADAR.velocity_bin_mps
     assert abs(np.sqrt(power[:, 5]) - 1).max() < 1 / (math.pi * bins) + 1e-3
 
 
 def test_who_stands_still_for_a_window_goes_with_the_room() -> None:
-    """Half a second at rest, then 1 m/s: the first half reads nothing but near its end, the second reads 1."""
+    """Half a second at rest, then 1 m/s: the first half reads nothing but near its end, the second
+    reads 1."""
     rest = np.zeros(1000)
     phase = np.cumsum(
         np.append(rest, np.full(1000, 4 * math.pi * RADAR.cycle_duration_s / RADAR.wavelength_m))

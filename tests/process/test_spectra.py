@@ -29,7 +29,8 @@ def noise(radar: Radar, n_chirps: int, seed: int = 0) -> np.ndarray:
 
 
 def point_echo(radar: Radar, n_chirps: int, range_m: float, velocity_mps: float) -> np.ndarray:
-    """IF of a point without delay differences over the array; ``range_m`` is where it is in the middle of the capture."""
+    """IF of a point without delay differences over the array; ``range_m`` is where it is in the
+    middle of the capture."""
     times = radar.chirp_times(n_chirps)
     tau = (
         2
@@ -44,7 +45,8 @@ def point_echo(radar: Radar, n_chirps: int, range_m: float, velocity_mps: float)
 
 
 def centroid(power: np.ndarray) -> float:
-    """Mean bin of the power within 12 bins of the peak: a Hann-windowed tone has 1e-6 of its power beyond."""
+    """Mean bin of the power within 12 bins of the peak: a Hann-windowed tone has 1e-6 of its power
+    beyond."""
     bins = power.argmax() + np.arange(-12, 13)
     return float(power[bins] @ bins / power[bins].sum())
 
@@ -66,8 +68,8 @@ def test_point_reads_back(preset: str, velocity: float) -> None:
     truth_m = 4.321
     spectra = range_doppler(point_echo(radar, n, truth_m, velocity), radar)
     power = np.abs(spectra.values[..., 0]) ** 2
-    # 2 m/s for 0.1 s blurs the echo over five range bins, evenly about the middle of the window; its Doppler shift of 187 Hz
-    # reads as 0.02 bins of range (12 GHz).
+    # 2 m/s for 0.1 s blurs the echo over five range bins, evenly about the middle of the window;
+    # its Doppler shift of 187 Hz reads as 0.02 bins of range (12 GHz).
     assert abs(centroid(power.sum(axis=1)) - truth_m / radar.range_bin_m) < 0.03
     doppler = power.sum(axis=0)
     assert (
@@ -129,7 +131,8 @@ def test_linear() -> None:
 
 
 def test_parseval() -> None:
-    # With rectangular windows of weight 1 / n: the mean power of the samples is the sum of the power of the cells.
+    # With rectangular windows of weight 1 / n: the mean power of the samples is the sum of the
+    # power of the cells.
     x = noise(SMALL, 30)
     flat = WindowFunctions("boxcar", "boxcar")
     power = np.sum(np.abs(range_doppler(x, SMALL, window_functions=flat).values) ** 2)
@@ -159,7 +162,8 @@ def test_power_map_is_the_sum_of_the_channels() -> None:
     spectra = range_spectrum(x, radar).reshape(5, 12, 8, 256)
     power = power_map(spectra, radar)
     assert power.dtype == np.float32
-    # The least of 5 x 256 sums of 96 cells is not small beside the mean: the rounding of complex64 is all there is.
+    # The least of 5 x 256 sums of 96 cells is not small beside the mean: the rounding of complex64
+    # is all there is.
     np.testing.assert_allclose(power, exact.sum(axis=2), rtol=1e-5)
     alone = power_map(spectra, radar, channel=3 * 8 + 5)
     np.testing.assert_allclose(

@@ -1,4 +1,5 @@
-"""The spectrogram: SciPy's columns, the axes of one TDM channel, and the same whatever the blocks."""
+"""The spectrogram: SciPy's columns, the axes of one TDM channel, and the same whatever the
+blocks."""
 
 from __future__ import annotations
 
@@ -30,7 +31,8 @@ def noise(shape: tuple[int, ...], seed: int = 0) -> NDArray[np.complex128]:
 
 
 def turning(radar: Radar, velocity: float, n_cycles: int) -> NDArray[np.complex128]:
-    """A channel's echo of amplitude 1 that recedes at this velocity, (cycle, 1); written with the paper's figures."""
+    """A channel's echo of amplitude 1 that recedes at this velocity, (cycle, 1); written with the
+    paper's figures."""
     times = np.arange(n_cycles) * 12 * radar.chirp_duration_s
     return np.exp(
         2j * np.pi * 2 * velocity / 299_792_458.0 * (radar.start_frequency_hz + 2e9) * times
@@ -44,7 +46,8 @@ def turning(radar: Radar, velocity: float, n_cycles: int) -> NDArray[np.complex1
 def test_columns_are_those_of_scipy(window: int, overlap: float, hop: int) -> None:
     signals = noise((300, 3))
     found = spectrogram(signals, TINY, window=window, overlap=overlap)
-    # SciPy's windows have their middles, sample window // 2, at multiples of the hop: zeros before the signal put ours there.
+    # SciPy's windows have their middles, sample window // 2, at multiples of the hop: zeros before
+    # the signal put ours there.
     ahead = -(window // 2) % hop
     first = (ahead + window // 2) // hop
     transform = ShortTimeFFT(
@@ -61,7 +64,8 @@ def test_columns_are_those_of_scipy(window: int, overlap: float, hop: int) -> No
     np.testing.assert_allclose(
         found.power, (np.abs(columns) ** 2).sum(axis=1).T, rtol=1e-10, atol=1e-14
     )
-    # The periodic window of odd length is even about half a sample more; a sample is at the middle of its chirp.
+    # The periodic window of odd length is even about half a sample more; a sample is at the middle
+    # of its chirp.
     middles = np.arange(len(found.time)) * hop + window / 2
     np.testing.assert_allclose(found.time, middles * 3 * 62.5e-6 + 62.5e-6 / 2, rtol=1e-12)
     doppler = transform.f * 299_792_458.0 / (2 * 14e9)
@@ -97,7 +101,8 @@ def test_too_fast_aliases_to_its_known_place(radar: Radar, speed: float) -> None
 
 @pytest.mark.parametrize("tx", [0, 5, 11])
 def test_time_is_that_of_the_channels_own_chirps(tx: int) -> None:
-    # A flash in one chirp: the column that has it in the middle of its window is the highest, and carries its time.
+    # A flash in one chirp: the column that has it in the middle of its window is the highest, and
+    # carries its time.
     cycle = 64 + 6 * 40
     signals = np.zeros((600, 1), np.complex64)
     signals[cycle] = 1
@@ -127,7 +132,8 @@ def test_power_does_not_depend_on_the_place_in_a_range_bin(fraction: float) -> N
 
 
 def test_signals_of_all_range_bins_cancel() -> None:
-    # Why power is summed and not the signal: bins of a Hann spectrum add up to the first sample, which weighs nothing.
+    # Why power is summed and not the signal: bins of a Hann spectrum add up to the first sample,
+    # which weighs nothing.
     spectra = range_spectrum(noise((12, 8, 256)), LOW)
     assert np.abs(spectra.sum(axis=2)).max() < 1e-5 * np.abs(spectra).sum(axis=2).min()
 
@@ -195,14 +201,17 @@ def test_memory_does_not_grow() -> None:
         stream.push(block)
     held = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    # Less than one window of the channel is held; the rest is the tracer's own. One block of the channel has 8 windows.
+    # Less than one window of the channel is held; the rest is the tracer's own. One block of the
+    # channel has 8 windows.
     assert held < 1.5 * window_bytes
 
 
 def test_noise_reads_its_mean_power() -> None:
-    # Each cell: sum of w^2 over (sum of w)^2, 1.5 / 128, times the noise power 2, times 20 range bins.
+    # Each cell: sum of w^2 over (sum of w)^2, 1.5 / 128, times the noise power 2, times 20 range
+    # bins.
     found = spectrogram(noise((4096, 20)), LOW, overlap=0.0)
-    # 32 windows x 128 cells x 20 looks: 0.35 % for independent cells, half as much again for the window's skirts; five sigma.
+    # 32 windows x 128 cells x 20 looks: 0.35 % for independent cells, half as much again for the
+    # window's skirts; five sigma.
     assert found.power.mean() == pytest.approx(1.5 / 128 * 2 * 20, rel=0.025)
     assert found.power.dtype == np.float64
 
@@ -248,9 +257,11 @@ def test_the_picture_shows_the_echo_where_it_is(tmp_path: Path) -> None:
         tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s"
     )
     shown = imread(tmp_path / "s.png")[:, :, :3]
-    # The brightest yellow of the colours, left of the colour bar, stands in the upper half: velocity rises upward.
+    # The brightest yellow of the colours, left of the colour bar, stands in the upper half:
+    # velocity rises upward.
     rows, columns = np.nonzero(np.abs(shown - [0.993, 0.906, 0.144]).max(axis=2) < 0.02)
     line = rows[columns < 0.8 * shown.shape[1]]
     assert len(line) > 100
-    # 4 of +-7.14 m/s is 22 % from the top of the axes, which fill the picture but for title and labels.
+    # 4 of +-7.14 m/s is 22 % from the top of the axes, which fill the picture but for title and
+    # labels.
     assert 0.2 < line.mean() / shown.shape[0] < 0.35

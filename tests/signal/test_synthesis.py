@@ -1,4 +1,5 @@
-"""The fast sum of echoes against the plain one, the phase convention from the physics, and laws of the sum."""
+"""The fast sum of echoes against the plain one, the phase convention from the physics, and laws of
+the sum."""
 
 from __future__ import annotations
 
@@ -72,14 +73,16 @@ def together(first: Echoes, second: Echoes) -> Echoes:
 
 
 def synthesize_block(echoes: Echoes, radar: Radar) -> Complex:
-    """All chirps as one block. The random lengths jump from chirp to chirp, which is not what is looked at here."""
+    """All chirps as one block. The random lengths jump from chirp to chirp, which is not what is
+    looked at here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ValidityWarning)
         return synthesize(echoes, radar, radar.chirp_times(len(echoes.length)))
 
 
 def plain_sum(echoes: Echoes, radar: Radar) -> Complex:
-    """x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, the turns in long double."""
+    """x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, the
+    turns in long double."""
     t = (
         np.arange(radar.samples_per_chirp, dtype=np.longdouble)
         * radar.chirp_duration_s
@@ -103,10 +106,11 @@ def relative_error(ours: Complex, reference: Complex) -> float:
 
 
 TOLERANCE = 1e-11
-"""Of float64: up to 77 GHz x 64 ns = 4900 turns are known to 3e-12 rad. Measured: 3e-13 at 12 GHz, 2e-12 at 77 GHz."""
+"""Of float64: up to 77 GHz x 64 ns = 4900 turns are known to 3e-12 rad. Measured: 3e-13 at 12 GHz,
+2e-12 at 77 GHz."""
 
 
-# -- the sum itself --------------------------------------------------------------------------------------------------
+# -- the sum itself --------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
@@ -162,7 +166,7 @@ def test_nodes_anywhere_in_any_order() -> None:
     np.testing.assert_allclose(np.abs(results[0][0, 0]), np.abs(truth), rtol=TOLERANCE)
 
 
-# -- the convention of phase, from the physics -----------------------------------------------------------------------
+# -- the convention of phase, from the physics -----------------------------------------------------
 
 
 @pytest.mark.parametrize("radar", [LOW, HIGH], ids=["12 GHz", "77 GHz"])
@@ -170,7 +174,8 @@ def test_nodes_anywhere_in_any_order() -> None:
 def test_if_is_the_chirp_times_the_conjugate_of_what_comes_back(
     radar: Radar, reflection: complex
 ) -> None:
-    # With exp(+j omega t) a chirp leaves, comes back tau later and multiplied by the reflection coefficient, and is mixed.
+    # With exp(+j omega t) a chirp leaves, comes back tau later and multiplied by the reflection
+    # coefficient, and is mixed.
     tau = 8.4 / SPEED_OF_LIGHT_MPS
     slope = np.longdouble(radar.bandwidth_hz) / radar.chirp_duration_s
     t = np.arange(256, dtype=np.longdouble) / radar.sample_rate_hz
@@ -183,13 +188,14 @@ def test_if_is_the_chirp_times_the_conjugate_of_what_comes_back(
     mixed = chirp(t) * np.conj(received)
     # `amplitude` is the conjugate of the scattering length.
     echoes = make_echoes([[[8.4]]], [[[[np.conj(reflection)]]]])
-    # A carrier of up to 960 000 turns, known to float64 where long double is no longer than that: 1e-9 rad.
+    # A carrier of up to 960 000 turns, known to float64 where long double is no longer than that:
+    # 1e-9 rad.
     np.testing.assert_allclose(synthesize_block(echoes, radar)[0, 0], mixed, rtol=0, atol=1e-8)
 
 
 def test_conjugate_of_the_if_is_the_received_spectrum() -> None:
-    # H(f) = sum conj(amplitude) exp(-j 2 pi f L / c): what a vector network analyser would read. A chirp of 10 s is one:
-    # the term s tau^2 / 2 is then 1e-7 turns.
+    # H(f) = sum conj(amplitude) exp(-j 2 pi f L / c): what a vector network analyser would read. A
+    # chirp of 10 s is one: the term s tau^2 / 2 is then 1e-7 turns.
     slow = dataclasses.replace(LONE, chirp_duration_s=10.0, frame_duration_s=10.0)
     length = np.array([1.0, 7.3, 12.0])
     scattering = np.array([1j, -0.4 + 0.2j, 0.8])
@@ -204,7 +210,8 @@ def test_conjugate_of_the_if_is_the_received_spectrum() -> None:
 
 
 def test_a_phase_over_frequency_is_a_way() -> None:
-    # A scattering length exp(-j 2 pi f delta) is a detour of c delta, told in amplitude instead of in length.
+    # A scattering length exp(-j 2 pi f delta) is a detour of c delta, told in amplitude instead of
+    # in length.
     delta = 1e-12
     frequency = np.array([12e9, 14e9, 16e9])
     scattering = np.exp(-2j * np.pi * frequency * delta)
@@ -216,7 +223,8 @@ def test_a_phase_over_frequency_is_a_way() -> None:
     walked = make_echoes(
         np.full((1, 8, 1), 8.0 + SPEED_OF_LIGHT_MPS * delta), np.ones((1, 1, 8, 1))
     )
-    # A detour in amplitude misses its part of s tau^2 / 2: 2 pi s tau delta = 1.1e-5 rad. A wrong sign would give 0.2.
+    # A detour in amplitude misses its part of s tau^2 / 2: 2 pi s tau delta = 1.1e-5 rad. A wrong
+    # sign would give 0.2.
     np.testing.assert_allclose(
         synthesize_block(told, LOW), synthesize_block(walked, LOW), rtol=0, atol=2e-5
     )
@@ -242,7 +250,7 @@ def test_farther_is_a_higher_beat() -> None:
     assert np.abs(np.fft.fft(x[0, 0])).argmax() == 100
 
 
-# -- laws ------------------------------------------------------------------------------------------------------------
+# -- laws ------------------------------------------------------------------------------------------
 
 
 @given(
@@ -349,8 +357,8 @@ def test_single_precision_is_the_double_to_a_millionth(nodes: int) -> None:
         single = synthesize(echoes, SMALL, SMALL.chirp_times(6), dtype=np.complex64)
     assert double.dtype == np.complex128
     assert single.dtype == np.complex64
-    # float32 has 6e-8; a tone is a product of three such numbers, and there are four tones. Polynomials between the nodes are
-    # at most three times as large as the amplitudes.
+    # float32 has 6e-8; a tone is a product of three such numbers, and there are four tones.
+    # Polynomials between the nodes are at most three times as large as the amplitudes.
     magnitudes = 3 * np.abs(echoes.amplitude).max(axis=0).sum(axis=-1, keepdims=True)
     np.testing.assert_array_less(
         np.abs(single - double), 1e-6 * np.broadcast_to(magnitudes, double.shape)
@@ -365,11 +373,12 @@ def test_amplitudes_of_single_precision_do() -> None:
     )
 
 
-# -- what is asked of times ------------------------------------------------------------------------------------------
+# -- what is asked of times ------------------------------------------------------------------------
 
 
 def moving(radar: Radar, velocity: float, chirps: int) -> tuple[Echoes, Radar, NDArray[np.float64]]:
-    """A point on the boresight, with the differences in length that the array makes from Tx to Tx."""
+    """A point on the boresight, with the differences in length that the array makes from Tx to
+    Tx."""
     times = radar.chirp_times(chirps)
     tx = radar.tx_of_chirp(np.arange(chirps))
     place = np.asarray(radar.position_m) + (4 + velocity * times)[:, None] * np.array([1.0, 0, 0])
