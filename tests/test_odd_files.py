@@ -167,7 +167,7 @@ def imported() -> None:
     for name in (
         "torch",
         "matplotlib.pyplot",
-        "rtradar.pipeline.pictures.run_view",
+        "rtradar.pipeline.view",
         "rtradar.campaign",
     ):
         pytest.importorskip(name)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from rtradar.errors import InputError
 from rtradar.kernels.jit import check_cache
 from rtradar.system.files import temporary_folder
-from rtradar.system.threads import environment_of, thread_limit
+from rtradar.system.threads import thread_environment, thread_limit
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -63,7 +63,7 @@ def dask_client(workers: int | None = None, scheduler: str | None = None) -> Ite
         return
     check_cache()
     count = workers or CPU_COUNT
-    environment = environment_of(thread_limit() or max(1, CPU_COUNT // count))
+    environment = thread_environment(thread_limit() or max(1, CPU_COUNT // count))
     settings = {
         # A forked process would inherit the locks of Dr.Jit's threads, but not the threads.
         "distributed.worker.multiprocessing-method": "spawn",

@@ -1,7 +1,6 @@
-"""The whole chain: a recording in, maps and clouds out, streamed; and several echo models side by side."""
+"""The whole chain, streamed: a recording in, maps and clouds out, by one echo model or several."""
 
-from rtradar.pipeline.chain import Result, run
-from rtradar.pipeline.clouds_alone import clouds_of
 from rtradar.pipeline.compare import Comparison, compare
+from rtradar.pipeline.run import Result, clouds_of, run
 
 __all__ = ["Comparison", "Result", "clouds_of", "compare", "run"]

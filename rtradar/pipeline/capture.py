@@ -1,4 +1,4 @@
-"""A person before a radar in a scene, streamed as range spectra to whatever makes something of them."""
+"""Capture of a moving person by a radar in a scene, streamed as range spectra."""
 
 from __future__ import annotations
 
@@ -14,60 +14,68 @@ from tqdm import tqdm
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.pipeline.indoors import Indoors
+from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.timing import Stages
-from rtradar.process import ClutterRemoval, Detector, WindowFunctions, range_spectrum
+from rtradar.process import range_spectrum
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel
 from rtradar.scatter.link_budget import LinkBudget
+from rtradar.scene import Scene
+from rtradar.settings import RunSettings
 from rtradar.signal import Noise, receive, separate, synthesize
 from rtradar.system.files import uninterruptible
 
 
-class Taker(Protocol):
-    """What range spectra are streamed to: `take` gets ``piece`` chirps at a time."""
+class SpectraSink(Protocol):
+    """What range spectra are streamed to, at most ``max_chirps`` at a time."""
 
-    piece: int
+    max_chirps: int
 
-    def take(self, spectra: NDArray[np.complex64], first: int) -> None:
-        """Range spectra (chirp, rx, range) from chirp ``first`` on; whole TDM cycles. The next come in the same array."""
+    def push(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """Process range spectra (chirp, rx, range) of whole TDM cycles from chirp ``first`` on.
+
+        The next call gets its spectra in the same array.
+        """
 
 
 @dataclass(frozen=True)
 class Capture:
-    """What `prepare` gives.
+    """Everything that `prepare` settles before the first echo is computed.
 
     Parameters
     ----------
-    radar : Radar
-        Where it stands in the scene.
+    motion : str
+        Name of the recording.
+    scene : Scene
+        Scene around the person.
+    settings : RunSettings
+        Settings of the run.
+    processing : Processing
+        Radar at its position in the scene, and what its range spectra go through.
     body : Body
-        Where it moves in the scene.
+        Person at their position in the scene.
     model : EchoModel
+        Echo model of the person, and of the paths over walls if the scene has any.
     inside : Indoors, optional
-        The room, where the scene has one.
+        Room, if the scene has one.
     survey : LinkBudget
+        Link budget of the person's parts.
     warned : tuple of str
-        What the survey warned of.
+        Warnings of the link budget.
     noise : Noise
+        Noise of the IF samples.
     n_chirps : int
-        Whole cycles of the capture.
-    windows : (window,) int64
-        First cycle of each processing window.
-    removal : ClutterRemoval
-        Filter that removes static clutter before Doppler.
-    detect : Detector
-        Detector that marks the cells of a map.
-    window_functions : WindowFunctions
-        Window functions in fast and in slow time.
-    title : str
-        For pictures and progress.
-    stages : Stages
-        Where the time goes.
+        Number of chirps, in whole TDM cycles.
+    frame_starts : (frame,) int64
+        First cycle of each frame.
     warmup_s : float
-        Seconds until all was compiled or loaded.
+        Time until everything was compiled or loaded [s].
     """
 
-    radar: Radar
+    motion: str
+    scene: Scene
+    settings: RunSettings
+    processing: Processing
     body: Body
     model: EchoModel
     inside: Indoors | None
@@ -75,79 +83,94 @@ class Capture:
     warned: tuple[str, ...]
     noise: Noise
     n_chirps: int
-    windows: NDArray[np.int64]
-    removal: ClutterRemoval
-    detect: Detector
-    window_functions: WindowFunctions
-    title: str
-    stages: Stages
+    frame_starts: NDArray[np.int64]
     warmup_s: float
 
     @property
-    def block(self) -> int:
-        """Chirps whose echoes are made at once: a hop of the windows, but no more than one of them holds."""
+    def radar(self) -> Radar:
+        """Radar at its position in the scene."""
+        return self.processing.radar
+
+    @property
+    def stages(self) -> Stages:
+        """Record of the time that each stage takes."""
+        return self.processing.stages
+
+    @property
+    def title(self) -> str:
+        """Title of pictures and of the progress bar."""
+        names = [self.motion, self.radar.name, self.settings.fidelity]
+        return ", ".join(names + ([self.scene.name] if self.inside else []))
+
+    @property
+    def block_chirps(self) -> int:
+        """Number of chirps whose echoes are computed together: a hop of the frames, or a frame."""
         return min(math.ceil(self.radar.hop_cycles), self.radar.cycles_per_frame) * self.radar.n_tx
 
-    def stream(self, taker: Taker, kept: Any = None, *, progress: bool = True) -> None:
-        """Echoes `block` chirps at a time, and from them IF samples, noise and range spectra by smaller pieces.
+    def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
+        """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.
 
         Parameters
         ----------
-        taker : Taker
-            Gets the range spectra.
+        sink : SpectraSink
+            Object that receives the range spectra.
         kept : array-like, optional
-            Gets the IF samples as received (chirp, rx, sample), `block` chirps at a time; under DDM those of a cycle are one.
+            Array (chirp, rx, sample) that receives the IF samples with noise; with DDM it has one
+            chirp for each cycle.
         progress : bool
-            Whether a bar is shown, on a terminal.
+            Whether a progress bar is shown on a terminal.
         """
-        radar, stages, noise = self.radar, self.stages, self.noise
+        radar, stages = self.radar, self.stages
         room = self.inside.room if self.inside else None
-        piece = taker.piece if kept is None else self.block  # which is a chunk of the array
+        # The blocks of an array on disk are its chunks.
+        at_once = self.block_chirps if kept is not None else min(sink.max_chirps, self.block_chirps)
 
-        # The largest arrays there are but for the windows: made anew for each piece, now and then they find no hole in the heap.
-        shape = min(piece, self.block), radar.n_rx, radar.samples_per_chirp
-        made, transformed = np.empty(shape, dtype=np.complex64), np.empty(shape, dtype=np.complex64)
+        # The largest arrays but for the frames. Allocated anew for each block, they would now and
+        # then find no hole in the heap.
+        shape = at_once, radar.n_rx, radar.samples_per_chirp
+        samples_of, spectra_of = np.empty(shape, np.complex64), np.empty(shape, np.complex64)
 
-        def spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
-            n, times = len(echoes.tx), radar.chirp_times(len(echoes.tx), first)
+        def range_spectra(echoes: Echoes, first: int) -> NDArray[np.complex64]:
+            n = len(echoes.tx)
             with stages.time("signal"):
-                samples = synthesize(echoes, radar, times, dtype=np.complex64, out=made[:n])
+                times = radar.chirp_times(n, first)
+                samples = synthesize(echoes, radar, times, dtype=np.complex64, out=samples_of[:n])
             if room is not None:
                 with stages.time("clutter"):
-                    room.add(samples, np.arange(first, first + len(samples)))
+                    room.add(samples, np.arange(first, first + n))
             with stages.time("noise"):
                 received = receive(samples, radar, first)
-                noise.add(received, radar, first)
+                self.noise.add(received, radar, first)
             if kept is not None:
-                # Its folders are made as they are needed, which must not be after they have been removed.
+                # Zarr makes folders as it writes, which must not be after they were removed.
                 with stages.time("write"), uninterruptible():
-                    begin = first * len(received) // len(samples)
+                    begin = first * len(received) // n
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
-                apart = separate(received, radar, first)
                 return range_spectrum(
-                    apart, radar, window_functions=self.window_functions, out=transformed[:n]
+                    separate(received, radar, first),
+                    radar,
+                    window_functions=self.processing.window_functions,
+                    out=spectra_of[:n],
                 )
 
-        def take(chirps: NDArray[np.int64]) -> None:
+        # A function of its own: names that a loop binds would keep echoes alive while the next
+        # block is computed.
+        def stream_block(chirps: NDArray[np.int64]) -> None:
             with stages.time("scatter"):
                 echoes = self.model.echoes(chirps)
-            for begin in range(0, len(chirps), piece):
-                taker.take(
-                    spectra(chirps_of(echoes, begin, begin + piece), int(chirps[begin])),
-                    int(chirps[begin]),
-                )
+            for begin in range(0, len(chirps), at_once):
+                first = int(chirps[begin])
+                sink.push(range_spectra(chirps_of(echoes, begin, begin + at_once), first), first)
 
-        # In functions, for what a loop leaves bound would still be held while the next block is made.
-        silent = None if progress else True  # None: where there is no terminal
-        for first in tqdm(
-            range(0, self.n_chirps, self.block), desc=self.title, unit="block", disable=silent
-        ):
-            take(np.arange(first, min(first + self.block, self.n_chirps)))
+        silent = None if progress else True  # None: silent where there is no terminal
+        blocks = range(0, self.n_chirps, self.block_chirps)
+        for first in tqdm(blocks, desc=self.title, unit="block", disable=silent):
+            stream_block(np.arange(first, min(first + self.block_chirps, self.n_chirps)))
 
 
 def chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
-    """Those of some chirps of the block."""
+    """Return the echoes of some chirps of a block."""
     chirps = slice(begin, end)
     return dataclasses.replace(
         echoes,

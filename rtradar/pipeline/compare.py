@@ -1,4 +1,4 @@
-"""`compare`: one recording by several echo models, with the same noise, and how far apart they end."""
+"""`compare`: one recording by several echo models, with the same noise, and how far they differ."""
 
 from __future__ import annotations
 
@@ -6,18 +6,17 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.motion import Motion
-from rtradar.pipeline.agreement import LevelAgreement, above_noise, chamfer, level_agreement
-from rtradar.pipeline.chain import Result, simulate
-from rtradar.pipeline.output.output_files import comparison_files
-from rtradar.pipeline.pictures.run_pictures import busiest_window, removed, thinned
+from rtradar.pipeline.pictures import busiest_frame, removed, thinned
+from rtradar.pipeline.run import Result, simulate
+from rtradar.pipeline.writer import files_of_runs
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.pages.comparison import (
@@ -50,17 +49,26 @@ _MEASURES = (
     ("real_time_factor", "Seconds a second of radar", 2),
     ("peak_memory_mb", "Peak memory [MB]", 0),
 )
-"""What is told of each model, in the order of the chain; differences are to the last model named."""
+"""Figures of each model, in the order of the chain; differences are to the last model named."""
+
+_PICTURES = {
+    "Echo power over time": "compare_power.png",
+    "Echo power and hiding of each part": "compare_parts.png",
+    "Range-Doppler": "compare_range_doppler.png",
+    "Spectrogram": "compare_spectrogram.png",
+    "Range-Doppler-time clouds": "compare_cloud.png",
+}
+_FILES = ("compare.html", "compare.json", *_PICTURES.values())
 
 
 @dataclass(frozen=True)
 class Comparison:
-    """What a comparison gave.
+    """Results of a comparison.
 
     Parameters
     ----------
     summary : dict
-        All that stands in ``compare.json``.
+        Contents of ``compare.json``.
     out : path
         Folder of the files; the run of each model is in a folder of its name.
     """
@@ -69,17 +77,11 @@ class Comparison:
     out: Path
 
     def table(self) -> str:
-        """The figures of each model, aligned, a column a model."""
+        """Return the figures as aligned text, one column for each model."""
         rows = comparison_rows(self.summary)
-        widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+        first, *others = (max(map(len, column)) for column in zip(*rows, strict=True))
         return "\n".join(
-            "  ".join(
-                [
-                    row[0].ljust(widths[0]),
-                    *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True)),
-                ]
-            )
-            for row in rows
+            "  ".join([row[0].ljust(first), *map(str.rjust, row[1:], others)]) for row in rows
         )
 
 
@@ -93,23 +95,23 @@ def compare(
     overwrite: bool = False,
     **options: Unpack[RunOptions],
 ) -> Comparison:
-    """Run several models on the same recording and say what differs.
+    """Run several models on the same recording and tell how they differ.
 
-    All runs have the same noise, sample by sample: that of the first model, whose echo ``snr_db`` is relative to. The last
-    model named is the reference.
+    All runs have the same noise, sample by sample: that of the first model, whose echo ``snr_db``
+    is relative to. The last model named is the reference.
 
     Parameters
     ----------
-    motion : Motion
-    radar : Radar
-    scene : Scene, optional
-        Free space if left out.
+    motion, radar, scene
+        The same as for `run`.
     out : path
-        Folder; a run of each model in a folder of its name, and ``compare.json``, ``compare.html`` and pictures.
+        Folder for a run of each model, in a folder of its name, and for ``compare.json``,
+        ``compare.html`` and pictures.
     fidelities : sequence of str
         Two models or more, each once; `rtradar.scatter.MODELS` has their names.
     overwrite : bool
-        Whether files that ``out`` holds under names of the new ones are replaced even where no ``compare.json`` lists them.
+        Whether files that ``out`` holds under names of the new ones are replaced even where no
+        ``compare.json`` lists them.
     **options
         Settings of all runs, the fields of `rtradar.RunSettings` but ``fidelity``.
 
@@ -120,7 +122,7 @@ def compare(
     Raises
     ------
     InputError
-        Where fewer than two models are named, one twice, or one that does not exist; and as in `run`.
+        If fewer than two models are named, one twice, or one that does not exist; and as in `run`.
     BackendError
         As in `run`.
     """
@@ -137,114 +139,222 @@ def compare(
     if "fidelity" in options:
         raise InputError("compare has no option 'fidelity'; name the models in fidelities")
     settings = RunSettings(**options)
-    kind = comparison_files(list(MODELS))
+    kind = files_of_runs("compare.json", _FILES, list(MODELS))
     with atomic_folder(Path(out), kind, overwrite=overwrite) as folder:
         results: dict[str, Result] = {}
         for name in names:
-            results[name] = simulate(
-                motion, radar, scene or Scene(), replace(settings, fidelity=name), folder / name
-            )
-            noise = results[name].summary["noise_power_m2"]  # that of the first model
-            settings = replace(settings, noise_power_m2=noise)
-        summary = _summary(results, folder, radar, names[-1])
-        mean_power = {name: result.survey.power_at.mean(axis=0) for name, result in results.items()}
-        unit = _unit(radar, summary, mean_power.values())
-        pictures = _draw(results, mean_power, unit, folder, radar, names[-1])
+            own = replace(settings, fidelity=name)
+            results[name] = simulate(motion, radar, scene or Scene(), own, folder / name)
+            # The noise of the first model is that of all.
+            settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
+        summary = _summary(results, radar, names[-1])
+        pictures, unit = _draw(results, folder, radar, names[-1])
         write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures, unit)
         summary["files"] = kind.list_of(folder)
-        (folder / "compare.json").write_text(
-            json.dumps(summary, indent=2, allow_nan=False) + "\n", encoding="utf-8"
-        )
+        text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
+        (folder / "compare.json").write_text(text, encoding="utf-8")
     return Comparison(summary, Path(out))
 
 
 def comparison_rows(summary: Mapping[str, Any]) -> list[list[str]]:
-    """The table of a comparison as text: a heading row, then a row a measure, with a column a model."""
-    fidelities = summary["fidelities"]
-    rows = [
-        [
-            "",
-            *(
-                f"{name} (reference)" if name == summary["reference"] else name
-                for name in fidelities
-            ),
-        ]
-    ]
+    """Return a comparison as text: a heading row, then a row a measure with a column a model."""
+    found = summary["fidelities"]
+    headings = [f"{name} (reference)" if name == summary["reference"] else name for name in found]
+    rows = [["", *headings]]
     for key, heading, digits in _MEASURES:
-        values = [found[key] for found in fidelities.values()]
-        rows.append(
-            [heading, *("-" if value is None else f"{value:.{digits}f}" for value in values)]
-        )
+        values = [figures[key] for figures in found.values()]
+        texts = ("-" if value is None else f"{value:.{digits}f}" for value in values)
+        rows.append([heading, *texts])
     return rows
 
 
-def _summary(
-    results: Mapping[str, Result], folder: Path, radar: Radar, reference: str
-) -> dict[str, Any]:
+def _summary(results: Mapping[str, Result], radar: Radar, reference: str) -> dict[str, Any]:
     first = next(iter(results.values())).summary
+    shared = dict(first["parameters"])
+    del shared["fidelity"], shared["variant"]
     return {
         "reference": reference,
-        "parameters": {
-            key: value
-            for key, value in first["parameters"].items()
-            if key not in ("fidelity", "variant")
-        },
-        "seed": first["seed"],
-        "noise_power_m2": first["noise_power_m2"],
-        "versions": first["versions"],
+        "parameters": shared,
+        **{name: first[name] for name in ("seed", "noise_power_m2", "versions")},
         "fidelities": {
-            name: _of_one(result, results[reference], folder, radar)
-            for name, result in results.items()
+            name: _figures(result, results[reference], radar) for name, result in results.items()
         },
     }
 
 
-def _of_one(result: Result, reference: Result, folder: Path, radar: Radar) -> dict[str, Any]:
-    """Every figure of one model; differences from itself are zero, which tells that the comparison works."""
-    said, cost = result.summary, result.summary["stages"]
-    power = _level_db(result.survey.power_at.sum(axis=1)) - _level_db(
-        reference.survey.power_at.sum(axis=1)
-    )
-    maps, shared, spectrogram = _map_agreement(
-        folder / said["fidelity"], folder / reference.summary["fidelity"]
-    )
+def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
+    """Return the figures of one model; differences of the reference from itself are zero."""
+    summary, stages = result.summary, result.summary["stages"]
+    power = _total_db(result) - _total_db(reference)
+    maps, overlap, spectrogram = _map_agreement(result.out, reference.out)
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
+    hidden = result.survey.hidden_at
     return {
         "power_mean_db": _finite(float(power.mean())),
         "power_rms_db": _finite(float(np.sqrt((power**2).mean()))),
-        "hidden_share": float(result.survey.hidden_at.mean()),
+        "hidden_share": float(hidden.mean()),
         "range_doppler_correlation": _finite(maps.correlation),
         "range_doppler_mean_db": _finite(maps.mean_db),
         "range_doppler_rms_db": _finite(maps.rms_db),
-        "detections": said["detections"],
-        "detection_overlap": shared,
+        "detections": summary["detections"],
+        "detection_overlap": overlap,
         "spectrogram_correlation": _finite(spectrogram.correlation),
         "spectrogram_rms_db": _finite(spectrogram.rms_db),
         "rdt_chamfer_bins": _finite(chamfer(result.points, reference.points, bins)),
-        "scatter_s": cost["scatter"] + cost["survey"],
-        "wall_s": said["wall_s"],
-        "real_time_factor": said["real_time_factor"],
-        "peak_memory_mb": said["peak_memory_mb"],
-        "stages": cost,
-        "limits": said["limits"],
-        "part_power_m2": said["part_power_m2"],
+        "scatter_s": stages["scatter"] + stages["survey"],
+        "wall_s": summary["wall_s"],
+        "real_time_factor": summary["real_time_factor"],
+        "peak_memory_mb": summary["peak_memory_mb"],
+        "stages": stages,
+        "limits": summary["limits"],
+        "part_power_m2": summary["part_power_m2"],
         "part_hidden_share": dict(
-            zip(said["part_power_m2"], result.survey.hidden_at.mean(axis=0).tolist(), strict=True)
+            zip(summary["part_power_m2"], hidden.mean(axis=0).tolist(), strict=True)
         ),
     }
 
 
+# -- pictures --------------------------------------------------------------------------------------
+
+
+def _draw(
+    results: Mapping[str, Result], folder: Path, radar: Radar, reference: str
+) -> tuple[dict[str, Path], FieldUnit]:
+    """Draw the pictures of a comparison; return them and the unit of the power of parts."""
+    parameters = results[reference].summary["parameters"]
+    spreading, title = parameters["spreading"], f"{parameters['motion']}, {radar.name}"
+    drawn = {name: folder / file for name, file in _PICTURES.items()}
+    paths = iter(drawn.values())
+
+    def unit_of(powers: Iterable[NDArray[np.floating]]) -> FieldUnit:
+        strongest = max(float(power.max()) for power in powers)
+        return field_unit(radar, spreading=spreading, strongest_m2=strongest)
+
+    surveys = {name: result.survey for name, result in results.items()}
+    times = surveys[reference].times
+    total = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
+    draw_power_over_time(next(paths), times, total, unit_of(total.values()), reference, title)
+    mean = {name: survey.power_at.mean(axis=0) for name, survey in surveys.items()}
+    hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
+    parts, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
+    draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
+
+    with h5py.File(results[reference].out / "maps.h5") as maps:
+        frame = busiest_frame(maps)
+        velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
+        times = thinned(maps, "spectrogram", "spectrogram_time")[1]
+        cleaned = removed(maps["range_doppler"])
+        frame_title = f"{title}{cleaned}, window at {maps['time'][frame]:.2f} s"
+        slow_title = title + removed(maps["spectrogram"])
+    by_range = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
+    levels, spectrograms = {}, {}
+    for name, result in results.items():
+        with h5py.File(result.out / "maps.h5") as maps:
+            levels[name] = by_range.level(maps["range_doppler"][frame] / radar.n_channels)
+            spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / HANN_BINS
+    across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
+    draw_maps(next(paths), levels, by_range.label("mean of channels"), across, up, frame_title)
+    unit = unit_of(spectrograms.values())
+    levels = {name: unit.level(power) for name, power in spectrograms.items()}
+    across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
+    draw_maps(next(paths), levels, unit.label("one channel"), across, up, slow_title)
+    draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
+    return drawn, part_unit
+
+
+# -- agreement of maps and clouds ------------------------------------------------------------------
+
+
+class LevelAgreement(NamedTuple):
+    """Agreement of two maps in decibels.
+
+    Parameters
+    ----------
+    correlation : float
+        Pearson correlation of the decibels; NaN if a map is flat or fewer than two cells count.
+    mean_db, rms_db : float
+        Mean and root mean square of the difference, map less reference [dB]; NaN if no cell counts.
+    """
+
+    correlation: float
+    mean_db: float
+    rms_db: float
+
+
+def level_agreement(
+    power: ArrayLike, reference: ArrayLike, where: NDArray[np.bool_]
+) -> LevelAgreement:
+    """Compare two power maps in decibels over the cells of a mask.
+
+    Parameters
+    ----------
+    power, reference : array_like of float
+        Power maps of one shape, positive in these cells.
+    where : array of bool
+        Mask of the cells to compare. Leave out noise that both share: it would make any two maps
+        alike.
+
+    Returns
+    -------
+    LevelAgreement
+    """
+    ours, other = (
+        10 * np.log10(np.asarray(values)[where].astype(np.float64)) for values in (power, reference)
+    )
+    if not ours.size:
+        return LevelAgreement(np.nan, np.nan, np.nan)
+    difference = ours - other
+    flat = ours.size < 2 or np.ptp(ours) == 0 or np.ptp(other) == 0
+    correlation = np.nan if flat else float(np.corrcoef(ours, other)[0, 1])
+    rms_db = float(np.sqrt((difference**2).mean()))
+    return LevelAgreement(correlation, float(difference.mean()), rms_db)
+
+
+def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
+    """Mark cells 10 dB above the median, which is noise, and at most 60 dB below the peak."""
+    values = np.asarray(power)
+    floor = max(10 * float(np.median(values)), 1e-6 * float(values.max(initial=0.0)))
+    return np.asarray(values > floor)
+
+
+def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: ArrayLike) -> float:
+    """Compute the Chamfer distance: mean distance to the nearest point of the other cloud.
+
+    Parameters
+    ----------
+    points, reference : (n, axis), (m, axis) float64
+        Clouds.
+    bins : (axis,) array_like
+        Unit of each axis, such as the width of its bins.
+
+    Returns
+    -------
+    float
+        Average over both directions [bins]. Two samplings of one surface have half the mean
+        distance between points, not 0. Infinite if one cloud alone is empty, 0 if both are.
+    """
+    from scipy.spatial import KDTree  # slow to import
+
+    if not len(points) or not len(reference):
+        return 0.0 if len(points) == len(reference) else np.inf
+    ours, other = (
+        np.asarray(cloud) / np.asarray(bins, dtype=np.float64) for cloud in (points, reference)
+    )
+    there, back = KDTree(other).query(ours)[0], KDTree(ours).query(other)[0]
+    return float(there.mean() + back.mean()) / 2
+
+
 def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, LevelAgreement]:
-    """Range-Doppler maps over cells that either detects, overlap of detections, spectrograms over cells above the noise."""
+    """Compare range-Doppler maps over cells that either detects, detections, and spectrograms."""
     with h5py.File(ours / "maps.h5") as first, h5py.File(reference / "maps.h5") as second:
         cells, both, either = [], 0, 0
-        for window in range(len(first["time"])):
-            masks = [maps["detections"][window].astype(bool) for maps in (first, second)]
-            union = masks[0] | masks[1]
-            both, either = both + int((masks[0] & masks[1]).sum()), either + int(union.sum())
-            cells.append([maps["range_doppler"][window][union] for maps in (first, second)])
-        power, other = (np.concatenate(column) for column in zip(*cells, strict=True))
-        levels = level_agreement(power, other, np.ones(len(power), dtype=bool))
+        for frame in range(len(first["time"])):
+            mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))
+            union = mask | other
+            both, either = both + int((mask & other).sum()), either + int(union.sum())
+            cells.append([maps["range_doppler"][frame][union] for maps in (first, second)])
+        power, its_power = (np.concatenate(column) for column in zip(*cells, strict=True))
+        levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
         spectrogram, its = (
             thinned(maps, "spectrogram", "spectrogram_time")[0] for maps in (first, second)
         )
@@ -252,95 +362,11 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
         return levels, both / either if either else 1.0, alike
 
 
-def _unit(
-    radar: Radar, said: Mapping[str, Any], powers: Iterable[NDArray[np.floating]]
-) -> FieldUnit:
-    """The unit of powers that sum over ranges, by the strongest of them; ``said`` is a summary with the parameters of the run."""
-    return field_unit(
-        radar,
-        spreading=said["parameters"]["spreading"],
-        strongest_m2=max(float(one.max()) for one in powers),
-    )
-
-
-def _draw(
-    results: Mapping[str, Result],
-    mean_power: Mapping[str, NDArray[np.float64]],
-    unit: FieldUnit,
-    folder: Path,
-    radar: Radar,
-    reference: str,
-) -> dict[str, Path]:
-    any_result = next(iter(results.values()))
-    said = any_result.summary
-    title = f"{any_result.summary['parameters']['motion']}, {radar.name}"
-    drawn = {
-        "Echo power over time": folder / "compare_power.png",
-        "Echo power and hiding of each part": folder / "compare_parts.png",
-        "Range-Doppler": folder / "compare_range_doppler.png",
-        "Spectrogram": folder / "compare_spectrogram.png",
-        "Range-Doppler-time clouds": folder / "compare_cloud.png",
-    }
-    paths = iter(drawn.values())
-    surveys = {name: result.survey for name, result in results.items()}
-    power = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
-    draw_power_over_time(
-        next(paths),
-        any_result.survey.times,
-        power,
-        _unit(radar, said, power.values()),
-        reference,
-        title,
-    )
-    hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
-    draw_part_power(next(paths), list(said["part_power_m2"]), mean_power, hidden, unit, title)
-    with h5py.File(folder / reference / "maps.h5") as maps:
-        window = busiest_window(maps)
-        moment, velocity = float(maps["time"][window]), maps["velocity"][:]
-        cleaned = {name: title + removed(maps[name]) for name in ("range_doppler", "spectrogram")}
-        slow, times = (
-            maps["spectrogram_velocity"][:],
-            thinned(maps, "spectrogram", "spectrogram_time")[1],
-        )
-    range_doppler, spectrogram = {}, {}
-    for name in results:
-        with h5py.File(folder / name / "maps.h5") as maps:
-            range_doppler[name] = maps["range_doppler"][window]
-            spectrogram[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / HANN_BINS
-    across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
-    by_range = field_unit(
-        radar, spreading=said["parameters"]["spreading"], range_m=radar.range_m[:, None]
-    )
-    levels = {
-        name: by_range.level(power / radar.n_channels) for name, power in range_doppler.items()
-    }
-    label = by_range.label("mean of channels")
-    draw_maps(
-        next(paths),
-        levels,
-        label,
-        across,
-        up,
-        f"{cleaned['range_doppler']}, window at {moment:.2f} s",
-    )
-    summed = _unit(radar, said, spectrogram.values())
-    levels = {name: summed.level(power) for name, power in spectrogram.items()}
-    draw_maps(
-        next(paths),
-        levels,
-        summed.label("one channel"),
-        ("Time [s]", times),
-        (across[0], slow),
-        cleaned["spectrogram"],
-    )
-    draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
-    return drawn
-
-
-def _level_db(power: NDArray[np.float64]) -> NDArray[np.float64]:
+def _total_db(result: Result) -> NDArray[np.float64]:
+    power = result.survey.power_at.sum(axis=1)
     return np.asarray(10 * np.log10(np.maximum(power, np.finfo(np.float64).tiny)))
 
 
 def _finite(value: float) -> float | None:
-    """JSON has no NaN."""
+    """Replace NaN and infinity, which JSON has not."""
     return value if np.isfinite(value) else None

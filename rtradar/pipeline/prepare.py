@@ -1,10 +1,11 @@
-"""Setting a person before a radar in a scene: echoes budget, noise settled, the room traced."""
+"""Preparation of a run: placement, echo model, link budget, noise, and the clutter of the room."""
 
 from __future__ import annotations
 
 import math
 import time
 import warnings
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,8 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
-from rtradar.pipeline.timing import Stages
+from rtradar.pipeline.processing import Processing
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
-from rtradar.process import WindowFunctions, build_detector, clutter_removal
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
 from rtradar.scatter.link_budget import LinkBudget, link_budget
@@ -28,24 +28,22 @@ from rtradar.settings import MAX_SNR_DB, RunSettings
 from rtradar.signal import Noise
 
 
-def prepare(
-    motion: Motion, radar: Radar, scene: Scene, settings: RunSettings, stages: Stages
-) -> Capture:
-    """Place a person before a radar, build the echo model, survey its echoes, and trace the room.
+def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -> Capture:
+    """Place a person before a radar and settle everything that the first echo needs.
 
     Errors are those of `rtradar.run`.
     """
-    removal = clutter_removal(settings.clutter_removal, radar)
-    detect = build_detector(settings.detector, pfa=settings.pfa, looks=radar.n_channels)
-    window_functions = WindowFunctions(settings.range_window, settings.doppler_window)
+    processing = Processing.of(radar, settings)
     if settings.snr_db == "physical":
-        # These say what is missing before the work.
+        # They report a missing value before the work.
         radar.noise_power_w, radar.watts_per_m2  # noqa: B018
     with processing_compiled_beside():
-        with stages.time("motion"):
-            radar, body = _placed(motion, radar, scene, settings)
-        n_chirps, windows = _frames(motion, radar, body)
-        warm = time.perf_counter()
+        with processing.stages.time("motion"):
+            body = _placed(motion, scene, settings)
+            radar = scene.place(radar)
+            processing = replace(processing, radar=radar)
+        n_chirps, frame_starts = _frames(motion, radar, body)
+        warm_up_start = time.perf_counter()
         model = _echo_model(radar, body, scene, settings)
         echoes = model.echoes(np.arange(2 * radar.n_tx))
         # Not every model has specular points; the report shows them of all.
@@ -53,8 +51,8 @@ def prepare(
             Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0])), points=True
         )
     warm_up_processing(echoes, radar)
-    warmup_s = time.perf_counter() - warm
-    with warnings.catch_warnings(record=True) as caught, stages.time("survey"):
+    warmup_s = time.perf_counter() - warm_up_start
+    with warnings.catch_warnings(record=True) as caught, processing.stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
         person = model.person if isinstance(model, RoomModel) else model
         budget = link_budget(
@@ -65,13 +63,15 @@ def prepare(
     noise = _noise(radar, budget, settings)
     inside = None
     if isinstance(model, RoomModel):
-        with stages.time("room"):
+        with processing.stages.time("room"):
             inside = indoors(
                 model, radar, body, scene, settings, n_chirps, budget.power, noise.power
             )
-    names = [motion.name, radar.name, settings.fidelity, *([scene.name] if inside else [])]
     return Capture(
-        radar=radar,
+        motion=motion.name,
+        scene=scene,
+        settings=settings,
+        processing=processing,
         body=body,
         model=model,
         inside=inside,
@@ -79,41 +79,31 @@ def prepare(
         warned=tuple(str(warning.message) for warning in caught),
         noise=noise,
         n_chirps=n_chirps,
-        windows=windows,
-        removal=removal,
-        detect=detect,
-        window_functions=window_functions,
-        title=", ".join(names),
-        stages=stages,
+        frame_starts=frame_starts,
         warmup_s=warmup_s,
     )
 
 
-def _placed(
-    motion: Motion, radar: Radar, scene: Scene, settings: RunSettings
-) -> tuple[Radar, Body]:
-    """The radar and the person where they are in the scene."""
+def _placed(motion: Motion, scene: Scene, settings: RunSettings) -> Body:
+    """Return the person at their position in the scene."""
+    heading_deg = settings.heading_deg + scene.heading_deg
     placed = place(
-        motion,
-        start_s=settings.start_s,
-        duration_s=settings.duration_s,
-        heading_deg=settings.heading_deg + scene.heading_deg,
+        motion, start_s=settings.start_s, duration_s=settings.duration_s, heading_deg=heading_deg
     )
-    body = Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
-    return scene.place(radar), body
+    return Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
 
 
 def _frames(motion: Motion, radar: Radar, body: Body) -> tuple[int, NDArray[np.int64]]:
-    """The number of chirps in whole cycles, and the first cycle of each frame."""
+    """Return the number of chirps in whole cycles, and the first cycle of each frame."""
     n_chirps = math.floor(body.duration_s / radar.cycle_duration_s * (1 + 1e-12)) * radar.n_tx
-    windows = radar.window_starts(n_chirps)
-    if len(windows) == 0:
+    starts = radar.window_starts(n_chirps)
+    if len(starts) == 0:
         raise InputError(
             f"motion {motion.name}: the interval of {body.duration_s:.3f} s holds no whole frame "
             f"of {radar.frame_duration_s} s of radar '{radar.name}'; choose a longer one "
             "(--start, --duration)"
         )
-    return n_chirps, windows
+    return n_chirps, starts
 
 
 def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -> EchoModel:
@@ -133,7 +123,7 @@ def _echo_model(radar: Radar, body: Body, scene: Scene, settings: RunSettings) -
 
 
 def _noise(radar: Radar, budget: LinkBudget, settings: RunSettings) -> Noise:
-    """The noise per sample, by the first of the settings that says its power."""
+    """Return the noise per sample, by the first of the settings that gives its power."""
     if settings.noise_power_m2 is not None:
         return Noise(settings.noise_power_m2, settings.seed)
     if not isinstance(settings.snr_db, str):

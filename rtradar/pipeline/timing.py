@@ -1,4 +1,4 @@
-"""Seconds and memory of a run, stage by stage."""
+"""Wall-clock time of the stages of a run, and its memory."""
 
 from __future__ import annotations
 
@@ -13,14 +13,10 @@ from pathlib import Path
 
 
 class Stages:
-    """Wall-clock seconds by the name of the stage."""
+    """Wall-clock time [s] by the name of the stage, in ``seconds``."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
-
-    def rounded(self) -> dict[str, float]:
-        """The same in whole tenths of a millisecond."""
-        return {name: round(seconds, 4) for name, seconds in self.seconds.items()}
 
     @contextmanager
     def time(self, name: str) -> Iterator[None]:
@@ -37,25 +33,22 @@ _HEAP_BYTES = 1 << 24
 
 
 def keep_memory_low() -> None:
-    """Ask the GNU C library for one heap, and to give back at once what large arrays took; elsewhere nothing happens.
+    """Make the GNU C library keep one heap and return large arrays at once; for the whole process.
 
-    Each thread that starts may else get a heap of its own, which keeps what was freed in it, and the size from which an array
-    is given back to the system grows with what was freed before. Then memory depends on how threads fell in with each
-    other, and creeps for seconds. Smaller arrays stay in the heap: the blocks of a run use the same memory again, and the
-    system need not clear new pages for each. Holds for the process, for good.
+    Otherwise each thread may get a heap of its own, which keeps what was freed in it, and the size
+    from which an array is returned to the system grows with what was freed before. Memory then
+    depends on how threads met, and creeps for seconds. Smaller arrays stay in the heap: the blocks
+    of a run use the same memory again, and the system need not clear new pages for each.
     """
     library = _gnu_c_library()
     if library is not None:
-        for option, value in (
-            (_M_ARENA_MAX, 1),
-            (_M_MMAP_THRESHOLD, _HEAP_BYTES),
-            (_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES),
-        ):
-            library.mallopt(option, value)
+        library.mallopt(_M_ARENA_MAX, 1)
+        library.mallopt(_M_MMAP_THRESHOLD, _HEAP_BYTES)
+        library.mallopt(_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)
 
 
 def give_back_memory() -> None:
-    """Let the GNU C library give back all that is free in its heap; elsewhere nothing happens. Takes milliseconds."""
+    """Return all that is free in the heap of the GNU C library; takes milliseconds."""
     library = _gnu_c_library()
     if library is not None:
         library.malloc_trim(0)
@@ -66,13 +59,13 @@ def _gnu_c_library() -> ctypes.CDLL | None:
 
 
 def forget_peak_memory() -> None:
-    """Let `peak_memory_mb` begin anew, where the system can: Linux does, elsewhere it stays that of the process."""
+    """Restart `peak_memory_mb` on Linux; elsewhere it stays that of the whole process."""
     with suppress(OSError):
         Path("/proc/self/clear_refs").write_text("5")  # proc(5): resets the peak resident set size
 
 
 def peak_memory_mb() -> float:
-    """Largest resident size of this process since `forget_peak_memory`, or so far [MB = 1e6 bytes]."""
+    """Return the peak resident size since `forget_peak_memory`, or so far [MB = 1e6 bytes]."""
     with suppress(OSError):
         for line in Path("/proc/self/status").read_text().splitlines():
             if line.startswith("VmHWM:"):

@@ -32,7 +32,7 @@ def _cores() -> int:
     return os.cpu_count() or 1
 
 
-def environment_of(threads: int) -> dict[str, str]:
+def thread_environment(threads: int) -> dict[str, str]:
     """Environment that holds a new process to that many threads: ours, those of compiled loops, and of linear algebra."""
     own = (
         THREADS_VARIABLE,

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.pipeline.view import load_run_view, view
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots, save_snapshots
 
@@ -80,7 +80,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def test_the_folder_is_good(folder: Path) -> None:
-    linked = load_linked(folder)
+    linked = load_run_view(folder)
     # Each point of the cloud has the power of the cell that it is nearest to, looked for here one by one.
     for (time, distance, velocity), power_db in zip(
         CLOUD["points"], linked.rdt_power_db, strict=True
@@ -98,7 +98,7 @@ def test_the_folder_is_good(folder: Path) -> None:
 
 def refused(folder: Path, says: str) -> None:
     with pytest.raises(InputError, match=says) as caught:
-        load_linked(folder)
+        load_run_view(folder)
     assert len(str(caught.value).splitlines()) == 1
 
 

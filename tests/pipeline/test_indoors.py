@@ -11,7 +11,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.errors import InputError
 from rtradar.motion import place
-from rtradar.pipeline.received import ReceivedWindow
+from rtradar.pipeline.writer import ReceivedFrame
 from rtradar.scatter import build_model
 from rtradar.scatter.multipath.path_summary import ghosts
 
@@ -138,7 +138,7 @@ def test_what_has_no_meaning_in_a_room_is_refused_before_anything_is_written(
 def test_a_received_window_is_put_together_from_pieces() -> None:
     rng = np.random.default_rng(0)
     stream = rng.normal(size=(400, RADAR.n_rx, 8)) + 0j
-    window = ReceivedWindow(RADAR, start_cycle=20)
+    window = ReceivedFrame(RADAR, start_cycle=20)
     found = [window.push(stream[first : first + 62], first) for first in range(0, 400, 62)]
     cubes = [cube for cube in found if cube is not None]
     assert len(cubes) == 1

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 
 import rtradar as rt
 from rtradar.exchange import read_cloud
-from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.pipeline.view import load_run_view, view
 
 LINES = {
     "y": {"tx_y": 2, "tx_z": 0, "rx_y": 4, "rx_z": 0},
@@ -97,7 +97,7 @@ def test_pages_show_what_is_measured(
 ) -> None:
     line, out, _ = made
     view(out, page=tmp_path / "view.html", still=tmp_path / "still.png")
-    assert load_linked(out).spatial.measured.tolist() == [True, line == "y", line == "z"]
+    assert load_run_view(out).spatial.measured.tolist() == [True, line == "y", line == "z"]
     for page in (out / "report.html", tmp_path / "view.html"):
         text = page.read_text(encoding="utf-8")
         found = re.search(r'id="report-data">(.*?)</script>', text)

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import rtradar
-from rtradar.system.threads import environment_of
+from rtradar.system.threads import thread_environment
 
 RADAR = "tx_y = 2\ntx_z = 2\nrx_y = 4\nrx_z = 4\nchirp_duration_s = 125e-6\nsamples_per_chirp = 128\nframe_duration_s = 0.05\n"
 
@@ -60,7 +60,7 @@ def test_one_thread_and_three_give_the_same_bits(tmp_path: Path, options: list[A
         ]
         done = subprocess.run(
             command,
-            env={**os.environ, **environment_of(threads)},
+            env={**os.environ, **thread_environment(threads)},
             capture_output=True,
             text=True,
             check=False,

@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import rtradar as rt
 from rtradar.cli import main
-from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import COLOURS
 
 
@@ -32,7 +32,7 @@ def made(
 
 
 def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
-    linked = load_linked(made)
+    linked = load_run_view(made)
     shown = (
         linked.range_doppler.low_db
         + linked.range_doppler.step_db * linked.range_doppler.level.astype(float)
@@ -51,7 +51,7 @@ def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
 
 
 def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
-    linked = load_linked(made)
+    linked = load_run_view(made)
     snapshots, levels = linked.snapshots, linked.range_doppler
     near = 0
     for step in range(len(snapshots.times)):
@@ -70,7 +70,7 @@ def test_the_strongest_echo_stands_on_the_strongest_cell(made: Path) -> None:
 
 
 def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
-    linked = load_linked(made)
+    linked = load_run_view(made)
     with h5py.File(made / "maps.h5") as maps:
         time, distance, velocity = (maps[name][:] for name in ("time", "range", "velocity"))
         for point in (0, 17, len(linked.rdt_points) - 1):

@@ -89,7 +89,7 @@ def test_it_ends_with_standard_input(tmp_path: Path) -> None:
 def test_one_that_takes_too_long_is_not_waited_for(
     others: list[subprocess.Popen[bytes]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(warm_up, "_LONGEST_S", 0.01)
+    monkeypatch.setattr(warm_up, "_MAX_S", 0.01)
     with processing_compiled_beside():
         pass
     (other,) = others

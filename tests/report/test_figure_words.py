@@ -15,7 +15,7 @@ from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
 
 import rtradar as rt
-from rtradar.pipeline.cloud_maker import window_angles
+from rtradar.pipeline.processing import frame_angles
 from rtradar.process import angle_grid, power_map, range_azimuth, range_spectrum, range_time
 from rtradar.report import (
     draw_before_after,
@@ -195,7 +195,7 @@ def test_a_sphere_reads_its_own_cross_section(
     cube = spectra.reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
     power = power_map(cube, radar)
     mask = power > power.max() * 1e-4
-    angles = window_angles(cube, mask, radar)
+    angles = frame_angles(cube, mask, radar)
     azimuth = {"azimuth": (range_azimuth(angles, radar), angle_grid(radar))}
     draw_range_doppler(FILE, power, mask, radar, "run")
     draw_range_time(FILE, range_time(spectra, radar)[0], np.arange(4.0), radar, "run")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline.pictures.run_view import load_linked, view
+from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import RunView
 from rtradar.scene import Furniture, material
 
@@ -33,7 +33,7 @@ def seen(
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.6)
     rt.run(motion, radar, room, out=folder, fidelity="analytic", clutter_removal="mean")
     view(folder, page=folder / "view.html")
-    return (folder / "view.html").as_uri(), load_linked(folder)
+    return (folder / "view.html").as_uri(), load_run_view(folder)
 
 
 def go(browser: Any, step: int) -> None:

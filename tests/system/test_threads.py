@@ -17,9 +17,9 @@ import pytest
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
-    environment_of,
     in_threads,
     thread_count,
+    thread_environment,
     thread_limit,
 )
 
@@ -143,7 +143,7 @@ def test_no_environment_no_limit(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.slow
 def test_every_kind_of_thread_is_limited() -> None:
-    environment = {**os.environ, **environment_of(1)}
+    environment = {**os.environ, **thread_environment(1)}
     found = subprocess.run(
         [sys.executable, "-c", COUNT], env=environment, capture_output=True, text=True, check=True
     )

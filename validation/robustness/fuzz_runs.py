@@ -11,7 +11,7 @@ import numpy as np
 from fuzz_kit import Target, as_text, hdf5, npz
 from fuzz_small import ARRAYS, JSON, RADAR, RADAR_WORDS, RDT, SPATIAL, SUMMARY
 
-from rtradar.pipeline.pictures.run_view import load_linked
+from rtradar.pipeline.view import load_run_view
 from rtradar.report.view.run_view import view_data
 
 MAPS = {
@@ -56,7 +56,7 @@ def _look(change: Callable[[Path, bytes], object]) -> Callable[[Path, bytes], No
         for file in ("summary.json", "view.npz", "maps.h5", "cloud_rdt.npz", "cloud_xyz.npz"):
             shutil.copyfile(folder / "good" / file, folder / file)
         change(folder, data)
-        linked = load_linked(folder)
+        linked = load_run_view(folder)
         json.dumps(view_data(linked), allow_nan=False)  # as its page does
 
     return read

@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import pytest
 
-from rtradar.pipeline import cloud_maker
-from rtradar.pipeline.cloud_maker import window_angles
+from rtradar.pipeline import processing
+from rtradar.pipeline.processing import frame_angles
 from rtradar.radar import Radar
 
 RADAR = Radar(
@@ -30,9 +30,9 @@ def test_cells_a_few_at_a_time(monkeypatch: pytest.MonkeyPatch, radar: Radar, n_
     cube = (rng.normal(size=shape) + 1j * rng.normal(size=shape)).astype(np.complex64)
     mask = np.zeros((radar.samples_per_chirp, radar.cycles_per_frame), dtype=bool)
     mask.flat[rng.choice(mask.size, n_cells, replace=False)] = True
-    whole = window_angles(cube, mask, radar)
-    monkeypatch.setattr(cloud_maker, "_CELLS_AT_ONCE", 7)
-    pieces = window_angles(cube, mask, radar)
+    whole = frame_angles(cube, mask, radar)
+    monkeypatch.setattr(processing, "_CELLS_AT_ONCE", 7)
+    pieces = frame_angles(cube, mask, radar)
     assert len(whole.range_m) == n_cells
     for field in dataclasses.fields(whole):
         ours, theirs = getattr(pieces, field.name), getattr(whole, field.name)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
-from rtradar.pipeline.pictures import snapshots as module
-from rtradar.pipeline.pictures.snapshots import moments
+from rtradar.pipeline import snapshots as module
+from rtradar.pipeline.snapshots import snapshots_of
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 
@@ -48,7 +48,7 @@ def look(
     body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None
 ) -> Any:
     chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
-    return moments(model, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
+    return snapshots_of(model, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
 
 
 def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres: Body) -> None:
@@ -169,8 +169,8 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
 def test_long_captures_and_rich_rooms_keep_no_more(
     spheres: Body, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(module, "MOST_STEPS", 4)
-    monkeypatch.setattr(module, "MOST_ECHOES", 25)
+    monkeypatch.setattr(module, "MAX_STEPS", 4)
+    monkeypatch.setattr(module, "MAX_ECHOES", 25)
     scene = Scene(name="one wall", walls=(WALL,))
     found = look(spheres, build_model("analytic", RADAR, spheres, scene=scene), scene)
     windows = RADAR.window_starts(N_CHIRPS)
@@ -205,7 +205,7 @@ def test_furniture_is_its_mesh_or_where_that_is_fine_its_box(
     model = build_model("analytic", RADAR, spheres, spreading=True)
     limit = len(chair.triangles().faces)
     assert limit < len(lamp.triangles().faces)
-    monkeypatch.setattr(module, "MOST_FACES", limit)
+    monkeypatch.setattr(module, "MAX_FACES", limit)
     found = look(spheres, model, scene, windows=np.array([0]))
     vertices = found.furniture_vertices.astype(float)
     own = found.furniture_faces[: len(chair.triangles().faces)]

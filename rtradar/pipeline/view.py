@@ -1,4 +1,4 @@
-"""What a run left in its folder, read again for `rtradar view`."""
+"""Reader of the folder of a run, for `rtradar view`; the files may be damaged or anybody's."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
-from rtradar.pipeline.pictures.run_pictures import thinned
+from rtradar.pipeline.pictures import thinned
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import HANN_BINS, FieldUnit, field_unit
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
@@ -23,24 +23,24 @@ from rtradar.system.checks import printable
 from rtradar.system.files import open_regular, read_arrays, read_json, stored
 from rtradar.system.output_folder import check_whole
 
-_MOST_ROWS, _MOST_COLUMNS = 256, 200
-"""Of a range-Doppler map; of larger ones neighbours are put together, the strongest for all."""
+_MAX_ROWS, _MAX_COLUMNS = 256, 200
+"""Size of a range-Doppler map; larger ones are pooled to the strongest of neighbouring cells."""
 
 _MAPS = {
     "range_doppler": ("time", "range", "velocity"),
     "spectrogram": ("spectrogram_time", "spectrogram_velocity"),
 }
-"""What is read of ``maps.h5``, with its axes."""
+"""Datasets that are read from ``maps.h5``, with their axes."""
 
 _LARGEST = 1e9
-"""Of coordinates and rates, in whatever unit; what is larger is damage."""
+"""Largest coordinate or rate, in any unit; a larger one is damage."""
 
-_MOST_LETTERS = 200
-"""Of a name from the summary."""
+_MAX_LETTERS = 200
+"""Length of a name from the summary that is shown."""
 
 _DYNAMIC_RANGE_DB = 60.0
 _SAMPLED = 16
-"""Maps whose median tells the noise."""
+"""Number of maps whose medians give the noise."""
 
 _DAMAGE = (OSError, ValueError, KeyError, IndexError, TypeError, RuntimeError, OverflowError)
 _MEND = "make it anew with: rtradar run"
@@ -59,64 +59,61 @@ def view(
     Parameters
     ----------
     folder : path
-        As ``run(..., out=folder)`` leaves it.
+        Folder of a run.
     page : path, optional
-        HTML file to write, with all it needs inside.
+        HTML file to write, which needs no other file.
     still : path, optional
         PNG file to draw.
     time_s : float, optional
-        Of the still, the nearest window [s]; the middle of the capture if left out.
+        Time of the still [s], taken from the nearest frame; the middle of the capture if left out.
     colour : {"part", "power", "velocity"}
-        What colours mean, at first on the page.
+        Quantity that colours show, on the page until the reader chooses another.
 
     Returns
     -------
     dict
-        ``windows`` and ``echoes`` shown, ``first_s`` and ``last_s`` of the windows, and with each file its path and bytes.
+        Numbers of ``windows`` and ``echoes`` shown, times ``first_s`` and ``last_s`` of the
+        windows, and path and bytes of each file.
 
     Raises
     ------
     InputError
-        Where a file of the folder is missing or damaged, the time lies outside of the capture, a colour is unknown, or a file
-        cannot be written.
+        If a file of the folder is missing or damaged, the time lies outside of the capture, the
+        colour is unknown, or a file cannot be written.
     """
     if colour not in COLOURS:
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
     if not os.path.isdir(folder):
         raise InputError(f"'{folder}' is no folder; give the one that 'rtradar run --out' named")
     check_whole(Path(folder))
-    linked = load_linked(Path(folder))
-    times = linked.snapshots.times
-    if (
-        time_s is not None
-        and not times[0] - linked.radar.frame_duration_s
-        <= time_s
-        <= times[-1] + linked.radar.frame_duration_s
-    ):
+    run_view = load_run_view(Path(folder))
+    times, margin_s = run_view.snapshots.times, run_view.radar.frame_duration_s
+    if time_s is not None and not times[0] - margin_s <= time_s <= times[-1] + margin_s:
         raise InputError(
-            f"time_s = {time_s}; the capture has windows from {times[0]:.3f} to {times[-1]:.3f} s (--time)"
+            f"time_s = {time_s}; the capture has windows "
+            f"from {times[0]:.3f} to {times[-1]:.3f} s (--time)"
         )
-    told: dict[str, Any] = {
+    shown: dict[str, Any] = {
         "windows": len(times),
-        "echoes": len(linked.snapshots.echo_part),
+        "echoes": len(run_view.snapshots.echo_part),
         "first_s": float(times[0]),
         "last_s": float(times[-1]),
     }
     if page is not None:
-        write_view(page, linked, name=printable(Path(folder).resolve().name), colour=colour)
-        told["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
+        write_view(page, run_view, name=printable(Path(folder).resolve().name), colour=colour)
+        shown["page"] = {"path": str(page), "bytes": Path(page).stat().st_size}
     if still is not None:
-        step = linked.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
-        draw_still(still, linked, step, colour=colour)
-        told["still"] = {
+        step = run_view.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
+        draw_still(still, run_view, step, colour=colour)
+        shown["still"] = {
             "path": str(still),
             "bytes": Path(still).stat().st_size,
             "time_s": float(times[step]),
         }
-    return told
+    return shown
 
 
-def load_linked(folder: Path) -> RunView:
+def load_run_view(folder: Path) -> RunView:
     """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
 
     Raises
@@ -126,7 +123,8 @@ def load_linked(folder: Path) -> RunView:
     """
     if not os.path.isfile(folder / "summary.json"):
         raise InputError(
-            f"'{folder}' holds no run (there is no summary.json); give the folder that 'rtradar run --out' named"
+            f"'{folder}' holds no run (there is no summary.json); give the folder that "
+            "'rtradar run --out' named"
         )
     summary, radar = _summary(folder / "summary.json")
     parameters = summary["parameters"]
@@ -191,7 +189,7 @@ def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
 
 def _line(value: Any) -> str:
     """As a page shows it: JSON may hold half of a character, which no file can."""
-    return printable(str(value)[:_MOST_LETTERS])
+    return printable(str(value)[:_MAX_LETTERS])
 
 
 def _archive(
@@ -213,7 +211,7 @@ def _finite(values: NDArray[Any]) -> NDArray[Any]:
     return values
 
 
-# -- maps ----------------------------------------------------------------------------------------------------------------
+# -- maps -------------------------------------------------------------------------------------------
 
 
 def _maps(file: h5py.File) -> dict[str, Any]:
@@ -242,13 +240,13 @@ def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDA
 
 
 def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
-    """Lowest level and the step between levels [dB]: from 3 dB below the noise, or 60 dB below the peak, up to the peak."""
+    """Return the lowest level, 3 dB below the noise or 60 dB below the peak, and the step [dB]."""
     low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
     return low, (top_db - low) / MOST_LEVEL
 
 
 def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
-    """Maps of the snapshots' windows, mean of the channels."""
+    """Maps of the windows of the snapshots, mean of the channels."""
     power, velocity, distance = maps["range_doppler"], maps["velocity"][:], maps["range"][:]
     unit = field_unit(radar, spreading=spreading, range_m=distance[:, None])
     scale = np.asarray(unit.scale) / radar.n_channels
@@ -260,7 +258,7 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
     ]
     scaled = FieldUnit(unit.name, 1.0)
     low_db, step_db = _scale(*scaled.level(_powers(np.array([top, np.median(noise)]))).tolist())
-    rows, columns = math.ceil(len(distance) / _MOST_ROWS), math.ceil(len(velocity) / _MOST_COLUMNS)
+    rows, columns = math.ceil(len(distance) / _MAX_ROWS), math.ceil(len(velocity) / _MAX_COLUMNS)
 
     def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
         by_row = np.maximum.reduceat(values, np.arange(0, len(distance), rows), axis=0)
@@ -312,15 +310,13 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
 def _at_points(
     maps: Any, points: NDArray[np.float64], radar: Radar, spreading: bool
 ) -> NDArray[np.float64]:
-    """Power (point,) of the range-Doppler map where points of the cloud are nearest, mean of the channels [dB]."""
+    """Return the power of the range-Doppler map nearest to each point, mean of channels [dB]."""
     if not len(points):
         return np.zeros(0)
     nearest = []
     for axis, column in zip(_MAPS["range_doppler"], points.T, strict=True):
         values = maps[axis][:]
-        nearest.append(
-            np.searchsorted((values[1:] + values[:-1]) / 2, column)
-        )  # which is in the middle goes to the lower
+        nearest.append(np.searchsorted((values[1:] + values[:-1]) / 2, column))
     found = np.zeros(len(points))
     for window in np.unique(nearest[0]).tolist():
         own = nearest[0] == window

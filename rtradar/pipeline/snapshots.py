@@ -1,4 +1,4 @@
-"""Body, room, and echoes with their ways at the middles of windows: what a run keeps for `rtradar view`."""
+"""Snapshots of body, room and echoes at the middle of frames, which `rtradar view` shows."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.pipeline.capture import Capture
 from rtradar.radar import Radar
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
@@ -19,27 +20,27 @@ from rtradar.scatter.multipath.room_model import RoomModel
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.scene import Scene, Triangles
 
-MOST_STEPS = 400
-"""10 s at the full rate; of longer captures fewer windows a second are kept, so that the file does not grow."""
+MAX_STEPS = 400
+"""Largest number of snapshots, those of 10 s; of longer captures fewer frames are kept."""
 
 STEPS_HZ = 40.0
-"""Most moments a second."""
+"""Largest number of snapshots per second."""
 
-MOST_ECHOES = 400
-"""The strongest by mean power; a person in a room of six walls has 273 of one wall."""
+MAX_ECHOES = 400
+"""Number of echoes kept, the strongest; a person has 273 over single walls in a room of six."""
 
-MOST_FACES = 2000
-"""Of a piece of furniture; a finer mesh is kept as its box."""
+MAX_FACES = 2000
+"""Largest number of faces of a piece of furniture; a finer mesh is kept as its box."""
 
 _AT_ONCE = 16
 _RATE_CYCLES = 2
-"""Before and after a moment, over which range rates are taken."""
+"""Cycles before and after a snapshot, over which range rates are taken."""
 
 Key = tuple[int, int, int]
 
 
-class _Looked(NamedTuple):
-    """Some steps: ``keys (path, part, bounces)`` of echoes, and ``range_m``, ``velocity_mps``, ``power_m2 (step, key)``."""
+class _Observed(NamedTuple):
+    """Some snapshots: path, part and bounces of each echo, and its values, (step, key)."""
 
     keys: list[Key]
     range_m: NDArray[np.float64]
@@ -47,47 +48,52 @@ class _Looked(NamedTuple):
     power_m2: NDArray[np.float64]
 
 
-def moments(
+def snapshots(capture: Capture) -> Snapshots:
+    """Return body, room and echoes of a capture at the middle of evenly chosen frames."""
+    radar, starts = capture.radar, capture.frame_starts
+    return snapshots_of(capture.model, radar, capture.body, capture.scene, starts, capture.n_chirps)
+
+
+def snapshots_of(
     model: EchoModel,
     radar: Radar,
     body: Body,
     scene: Scene,
-    windows: NDArray[np.int64],
+    frame_starts: NDArray[np.int64],
     n_chirps: int,
 ) -> Snapshots:
-    """Look at the middle of windows.
+    """Return snapshots at the middle of frames; as many for any length of the capture.
 
     Parameters
     ----------
     model : EchoModel
-        Its echoes, by the Tx nearest to the middle of the array, summed up by path, part and bounces.
+        Echo model; its echoes from the Tx nearest to the middle of the array are summed by path,
+        part and number of reflections.
     radar : Radar
-        Where it stands in the scene.
+        Radar at its position in the scene.
     body : Body
+        Person at their position in the scene.
     scene : Scene
-    windows : (window,) int64
-        First cycle of each.
+        Walls and furniture.
+    frame_starts : (frame,) int64
+        First cycle of each frame.
     n_chirps : int
-        In the capture.
+        Number of chirps in the capture.
 
     Returns
     -------
     Snapshots
-        Of evenly chosen windows; as large for any length of the capture.
     """
-    hop_s = (
-        radar.frame_hop_s
-        if len(windows) < 2
-        else float(np.diff(windows).mean()) * radar.cycle_duration_s
-    )
-    every = max(math.ceil(len(windows) / MOST_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
-    window = np.arange(0, len(windows), every)
-    times = np.minimum(radar.window_times(windows[window]), body.duration_s)
+    hop_s = radar.frame_hop_s
+    if len(frame_starts) > 1:
+        hop_s = float(np.diff(frame_starts).mean()) * radar.cycle_duration_s
+    every = max(math.ceil(len(frame_starts) / MAX_STEPS), math.ceil(1 / (STEPS_HZ * hop_s) - 1e-6))
+    window = np.arange(0, len(frame_starts), every)
+    times = np.minimum(radar.window_times(frame_starts[window]), body.duration_s)
     paths = model.paths if isinstance(model, RoomModel) else (WallPath((), ()),)
-    keys, looked = _look(
-        model, radar, windows[window] + radar.cycles_per_frame // 2, n_chirps // radar.n_tx
-    )
-    chosen = _strongest(keys, looked.power_m2)
+    cycles = frame_starts[window] + radar.cycles_per_frame // 2
+    keys, observed = _observe(model, radar, cycles, n_chirps // radar.n_tx)
+    chosen = _strongest(keys, observed.power_m2)
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
     vertices, faces, piece = _furniture(scene)
@@ -100,9 +106,9 @@ def moments(
         echo_path=np.array([used.index(path) for path, _, _ in keys], dtype=np.int64),
         echo_part=np.array([part for _, part, _ in keys], dtype=np.int64),
         echo_bounces=np.array([bounces for _, _, bounces in keys], dtype=np.int64),
-        range_m=looked.range_m[:, chosen],
-        velocity_mps=looked.velocity_mps[:, chosen],
-        power_m2=looked.power_m2[:, chosen],
+        range_m=observed.range_m[:, chosen],
+        velocity_mps=observed.velocity_mps[:, chosen],
+        power_m2=observed.power_m2[:, chosen],
         corners=_corners(radar, body, paths, keys, times).astype(np.float32),
         wall_names=np.array([wall.name for wall in scene.walls], dtype=np.str_),
         walls=np.array([wall.corners for wall in scene.walls]).reshape(-1, 4, 3),
@@ -113,40 +119,41 @@ def moments(
     )
 
 
-# -- echoes ------------------------------------------------------------------------------------------------------------
+# -- echoes ----------------------------------------------------------------------------------------
 
 
-def _look(
+def _observe(
     model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int
-) -> tuple[list[Key], _Looked]:
-    """Echoes about some cycles, with one column for each key that ever comes."""
-    looked = [
-        _look_at(model, radar, cycles[first : first + _AT_ONCE], n_cycles)
+) -> tuple[list[Key], _Observed]:
+    """Return the echoes about some cycles, with one column for each key that ever comes."""
+    observed = [
+        _observe_block(model, radar, cycles[first : first + _AT_ONCE], n_cycles)
         for first in range(0, len(cycles), _AT_ONCE)
     ]
-    keys = list(dict.fromkeys(key for one in looked for key in one.keys))
+    keys = list(dict.fromkeys(key for one in observed for key in one.keys))
     place = {key: column for column, key in enumerate(keys)}
-    tables = {
-        name: np.zeros((len(cycles), len(keys))) for name in ("range_m", "velocity_mps", "power_m2")
-    }
-    for number, one in enumerate(looked):
+    names = "range_m", "velocity_mps", "power_m2"
+    tables = {name: np.zeros((len(cycles), len(keys))) for name in names}
+    for number, one in enumerate(observed):
         columns = [place[key] for key in one.keys]
         for name, table in tables.items():
             table[number * _AT_ONCE : (number + 1) * _AT_ONCE, columns] = getattr(one, name)
-    return keys, _Looked(keys, **tables)
+    return keys, _Observed(keys, **tables)
 
 
-def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int) -> _Looked:
+def _observe_block(
+    model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles: int
+) -> _Observed:
     middle = int(np.linalg.norm(radar.tx - np.asarray(radar.position_m), axis=1).argmin())
     ends = np.clip(cycles[:, None] + [-_RATE_CYCLES, _RATE_CYCLES], 0, n_cycles - 1)
     chirps, where = np.unique((ends * radar.n_tx + middle).astype(np.int64), return_inverse=True)
     where = where.reshape(ends.shape)
     echoes = model.echoes(chirps)
-    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[
-        where
-    ]  # (cycle, before and after, rx, echo)
+    # (cycle, before and after, rx, echo)
+    power = (np.abs(echoes.amplitude) ** 2).mean(axis=0)[where]
     length = echoes.length[where]
-    # By the power at both ends: where a receiver sees an echo at one end only, its length jumps to one of no meaning.
+    # Weighted by the smaller power of both ends: where a receiver has an echo at one end only, its
+    # length jumps to one of no meaning.
     weight = power.min(axis=1)
     power = np.where(weight > 0, power.mean(axis=1), 0.0).mean(axis=1)
     weight = np.where(weight.sum(axis=1, keepdims=True) > 0, weight, 1.0)
@@ -154,34 +161,23 @@ def _look_at(model: EchoModel, radar: Radar, cycles: NDArray[np.int64], n_cycles
     before, after = (weight * length[:, 0]).sum(axis=1), (weight * length[:, 1]).sum(axis=1)
     apart_s = np.diff(ends, axis=1) * radar.cycle_duration_s
     rate = np.divide(after - before, apart_s, out=np.zeros_like(before), where=apart_s > 0)
-    owned = list(
-        zip(
-            _path_of_echoes(model, len(echoes.part)),
-            echoes.part.tolist(),
-            echoes.bounces.tolist(),
-            strict=True,
-        )
-    )
-    keys = list(dict.fromkeys(owned))
-    column = (
-        np.array([keys.index(key) for key in owned], dtype=np.int64)
-        if len(keys) < len(owned)
-        else np.arange(len(owned))
-    )
+    paths = _path_of_echoes(model, len(echoes.part))
+    owned = list(zip(paths, echoes.part.tolist(), echoes.bounces.tolist(), strict=True))
+    places = {key: number for number, key in enumerate(dict.fromkeys(owned))}
+    keys, column = list(places), np.array([places[key] for key in owned], dtype=np.int64)
     shape = (len(cycles), len(keys))
     total = np.zeros(shape)
     np.add.at(total.T, column, power.T)
-    share = np.where(total[:, column] > 0, power, 1.0)
+    fraction = np.where(total[:, column] > 0, power, 1.0)
     sums = np.zeros((3, *shape))
-    for table, values in zip(
-        sums, (share, share * (before + after) / 4, share * rate / 2), strict=True
-    ):
+    averaged = fraction, fraction * (before + after) / 4, fraction * rate / 2
+    for table, values in zip(sums, averaged, strict=True):
         np.add.at(table.T, column, values.T)
-    return _Looked(keys, sums[1] / sums[0], sums[2] / sums[0], total)
+    return _Observed(keys, sums[1] / sums[0], sums[2] / sums[0], total)
 
 
 def _path_of_echoes(model: EchoModel, n_echoes: int) -> list[int]:
-    """Number of each echo's path; without walls there is one."""
+    """Return the number of each echo's path; without walls there is one."""
     if not isinstance(model, RoomModel):
         return [0] * n_echoes
     numbers = {path.name: number for number, path in enumerate(model.paths)}
@@ -189,14 +185,14 @@ def _path_of_echoes(model: EchoModel, n_echoes: int) -> list[int]:
 
 
 def _strongest(keys: list[Key], power_m2: NDArray[np.float64]) -> list[int]:
-    """Direct echoes, and of those others that are ever seen the strongest, in the order in which they came."""
+    """Choose direct echoes and the strongest of the others, in the order in which they came."""
     mean = power_m2.mean(axis=0)
     mean[[bounces == 1 for _, _, bounces in keys]] = np.inf
-    order = np.argsort(-mean, kind="stable")[:MOST_ECHOES]
+    order = np.argsort(-mean, kind="stable")[:MAX_ECHOES]
     return sorted(int(number) for number in order if mean[number] > 0)
 
 
-# -- where they run ------------------------------------------------------------------------------------------------------
+# -- paths and furniture ---------------------------------------------------------------------------
 
 
 def _corners(
@@ -206,9 +202,9 @@ def _corners(
     keys: list[Key],
     times: NDArray[np.float64],
 ) -> NDArray[np.float64]:
-    """Places of reflection (step, echo, corner, 3), from and to the middle of the array; NaN where not known.
+    """Return the reflection points (step, echo, corner, 3) on the path from and to the array.
 
-    A leg over walls is straight from the image of the array, and the specular point is that of both images.
+    The specular point is that of both images of the middle of the array. NaN if it is not known.
     """
     centre = np.broadcast_to(np.asarray(radar.position_m, dtype=np.float64), (len(times), 3))
     poses = body.at(times)
@@ -231,7 +227,7 @@ def _corners(
 
 
 def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
-    """Vertices (vertex, 3), faces (face, 3) and the piece of each vertex (vertex,)."""
+    """Return vertices (vertex, 3), faces (face, 3) and the piece of each vertex (vertex,)."""
     vertices, faces, piece = (
         [np.zeros((0, 3))],
         [np.zeros((0, 3), dtype=np.int64)],
@@ -239,7 +235,7 @@ def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], ND
     )
     for number, one in enumerate(scene.furniture):
         triangles = one.triangles()
-        if len(triangles.faces) > MOST_FACES:
+        if len(triangles.faces) > MAX_FACES:
             triangles = _box(triangles)
         faces.append(triangles.faces + sum(map(len, vertices)))
         vertices.append(triangles.vertices)

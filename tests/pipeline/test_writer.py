@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import rtradar as rt
-from rtradar.pipeline import cloud_maker, products
-from rtradar.pipeline.timing import Stages
-from rtradar.process import build_detector, clutter_removal
+from rtradar.pipeline import processing
+from rtradar.pipeline.processing import Processing
+from rtradar.pipeline.writer import RunWriter
+from rtradar.settings import RunSettings
 
 RADAR = rt.Radar(
     name="small",
@@ -29,7 +30,7 @@ RADAR = rt.Radar(
 def test_pieces_give_what_the_whole_gives(
     method: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cloud_maker, "_PIECE_BYTES", 1)
+    monkeypatch.setattr(processing, "_MAX_BYTES", 1)
     random = np.random.default_rng(0)
     chirps = np.arange(800)
     tone = (
@@ -40,33 +41,21 @@ def test_pieces_give_what_the_whole_gives(
     spectra = (tone + 0.01 * random.standard_normal((800, 4, 64))).astype(np.complex64)
     found = []
     for name, cut in (("whole", False), ("pieces", True)):
-        path, removal = tmp_path / f"{name}.h5", clutter_removal(method, RADAR)
-        made = products.Products(
-            path,
-            RADAR,
-            detect=build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels),
-            seed=0,
-            stages=Stages(),
-            title="",
-            removal=removal,
-        )
+        settings = RunSettings(pfa=1e-4, clutter_removal=method)
+        made = RunWriter(tmp_path / f"{name}.h5", Processing.of(RADAR, settings), "")
         # 10 cycles of 0.5 ms are a step of range-time; a hop of the windows is 50 of them.
-        assert made.piece == 10 * RADAR.n_tx
+        assert made.max_chirps == 10 * RADAR.n_tx
         for block in range(0, 800, 100):
-            for first in range(block, block + 100, made.piece if cut else 100):
-                made.take(
-                    spectra[first : min(first + made.piece, block + 100)]
-                    if cut
-                    else spectra[block : block + 100],
-                    first,
-                )
+            for first in range(block, block + 100, made.max_chirps if cut else 100):
+                last = min(first + made.max_chirps, block + 100) if cut else block + 100
+                made.push(spectra[first:last], first)
         clouds = made.finish()
         with h5py.File(tmp_path / f"{name}.h5") as maps:
             found.append(
                 {key: maps[key][:] for key in maps}
                 | {"rdt": clouds.rdt.points, "xyz": clouds.spatial.points}
             )
-    assert len(found[0]["rdt"]) == cloud_maker.CLOUD_POINTS
+    assert len(found[0]["rdt"]) == processing.CLOUD_POINTS
     assert found[0].keys() == found[1].keys()
     for key, values in found[0].items():
         np.testing.assert_array_equal(found[1][key], values, err_msg=key)
@@ -95,21 +84,10 @@ def test_clutter_is_removed_from_every_map_and_each_says_how(method: str, tmp_pa
     own = 1000.0 * (np.arange(64) == 10) + walker[:, None] * (np.arange(64) == 20)
     noise = 1e-3 * np.random.default_rng(0).standard_normal((1600, 4, 64))
     spectra = (own[:, None] + noise).astype(np.complex64)
-    detect, removal = (
-        build_detector("os-cfar", pfa=1e-4, looks=RADAR.n_channels),
-        clutter_removal(method, RADAR),
-    )
-    made = products.Products(
-        tmp_path / "maps.h5",
-        RADAR,
-        detect=detect,
-        seed=0,
-        stages=Stages(),
-        title="",
-        removal=removal,
-    )
+    settings = RunSettings(pfa=1e-4, clutter_removal=method)
+    made = RunWriter(tmp_path / "maps.h5", Processing.of(RADAR, settings), "")
     for first in range(0, 1600, 100):
-        made.take(spectra[first : first + 100], first)
+        made.push(spectra[first : first + 100], first)
     made.finish()
     with h5py.File(tmp_path / "maps.h5") as maps:
         zero_doppler = float(maps["spectrogram"][20:, 64].max())

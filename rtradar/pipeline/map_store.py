@@ -1,0 +1,168 @@
+"""HDF5 file of maps that grow step by step, with their axes: netCDF-4 to those who read it so."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from rtradar.system.files import LastingFile
+
+_SINCE = "since the start of the capture"
+_AXES = {
+    "time": ("s", f"centre of the processing window {_SINCE}"),
+    "slow_time": ("s", f"centre of the averaged cycles {_SINCE}"),
+    "spectrogram_time": ("s", f"centre of the spectrogram's window {_SINCE}"),
+    "range": ("m", "half the path from Tx to Rx"),
+    "velocity": ("m/s", "rate of range, positive receding"),
+    "spectrogram_velocity": ("m/s", "rate of range, positive receding"),
+    "azimuth": (
+        "rad",
+        "atan2(y, x) in the radar's frame, positive to the left; "
+        "without a z-line asin(y / r), the cone angle",
+    ),
+    "elevation": ("rad", "asin(z / r) in the radar's frame, positive upward"),
+}
+_GROWING = ("time", "slow_time", "spectrogram_time")
+
+
+class _Map(NamedTuple):
+    axes: tuple[str, ...]
+    dtype: type
+    unit: str
+    meaning: str
+    sparse: bool = False  # mostly zeros, which cost nothing once compressed
+
+
+_CELLS = "power summed over detected cells"
+_MAPS = {
+    "range_doppler": _Map(
+        ("time", "range", "velocity"), np.float32, "m2", "power summed over all channels"
+    ),
+    "detections": _Map(
+        ("time", "range", "velocity"), np.uint8, "1", "1 where a target is detected", sparse=True
+    ),
+    "range_time": _Map(
+        ("slow_time", "range"), np.float32, "m2", "power averaged over channels and a few cycles"
+    ),
+    "spectrogram": _Map(
+        ("spectrogram_time", "spectrogram_velocity"),
+        np.float32,
+        "m2",
+        "power of one channel summed over range",
+    ),
+    "range_azimuth": _Map(("time", "range", "azimuth"), np.float32, "m2", _CELLS, sparse=True),
+    "range_elevation": _Map(("time", "range", "elevation"), np.float32, "m2", _CELLS, sparse=True),
+}
+_SINGLE = {
+    "range_doppler_received": _Map(
+        ("range", "velocity"),
+        np.float32,
+        "m2",
+        "range_doppler of one window before clutter was removed",
+    ),
+    "detections_received": _Map(
+        ("range", "velocity"),
+        np.uint8,
+        "1",
+        "1 where a target is detected in range_doppler_received",
+    ),
+    "range_azimuth_received": _Map(
+        ("range", "azimuth"),
+        np.float32,
+        "m2",
+        "range_azimuth of that window before clutter was removed",
+    ),
+}
+_STEPS_A_CHUNK = 64  # time steps written together, for maps with few numbers a step
+
+
+class MapStore:
+    """HDF5 file of maps that grow along their first axis.
+
+    Parameters
+    ----------
+    path : path
+        File, which is replaced if it exists.
+    fixed : mapping of str to (n,) float64
+        Axes of known values, such as ``range`` and ``velocity``. Maps with another axis that does
+        not grow are left out: a radar without a z-line has no elevation.
+    attributes : mapping
+        Attributes of the file.
+    clutter_removal : mapping of str to str, optional
+        Removal of static clutter from the maps along each growing axis, an attribute of their
+        datasets; ``none`` if left out.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        fixed: Mapping[str, NDArray[np.float64]],
+        attributes: Mapping[str, Any],
+        clutter_removal: Mapping[str, str] | None = None,
+    ) -> None:
+        # The newest format indexes growing data in constant memory.
+        self._raw = LastingFile(path.open("w+b"))
+        self._file = h5py.File(self._raw, "w", libver="latest")
+        self._file.attrs.update(attributes)
+        for name in _GROWING:
+            self._scale(name, data=np.zeros(0), maxshape=(None,), chunks=(1024,))
+        for name, values in fixed.items():
+            self._scale(name, data=values)
+        for name, kind in _MAPS.items():
+            if any(axis not in fixed for axis in kind.axes[1:]):
+                continue
+            shape = tuple(len(fixed[axis]) for axis in kind.axes[1:])
+            steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
+            chunk_bytes = steps * math.prod(shape) * np.dtype(kind.dtype).itemsize
+            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+            self._describe(
+                self._file.create_dataset(
+                    name,
+                    shape=(0, *shape),
+                    maxshape=(None, *shape),
+                    dtype=kind.dtype,
+                    chunks=(steps, *shape),
+                    # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
+                    rdcc_nbytes=0 if steps == 1 else chunk_bytes,
+                    **(packed if kind.sparse else {}),
+                ),
+                kind,
+                clutter_removal=(clutter_removal or {}).get(kind.axes[0], "none"),
+            )
+
+    def _scale(self, name: str, **options: Any) -> None:
+        axis = self._file.create_dataset(name, **options)
+        axis.make_scale(name)
+        axis.attrs["units"], axis.attrs["long_name"] = _AXES[name]
+
+    def _describe(self, data: Any, kind: _Map, **attributes: Any) -> None:
+        data.attrs.update({"units": kind.unit, "long_name": kind.meaning, **attributes})
+        for number, axis in enumerate(kind.axes):
+            data.dims[number].attach_scale(self._file[axis])
+
+    def extend(self, axis: str, values: ArrayLike, **maps: ArrayLike) -> None:
+        """Append the steps ``values (n,)`` [s] to a growing axis, and (n, ...) to maps along it."""
+        for name, added in ((axis, values), *maps.items()):
+            steps = np.asarray(added)
+            data = self._file[name]
+            data.resize(len(data) + len(steps), axis=0)
+            data[len(data) - len(steps) :] = steps
+        self._raw.check()
+
+    def put(self, time_s: float, **maps: ArrayLike) -> None:
+        """Write maps of a single time [s], which do not grow."""
+        for name, values in maps.items():
+            kind = _SINGLE[name]
+            data = self._file.create_dataset(name, data=np.asarray(values, dtype=kind.dtype))
+            self._describe(data, kind, clutter_removal="none", time_s=time_s)
+
+    def close(self) -> None:
+        """Write what is buffered and close the file; may be called again."""
+        self._file.close()
+        self._raw.close()

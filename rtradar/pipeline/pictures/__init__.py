@@ -1,1 +1,0 @@
-"""Pictures of a run, and the snapshots that the linked view shows."""

@@ -1,0 +1,206 @@
+"""From range spectra, block by block, to detections, angles and clouds, in constant memory."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, UniformSample, spatial_points
+from rtradar.pipeline.timing import Stages
+from rtradar.process import (
+    AngleSpectra,
+    ClutterRemoval,
+    Detector,
+    SlidingWindows,
+    WindowFunctions,
+    angle_spectra,
+    build_detector,
+    cell_spectra,
+    clutter_removal,
+    measures_angle,
+    power_map,
+)
+from rtradar.process.window_functions import HANN
+from rtradar.radar import Radar
+from rtradar.settings import RunSettings
+
+CLOUD_POINTS = 3000
+"""Points in the RDT cloud (paper, section 3.2.4)."""
+
+SPATIAL_POINTS = 30_000
+"""Largest number of points in the spatial cloud, a uniform sample of all: some 3 s of a walk."""
+
+RANGE_TIME_S = 5e-3
+"""Time step of the range-time map [s]."""
+
+_CELLS_AT_ONCE = 1024  # 7 kB each, in all channels; a frame with a person has some hundreds
+_MAX_BYTES = 8e6  # of IF samples: part of them stays in the cache, and all threads have work
+
+
+@dataclass(frozen=True)
+class Processing:
+    """How range spectra of one capture are processed.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar at its position in the scene.
+    detect : Detector
+        Detector that marks the cells of a range-Doppler map.
+    removal : ClutterRemoval
+        Filter that removes static clutter before Doppler.
+    window_functions : WindowFunctions
+        Window functions of fast and slow time.
+    seed : int
+        Seed of the sampling of clouds.
+    stages : Stages
+        Record of the time that each stage takes.
+    """
+
+    radar: Radar
+    detect: Detector
+    removal: ClutterRemoval
+    window_functions: WindowFunctions = HANN
+    seed: int = 0
+    stages: Stages = field(default_factory=Stages)
+
+    @classmethod
+    def of(cls, radar: Radar, settings: RunSettings) -> Processing:
+        """Build the processing that these settings name; InputError if a name is unknown."""
+        return cls(
+            radar,
+            build_detector(settings.detector, pfa=settings.pfa, looks=radar.n_channels),
+            clutter_removal(settings.clutter_removal, radar),
+            WindowFunctions(settings.range_window, settings.doppler_window),
+            settings.seed,
+        )
+
+
+class Clouds(NamedTuple):
+    """The clouds of a capture.
+
+    Parameters
+    ----------
+    rdt : RdtCloudResult
+        Range-Doppler-time cloud.
+    spatial : SpatialCloud
+        Points in space.
+    n_spatial : int
+        Number of points that the spatial cloud was sampled from.
+    """
+
+    rdt: RdtCloudResult
+    spatial: SpatialCloud
+    n_spatial: int
+
+
+class Frame(NamedTuple):
+    """One processed frame.
+
+    Parameters
+    ----------
+    middle_s : float
+        Time of its centre [s].
+    power : (range, velocity) float32
+        Range-Doppler map [m^2].
+    mask : (range, velocity) bool
+        Detections.
+    angles : AngleSpectra, optional
+        Angle spectra of the detected cells; None if the radar measures no angle.
+    """
+
+    middle_s: float
+    power: NDArray[np.float32]
+    mask: NDArray[np.bool_]
+    angles: AngleSpectra | None
+
+
+class CloudMaker:
+    """Accumulates the clouds of one capture from its range spectra.
+
+    Attributes
+    ----------
+    max_chirps : int
+        Largest number of chirps in one call of `push`, so that memory stays low.
+    """
+
+    def __init__(self, processing: Processing) -> None:
+        self._processing, radar = processing, processing.radar
+        self._sliding = SlidingWindows(radar)
+        self._rdt = RdtCloud(radar, CLOUD_POINTS, processing.seed)
+        self._spatial = UniformSample(SPATIAL_POINTS, processing.seed, columns=6)
+        step = max(1, round(RANGE_TIME_S / radar.cycle_duration_s)) * radar.n_tx
+        step_bytes = step * radar.n_rx * radar.samples_per_chirp * np.dtype(np.complex64).itemsize
+        self.max_chirps = step * max(1, int(_MAX_BYTES / step_bytes))
+
+    def push(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """Process the next chirps: (chirp, rx, range) from chirp ``first`` on, in whole cycles."""
+        for _ in self.frames(self.without_clutter(spectra, first)):
+            pass
+
+    def without_clutter(self, spectra: NDArray[np.complex64], first: int) -> NDArray[np.complex64]:
+        """Remove what static clutter can be removed without the whole frame."""
+        with self._processing.stages.time("clutter removal"):
+            return self._processing.removal.block(spectra, first)
+
+    def frames(self, spectra: NDArray[np.complex64]) -> Iterator[Frame]:
+        """Process and yield the frames that end with these chirps, and add them to the clouds."""
+        radar, stages = self._processing.radar, self._processing.stages
+        window_functions = self._processing.window_functions
+        for _, start, window in self._sliding.push(spectra):
+            with stages.time("clutter removal"):
+                cube = self._processing.removal.window(window)
+            with stages.time("doppler"):
+                power = power_map(cube, radar, window_functions=window_functions)
+            with stages.time("cfar"):
+                mask = self._processing.detect(power)
+            middle = float(radar.window_times(np.array([start]))[0])
+            with stages.time("cloud"):
+                self._rdt.push(mask, middle)
+            angles = None
+            if measures_angle(radar):
+                with stages.time("angle"):
+                    angles = frame_angles(cube, mask, radar, window_functions)
+                    found = spatial_points(angles, radar, middle)
+                    self._spatial.add(
+                        np.column_stack([found.points, found.velocity, found.power, found.time])
+                    )
+            yield Frame(middle, power, mask, angles)
+
+    def finish(self) -> Clouds:
+        """Return the clouds of all frames so far."""
+        with self._processing.stages.time("cloud"):
+            rdt = self._rdt.finish()
+            rows = self._spatial.rows()
+            rows = rows[np.argsort(rows[:, 5], kind="stable")]
+        spatial = SpatialCloud(rows[:, :3], rows[:, 3], rows[:, 4], rows[:, 5])
+        return Clouds(rdt, spatial, self._spatial.n_seen)
+
+
+def frame_angles(
+    cube: NDArray[np.complexfloating],
+    mask: NDArray[np.bool_],
+    radar: Radar,
+    window_functions: WindowFunctions = HANN,
+) -> AngleSpectra:
+    """Return the angle spectra of the detected cells of one frame (cycle, tx, rx, range)."""
+    rows, columns = np.nonzero(mask)
+    velocity = radar.velocity_mps(radar.cycles_per_frame)
+    blocks = []
+    for first in range(0, max(len(rows), 1), _CELLS_AT_ONCE):
+        row, column = (bins[first : first + _CELLS_AT_ONCE] for bins in (rows, columns))
+        values = cell_spectra(cube, radar, row, column, window_functions=window_functions)
+        blocks.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
+    if len(blocks) == 1:
+        return blocks[0]
+    joined: dict[str, Any] = {
+        name: None
+        if getattr(blocks[0], name) is None
+        else np.concatenate([getattr(block, name) for block in blocks])
+        for name in ("y", "z", "range_m", "velocity")
+    }
+    return AngleSpectra(blocks[0].sines, **joined)

@@ -1,0 +1,113 @@
+"""Contents of ``summary.json``: parameters, cost, findings, and what was near its limits."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+import platform
+import time
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.processing import Clouds
+from rtradar.pipeline.timing import peak_memory_mb
+from rtradar.scatter import Accountable
+
+_PACKAGES = (
+    *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba"),
+    *("scikit-image", "trimesh", "torch"),
+)
+
+
+def cost(capture: Capture, started_s: float) -> dict[str, Any]:
+    """Return time and memory since the run started, at ``started_s`` of `time.perf_counter`."""
+    wall_s = time.perf_counter() - started_s - capture.warmup_s
+    capture_s = capture.n_chirps * capture.radar.chirp_interval_s
+    return {
+        "stages": {name: round(spent, 4) for name, spent in capture.stages.seconds.items()},
+        "wall_s": round(wall_s, 4),
+        "warmup_s": round(capture.warmup_s, 4),
+        "capture_s": capture_s,
+        "real_time_factor": round(wall_s / capture_s, 4),
+        "peak_memory_mb": round(peak_memory_mb(), 1),
+    }
+
+
+def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, Any]:
+    """Return the summary of a run that started at ``started_s``, see `cost`."""
+    settings, radar, survey = capture.settings, capture.radar, capture.survey
+    summary = {
+        "parameters": {
+            "motion": capture.motion,
+            "scene": capture.scene.name,
+            **settings.parameters(),
+            "duration_s": capture.body.duration_s,
+            "radar": dataclasses.asdict(radar),
+        },
+        "seed": settings.seed,
+        "versions": {"python": platform.python_version(), **_versions()},
+        "fidelity": settings.fidelity,
+        "variant": capture.model.variant,
+        "occlusion": "mitsuba" if _traces(capture) else "none",
+        **cost(capture, started_s),
+        "windows": len(capture.frame_starts),
+        "chirps": capture.n_chirps,
+        "detections": clouds.rdt.n_voxels,
+        "rdt_triangles": clouds.rdt.n_triangles,
+        "rdt_points": len(clouds.rdt.points),
+        "xyz_points": len(clouds.spatial.points),
+        "xyz_points_found": clouds.n_spatial,
+        "echo_power_m2": survey.power if survey.visible else 0.0,
+        "part_power_m2": survey.part_power,
+        "noise_power_m2": capture.noise.power,
+    }
+    if radar.transmit_power_dbm is not None and settings.spreading:
+        # Powers per IF sample as received at the port of the antenna: the radar equation.
+        scale = radar.watts_per_m2
+        summary["watts"] = {
+            "watts_per_m2": scale,
+            "echo_power_w": survey.power * scale,
+            "noise_power_w": capture.noise.power * scale,
+        }
+    summary["limits"] = _limits(capture)
+    if isinstance(capture.model, Accountable):
+        summary["modelled"] = capture.model.account()
+    if capture.inside:
+        summary["room"] = capture.inside.account
+    return summary
+
+
+def plain(value: object) -> Any:
+    """Convert a NumPy scalar for JSON: seeds from ``np.arange``, figures of a model."""
+    if isinstance(value, np.generic):
+        return value.item()
+    raise TypeError(f"a {type(value).__name__} has no place in summary.json")
+
+
+def _traces(capture: Capture) -> bool:
+    """Whether the model asks Mitsuba, or would if a part came near a line of sight."""
+    return capture.model.variant is not None or getattr(capture.model, "traces", False)
+
+
+def _limits(capture: Capture) -> list[dict[str, Any]]:
+    of_room = capture.inside.limits if capture.inside else ()
+    limits = [dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)]
+    if not capture.survey.visible:
+        limits += [
+            {"name": "nobody_visible", "share": 0.0, "message": message}
+            for message in capture.warned
+        ]
+    return limits
+
+
+def _versions() -> dict[str, str]:
+    found = {}
+    for name in _PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    return found | {"cores": str(os.cpu_count())}

@@ -1,0 +1,195 @@
+"""Files that a run writes while it streams: the maps, and the IF samples if they are kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.map_store import MapStore
+from rtradar.pipeline.processing import (
+    RANGE_TIME_S,
+    CloudMaker,
+    Clouds,
+    Processing,
+    frame_angles,
+)
+from rtradar.process import (
+    SlidingRangeTime,
+    SlidingSpectrogram,
+    angle_grid,
+    measured_angles,
+    power_map,
+    range_azimuth,
+    range_elevation,
+    window_cycles,
+)
+from rtradar.radar import Radar
+from rtradar.system.output_folder import OutputFiles, one_of
+
+_FILES = (
+    *("maps.h5", "cloud_rdt.npz", "cloud_rdt.ply", "cloud_rdt.png", "cloud_xyz.npz"),
+    *("cloud_xyz.png", "clutter_removal.png", "plan.png", "range_angle.png"),
+    *("range_azimuth_walls.png", "range_doppler.png", "range_time.png", "report.html"),
+    *("spectrogram.png", "summary.json", "view.npz"),
+)
+_RUN_FILES = rf"{one_of(_FILES)}|if\.zarr/(zarr\.json|c(/\d+)+)"
+_RUN_FOLDERS = r"if\.zarr(/c(/\d+)*)?"
+
+RUN_FILES = OutputFiles("summary.json", _RUN_FILES, _RUN_FOLDERS)
+"""Files of `run`."""
+
+
+def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> OutputFiles:
+    """Return the files of a command that has some of its ``own``, and a run in each folder."""
+    runs = one_of(folders)
+    return OutputFiles(
+        listing, rf"{one_of(own)}|({runs})/({_RUN_FILES})", rf"({runs})(/({_RUN_FOLDERS}))?"
+    )
+
+
+class RunWriter:
+    """Makes maps and clouds from the range spectra of one capture, and writes the maps.
+
+    Parameters
+    ----------
+    path : path
+        HDF5 file of the maps, which is replaced if it exists.
+    processing : Processing
+        Radar, and what its range spectra go through.
+    title : str
+        Title of the file.
+    received : ReceivedFrame, optional
+        Frame whose map is also kept as it was before clutter removal.
+
+    Attributes
+    ----------
+    max_chirps : int
+        Largest number of chirps in one call of `push`, so that memory stays low.
+    """
+
+    def __init__(
+        self, path: Path, processing: Processing, title: str, received: ReceivedFrame | None = None
+    ) -> None:
+        self._processing, self._received = processing, received
+        radar, removal = processing.radar, processing.removal
+        self._clouds = CloudMaker(processing)
+        self._spectrogram = SlidingSpectrogram(
+            radar, removal=removal, window_functions=processing.window_functions
+        )
+        self._range_time = SlidingRangeTime(radar, removal, step_s=RANGE_TIME_S)
+        self.max_chirps = self._clouds.max_chirps
+        self._angle_names = measured_angles(radar)
+        axes = {
+            "range": radar.range_m,
+            "velocity": radar.velocity_mps(radar.cycles_per_frame),
+            "spectrogram_velocity": radar.velocity_mps(window_cycles(radar)),
+        } | {name: angle_grid(radar) for name in self._angle_names}
+        removed = {
+            "time": removal.description(radar.cycles_per_frame),
+            "slow_time": removal.description(self._range_time.window_cycles),
+            "spectrogram_time": removal.description(window_cycles(radar)),
+        }
+        self._store = MapStore(path, axes, {"title": title}, clutter_removal=removed)
+
+    def __enter__(self) -> RunWriter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._store.close()
+
+    def push(self, spectra: NDArray[np.complex64], first: int) -> None:
+        """Process the next chirps, (chirp, rx, range) of whole TDM cycles from ``first`` on.
+
+        A block that is cut after a multiple of ``max_chirps`` chirps gives the same as the whole.
+        """
+        stages, store = self._processing.stages, self._store
+        if self._received is not None and (cube := self._received.push(spectra, first)) is not None:
+            self._keep_received(cube, self._received.start_cycle)
+        spectra = self._clouds.without_clutter(spectra, first)
+        with stages.time("range"):
+            power, times = self._range_time.push(spectra, first)
+        with stages.time("spectrogram"):
+            columns = self._spectrogram.push(spectra)
+        with stages.time("write"):
+            store.extend("slow_time", times, range_time=power)
+            store.extend("spectrogram_time", columns.time, spectrogram=columns.power)
+        for frame in self._clouds.frames(spectra):
+            maps = {"range_doppler": frame.power, "detections": frame.mask}
+            with stages.time("angle"):
+                if frame.angles:
+                    maps |= self._angle_maps(frame.angles)
+            with stages.time("write"):
+                added = {name: values[None] for name, values in maps.items()}
+                store.extend("time", [frame.middle_s], **added)
+
+    def _angle_maps(self, angles: Any) -> dict[str, NDArray[Any]]:
+        makers = {"azimuth": range_azimuth, "elevation": range_elevation}
+        radar = self._processing.radar
+        return {f"range_{name}": makers[name](angles, radar) for name in self._angle_names}
+
+    def _keep_received(self, cube: NDArray[np.complexfloating], start_cycle: int) -> None:
+        radar, windows = self._processing.radar, self._processing.window_functions
+        with self._processing.stages.time("received"):
+            power = power_map(cube, radar, window_functions=windows)
+            mask = self._processing.detect(power)
+            kept = {"range_doppler_received": power, "detections_received": mask}
+            if "azimuth" in self._angle_names:
+                angles = frame_angles(cube, mask, radar, windows)
+                kept["range_azimuth_received"] = range_azimuth(angles, radar)
+            self._store.put(float(radar.window_times(np.array([start_cycle]))[0]), **kept)
+
+    def finish(self) -> Clouds:
+        """Write what is buffered, close the file and return the clouds."""
+        power, times = self._range_time.finish()
+        self._store.extend("slow_time", times, range_time=power)
+        self._store.close()
+        return self._clouds.finish()
+
+
+class ReceivedFrame:
+    """Collects the range spectra of one frame, from cycle ``start_cycle`` on, from a stream."""
+
+    def __init__(self, radar: Radar, start_cycle: int) -> None:
+        self.start_cycle = start_cycle
+        self._first, self._radar = start_cycle * radar.n_tx, radar
+        self._blocks: list[NDArray[np.complexfloating]] = []
+
+    def push(
+        self, spectra: NDArray[np.complexfloating], first: int
+    ) -> NDArray[np.complexfloating] | None:
+        """Take the next chirps; return the cube (cycle, tx, rx, range) once it is whole."""
+        last = self._first + self._radar.chirps_per_frame
+        begin, end = max(self._first, first), min(last, first + len(spectra))
+        if begin >= end:
+            return None
+        self._blocks.append(spectra[begin - first : end - first].copy())
+        if end < last:
+            return None
+        cube = np.concatenate(self._blocks)
+        self._blocks = []
+        return cube.reshape(self._radar.cycles_per_frame, self._radar.n_tx, *cube.shape[1:])
+
+
+def if_array(path: Path, capture: Capture) -> Any:
+    """Make a new Zarr array (chirp, rx, sample) for all IF samples, described by attributes."""
+    import zarr
+
+    radar = capture.radar
+    # With DDM a receiver gets the sum of all transmitters.
+    together = radar.n_tx if radar.multiplexing == "ddm" else 1
+    shape = (radar.n_rx, radar.samples_per_chirp)
+    array = zarr.create_array(
+        path,
+        shape=(capture.n_chirps // together, *shape),
+        chunks=(capture.block_chirps // together, *shape),
+        dtype="complex64",
+        dimension_names=("chirp", "rx", "sample"),
+    )
+    described = ("multiplexing", "chirp_duration_s", "sample_rate_hz")
+    array.attrs.update({"units": "m"} | {name: getattr(radar, name) for name in described})
+    return array
