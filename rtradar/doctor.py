@@ -122,8 +122,8 @@ def _chosen(backends: dict[Kind, str]) -> tuple[str | None, list[str]]:
     finding, advice = backends[backend.kind], [backend.warning] if backend.warning else []
     if finding == "good":
         return backend.variant, advice
-    cure = "reinstall it: pip install --force-reinstall mitsuba"
-    return None, [f"{backend.variant}: {finding}; {cure}", *advice]
+    remedy = "reinstall it: pip install --force-reinstall mitsuba"
+    return None, [f"{backend.variant}: {finding}; {remedy}", *advice]
 
 
 def report_text(found: DoctorReport) -> str:

@@ -18,7 +18,7 @@ class Echoes:
         Length of the whole path from Tx to Rx at the centre of the chirp [m].
     amplitude : (node, chirp, rx, echo) complex
         Conjugate of the scattering length, the phase of ``length`` taken out, spreading included
-        [m]; hidden is 0.
+        [m]; it is 0 where the echo is occluded.
     frequency : (node,) float64
         Frequencies [Hz] at which ``amplitude`` is given: the polynomial through the nodes; one node
         means constant.
@@ -36,7 +36,7 @@ class Echoes:
 
     Notes
     -----
-    Equation :eq:`received-spectrum` of the theory page has what they stand for; :eq:`if-signal`
+    Equation :eq:`received-spectrum` of the theory page says what they mean, and :eq:`if-signal`
     what is made of them.
     """
 

@@ -15,7 +15,7 @@ class InputError(ValueError):
 class BackendError(RuntimeError):
     """No ray-tracing backend of the kind asked for works on this machine.
 
-    The message names the cure. The command line exits with status 1.
+    The message names the remedy. The command line exits with status 1.
     """
 
 

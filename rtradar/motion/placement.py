@@ -32,7 +32,7 @@ def place(
     """Cut an interval out of a recording and put it before the radar.
 
     The interval's mean horizontal root position goes to the origin; heights stay as recorded. One
-    yaw turns the whole: a walk, as of `walk_direction`, moves along -x, toward the radar;
+    yaw rotates the whole: a walk, as of `walk_direction`, moves along -x, toward the radar;
     everything else faces -x by the median heading of its hips.
 
     Parameters

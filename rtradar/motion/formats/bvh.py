@@ -1,8 +1,8 @@
 """BVH motions: any channel order, positions on any joint, y up.
 
-The global rotation of a joint turns the offsets of its children, so joint j of the `Motion` carries
-the rotation of its parent. End sites become joints named ``<parent>_end``, so that the rotation of
-a last joint is kept even where its end site has no length.
+The global rotation of a joint applies to the offsets of its children, so joint j of the `Motion`
+carries the rotation of its parent. End sites become joints named ``<parent>_end``, so that the
+rotation of a last joint is kept even where its end site has no length.
 """
 
 from __future__ import annotations
@@ -239,9 +239,9 @@ def _quaternions(joints: list[_Joint], values: NDArray[np.float64]) -> NDArray[n
     """Rotations of all joints (frame, joint, 4) in the axes of the file."""
     world: list[Rotation] = []
     for joint in joints:
-        turns = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
-        order = "".join(joint.channels[k][0].upper() for k in turns)
-        angles = values[:, [joint.column + k for k in turns]]
+        rotations = [k for k, name in enumerate(joint.channels) if name.endswith("rotation")]
+        order = "".join(joint.channels[k][0].upper() for k in rotations)
+        angles = values[:, [joint.column + k for k in rotations]]
         local = Rotation.identity(len(values))
         if order:
             local = Rotation.from_euler(order, angles, degrees=True)

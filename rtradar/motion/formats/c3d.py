@@ -1,7 +1,7 @@
 """C3D recordings of optical markers, with the marker set of CMU and HDM05.
 
 World axes are those of the file: Vicon's z is up, and C3D (x, y, z) = AMC (z, x, y), which is the
-world's (x, y, z). A file whose POINT:Y_SCREEN says that y is up is turned.
+world's (x, y, z). A file whose POINT:Y_SCREEN says that y is up is rotated.
 """
 
 from __future__ import annotations

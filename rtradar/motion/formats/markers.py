@@ -11,7 +11,7 @@ or, where one marker alone marks it, that marker; from there an offset in the ax
 leads inward. Offsets belong to a person whose knee and ankle markers are `SHANK_M` apart, and grow
 with that distance. They are medians over the first half of the CMU take 135_02, which exists as AMC
 too; ``validation/measurements/c3d_take.py`` judges by its second half. Markers on waist and wrist
-bars stand centimetres off the bone, and a solver's shoulder lies lower than the marker on it:
+bars are centimetres off the bone, and a solver's shoulder lies lower than the marker on it:
 without the offsets hips are 18 cm off.
 
 References

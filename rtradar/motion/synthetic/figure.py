@@ -42,7 +42,7 @@ HEEL_X, TOE_X = -FOOT / 4, FOOT * 3 / 4
 """Heel and toe ahead of the ankle."""
 
 MAXIMUM_REACH = 0.9985
-"""Largest extension of a leg relative to its length: at 1 the knee would turn infinitely fast."""
+"""Largest extension of a leg relative to its length: at 1 the knee would rotate infinitely fast."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,8 +141,8 @@ def about(**angles: Array | float) -> Rotation:
 
     Angles (n,) give n rotations.
     """
-    turns = (Rotation.from_euler(axis, np.asarray(a)[..., None]) for axis, a in angles.items())
-    return reduce(operator.mul, turns)
+    rotations = (Rotation.from_euler(axis, np.asarray(a)[..., None]) for axis, a in angles.items())
+    return reduce(operator.mul, rotations)
 
 
 def offsets(height_m: float) -> dict[str, Array]:
@@ -237,7 +237,7 @@ def rotations(pose: Pose, height_m: float) -> Array:
     bones = offsets(height_m)
     bent = (pose.pelvis.inv() * pose.thorax).as_rotvec()
     nod = (pose.thorax.inv() * pose.head).as_rotvec()
-    turned: dict[str, Rotation] = {
+    found: dict[str, Rotation] = {
         "root": pose.pelvis,
         "lowerback": pose.pelvis * Rotation.from_rotvec(bent / 3),
         "upperback": pose.pelvis * Rotation.from_rotvec(bent * 2 / 3),
@@ -248,7 +248,7 @@ def rotations(pose: Pose, height_m: float) -> Array:
     for side, sign in SIDES.items():
         leg = pose.ankles[side] - pose.root - pose.pelvis.apply(bones[f"{side}_hip"])
         thigh, shank = bend(leg, THIGH * height_m, SHANK * height_m, pose.left, 1.0)
-        turned |= {
+        found |= {
             f"{side}_hip": pose.pelvis,
             f"{side}_knee": thigh,
             f"{side}_ankle": shank,
@@ -259,7 +259,7 @@ def rotations(pose: Pose, height_m: float) -> Array:
             f"{side}_hand": pose.arms[side].hand,
         }
     shape = len(pose.root), 4
-    return np.stack([np.broadcast_to(turned[node].as_quat(), shape) for node in NODES], axis=1)
+    return np.stack([np.broadcast_to(found[node].as_quat(), shape) for node in NODES], axis=1)
 
 
 # -- smooth functions of time (C2) -----------------------------------------------------------------

@@ -61,7 +61,7 @@ def footprints(subject: Subject, duration_s: float) -> list[Step]:
     x -= (before + 1 + subject.phase) * step_m
     time = -(before + subject.phase) * half_cycle - MIDSTANCE * subject.cycle_s
     side, heading, turn_sign = subject.side, 0.0, 1.0
-    plan: list[tuple[float, float]] = []  # advance and turn of the steps that are decided already
+    plan: list[tuple[float, float]] = []  # advance and rotation of the steps ahead
     steps: list[Step] = []
     while time < duration_s + 1.6 * subject.cycle_s:
         direction = round(math.cos(heading))
@@ -93,8 +93,8 @@ def _foot(own: list[Step], subject: Subject) -> Callable[[Array], tuple[Array, A
         ]
     pitch = partial(keyed, times=[time for time, _ in keys], values=[value for _, value in keys])
     landings = np.array([step.time for step in own])
-    turns = np.stack([landings - (1 - STANCE) * cycle, landings], axis=1).ravel()
-    yaw = partial(keyed, times=turns[1:], values=np.repeat([step.heading for step in own], 2)[:-1])
+    yawing = np.stack([landings - (1 - STANCE) * cycle, landings], axis=1).ravel()
+    yaw = partial(keyed, times=yawing[1:], values=np.repeat([step.heading for step in own], 2)[:-1])
 
     def standing(step: Step, t: Array) -> Array:
         """Ankle over its footprint, as the foot rolls about the toe or the heel."""
@@ -110,8 +110,8 @@ def _foot(own: list[Step], subject: Subject) -> Callable[[Array], tuple[Array, A
         first, last = np.searchsorted(landings, (t[0], t[-1]), side="right")
         for step, after in itertools.pairwise(own[max(first - 1, 0) : last + 1]):
             lift = step.time + STANCE * cycle
-            stands = (t >= step.time) & (t < lift)
-            ankle[stands] = standing(step, t[stands])
+            down = (t >= step.time) & (t < lift)
+            ankle[down] = standing(step, t[down])
             swings = (t >= lift) & (t < after.time)
             ends = state(partial(standing, step), lift), state(partial(standing, after), after.time)
             path = hermite(t[swings], (lift, after.time), *ends)
