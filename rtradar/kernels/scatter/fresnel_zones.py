@@ -24,7 +24,7 @@ from scipy.interpolate import CubicHermiteSpline
 from rtradar.kernels.blends import hermite_weights
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.phasor import phasor
-from rtradar.kernels.scatter.triangle_fraction import positive_share
+from rtradar.kernels.scatter.triangles import positive_fraction
 from rtradar.kernels.small_vectors import apply, apply_transposed, dot, normalize, subtract
 
 RIM = 7.0
@@ -100,7 +100,8 @@ def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back,
     normalize(pole)
     apply_transposed(back, pole, normal)
     gradient = normalize(normal)
-    # Tangents that rotate with nothing but the normal, so that the pattern does not jump: one level.
+    # Tangents that rotate with nothing but the normal, so that the pattern does not jump: one
+    # level.
     e[0], e[1], e[2] = -normal[1], normal[0], 0.0
     if normal[0] ** 2 + normal[1] ** 2 < 1e-8:
         e[0], e[1], e[2] = 0.0, normal[2], -normal[1]
@@ -252,8 +253,8 @@ def open_share(a, b, c, d):
         return 1.0
     if max(max(a, b), max(c, d)) <= 0:
         return 0.0
-    first = positive_share(a, b, c) + positive_share(d, b, c)
-    return (first + positive_share(a, b, d) + positive_share(a, c, d)) / 4
+    first = positive_fraction(a, b, c) + positive_fraction(d, b, c)
+    return (first + positive_fraction(a, b, d) + positive_fraction(a, c, d)) / 4
 
 
 @inlined()
@@ -264,7 +265,7 @@ def _open_cell(line, j, here, after, cosine, sine):
     across = (a * cosine + b * sine) * after
     other_first, other_last = c + across * j, c + across * (j + 1)
     if j == 0:  # the innermost cell has three corners
-        return positive_share(first, last, other_last)
+        return positive_fraction(first, last, other_last)
     return open_share(first, last, other_first, other_last)
 
 
@@ -525,7 +526,8 @@ def blend_fractions(nodes, slopes, fine, where, spread, inside, out):
     value = np.empty(pairs, dtype=np.complex128)
     for f in range(frequencies):
         for part in range(parts):
-            # Where nothing changes the value is taken as it is: the polynomials add up to 1 only nearly.
+            # Where nothing changes the value is taken as it is: the polynomials add up to 1 only
+            # nearly.
             still = True
             for node in range(last + 1):
                 if node == 0 or node == last or fine[part]:

@@ -1,59 +1,59 @@
-"""The slow part of a physical-optics echo: sampled at anchors in time, more of them where it bends, and interpolated.
+"""The slow part of a physical-optics echo, interpolated between keyframes, more where it bends.
 
-The envelope is the echo over that of the unobstructed specular point, carrier and all: 1 where optics is geometric, and
-slow. Anchors are 10 ms apart. Where the second difference of a part's echo over neighbouring anchors is more than a given
-share of the whole body's, the interval is halved, and halved again, down to an eighth: there an edge crosses the part, or
-what it returns comes from far beside its specular point. Between anchors runs a cubic with one slope on either side of each.
+The envelope is the echo over that of the unobstructed specular point, carrier and all: 1 where
+optics is geometric, and slow. Keyframes are 10 ms apart. Where the second difference of a part's
+echo over neighbouring keyframes is more than a given fraction of the whole body's, the interval is
+halved, and halved again, down to an eighth: there an edge crosses the part, or what it returns
+comes from far beside its specular point. Between keyframes runs a cubic with one slope on either
+side of each.
 """
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.envelope import PLACES, find_slopes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.system.threads import in_threads
 
-PIECES = 8
-"""Parts of the interval between two anchors where it is divided the most: 1.25 ms of 10 ms."""
-
-_KEPT_ANCHORS = 2048
-"""Anchors remembered, so that the pass that measures power and the pass that makes the signal trace once (some 50 MB)."""
+_KEPT_KEYFRAMES = 2048
+"""Keyframes kept, so that the passes for power and for the signal trace once (some 50 MB)."""
 
 _PASSING = 32
-"""Of later ones: those that are prepared together, and what lies around them."""
+"""Later keyframes kept: those that are prepared together, and what lies around them."""
 
 TOGETHER = 16
 """Neighbouring intervals that may be prepared at once."""
 
-_INTERVALS_KEPT = TOGETHER + 8
+_KEPT_INTERVALS = TOGETHER + 8
 """More than these and one on either side."""
+
+Field = NDArray[np.complex128]
 
 
 class Sample(NamedTuple):
-    """The envelope in one pose: ``ratio (node, pair, part)`` complex, ``strength (pair, part)`` [m] of what it multiplies."""
+    """One pose: ``ratio (node, pair, part)``, and ``strength (pair, part)`` of what it multiplies [m]."""
 
-    ratio: NDArray[np.complex128]
+    ratio: Field
     strength: NDArray[np.float64]
 
 
 class _Interval(NamedTuple):
-    """``ratio (place, node, pair, part)`` at the 9 places of one interval, ``known (place, part)``."""
+    """``ratio (place, node, pair, part)`` at 9 places of one interval, where ``known (place, part)``."""
 
-    ratio: NDArray[np.complex128]
+    ratio: Field
     known: NDArray[np.bool_]
 
 
 class Course(NamedTuple):
-    """The envelope over one interval: ``ratio`` and ``slope (place, node, pair, part)``, where ``known (place, part)``."""
+    """One interval: ratio and slope (place, node, pair, part), where ``known (place, part)``."""
 
-    ratio: NDArray[np.complex128]
-    slope: NDArray[np.complex128]
+    ratio: Field
+    slope: Field
     known: NDArray[np.bool_]
 
 
@@ -63,14 +63,16 @@ class Envelope:
     Parameters
     ----------
     sample : callable
-        ``sample(place, parts, whole)``: the `Sample` of these parts (n,) at a place in time, counted in anchors from the
-        start; ``whole`` is `whole_echo` near by, or None where all parts are asked for. Several threads call it at once.
+        ``sample(place, parts, whole)``: the `Sample` of these parts (n,) at a place in time,
+        counted in keyframes from the start; ``whole`` is `whole_echo` near by, or None where all
+        parts are asked for. Several threads call it at once.
     parts : int
-        How many parts there are.
+        Number of parts.
     tolerance : float
-        Second difference of a part's echo over the root of the whole body's power that halves an interval.
+        Second difference of a part's echo over the root of the whole body's power that halves an
+        interval.
     end : int
-        Anchor from which on nothing moves.
+        Keyframe from which on nothing moves.
     """
 
     def __init__(
@@ -80,97 +82,84 @@ class Envelope:
         tolerance: float,
         end: int,
     ) -> None:
-        self._sample, self._parts, self._tolerance, self._end = (
-            sample,
-            np.arange(parts),
-            tolerance,
-            end,
-        )
-        self._anchors: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_ANCHORS, _PASSING)
-        self._intervals: OrderedDict[int, _Interval] = OrderedDict()
+        self._sample, self._parts = sample, np.arange(parts)
+        self._tolerance, self._end = tolerance, end
+        self._keyframes: KeyframeCache[int, Sample] = KeyframeCache(_KEPT_KEYFRAMES, _PASSING)
+        self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _KEPT_INTERVALS)
 
-    def prepare_anchors(self, indices: Iterable[int]) -> None:
-        """Find these anchors, of `TOGETHER` intervals at the most, with all cores: one by itself has too little to share."""
-        missing = [
-            index
-            for index in sorted({min(index, self._end) for index in indices})
-            if index not in self._anchors
-        ]
+    def prepare_keyframes(self, indices: Iterable[int]) -> None:
+        """Find these keyframes, of `TOGETHER` intervals at most, with all cores."""
+        wanted = sorted({min(index, self._end) for index in indices})
+        missing = [index for index in wanted if index not in self._keyframes]
         found = in_threads(
             lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing))
         )
         for index, sample in zip(missing, found, strict=True):
-            self._anchors.keep(index, sample)
+            self._keyframes.keep(index, sample)
 
     def prepare_courses(self, indices: Iterable[int]) -> None:
         """The same for the courses of these intervals."""
-        around = sorted(
-            {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
-        )
-        missing = [index for index in around if index not in self._intervals]
-        self.prepare_anchors(
+        around = {index + step for index in indices for step in (-1, 0, 1) if index + step >= 0}
+        missing = []
+        for index in sorted(around):
+            if index in self._intervals:
+                self._interval(index)  # now the last to be dropped
+            else:
+                missing.append(index)
+        self.prepare_keyframes(
             index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0
         )
         ends = [self._ends(index) for index in missing]
         found = in_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
-        self._intervals.update(zip(missing, found, strict=True))
-        for index in around:
-            self._intervals.move_to_end(index)
-        while len(self._intervals) > _INTERVALS_KEPT:
-            self._intervals.popitem(last=False)
+        for index, interval in zip(missing, found, strict=True):
+            self._intervals.keep(index, interval)
 
-    def anchor(self, index: int) -> Sample:
-        """All parts at one anchor."""
+    def _interval(self, index: int) -> _Interval:
+        return self._intervals.get(index, lambda: self._divided(index, *self._ends(index)))
+
+    def keyframe(self, index: int) -> Sample:
+        """All parts at one keyframe."""
         index = min(index, self._end)
-        return self._anchors.get(index, lambda: self._sample(float(index), self._parts, None))
+        return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> Course:
-        """From one anchor to the next: a cubic from place to place, its slopes those of the parabola through three."""
+        """Cubics from place to place of an interval, their slopes those of parabolas through three."""
         self.prepare_courses([index])
-        here, after = self._intervals[index], self._intervals[index + 1]
-        before = self._intervals[index - 1] if index > 0 else here
+        here, after = self._interval(index), self._interval(index + 1)
+        before = self._interval(index - 1) if index > 0 else here
         slope = np.empty_like(here.ratio)
-        _find_slopes(
-            index > 0,
-            before.ratio,
-            before.known,
-            here.ratio,
-            here.known,
-            after.ratio,
-            after.known,
-            slope,
-        )
+        find_slopes(index > 0, tuple(before), tuple(here), tuple(after), slope)
         return Course(here.ratio, slope, here.known)
 
     def _ends(self, index: int) -> tuple[Sample | None, Sample, Sample, Sample]:
-        """The anchor before an interval, if there is one, those at its ends, and the one after it."""
-        before = self.anchor(index - 1) if index > 0 else None
-        return before, self.anchor(index), self.anchor(index + 1), self.anchor(index + 2)
+        """The keyframe before an interval, if any, those at its ends, and the one after it."""
+        before = self.keyframe(index - 1) if index > 0 else None
+        return before, self.keyframe(index), self.keyframe(index + 1), self.keyframe(index + 2)
 
     def _divided(
         self, index: int, before: Sample | None, first: Sample, last: Sample, after: Sample
     ) -> _Interval:
-        ratio = np.full((PIECES + 1, *first.ratio.shape), np.nan + 0j)
-        ratio[0], ratio[PIECES] = first.ratio, last.ratio
-        known = np.zeros((PIECES + 1, len(self._parts)), dtype=bool)
-        known[[0, PIECES]] = True
+        ratio = np.full((PLACES + 1, *first.ratio.shape), np.nan + 0j)
+        ratio[0], ratio[PLACES] = first.ratio, last.ratio
+        known = np.zeros((PLACES + 1, len(self._parts)), dtype=bool)
+        known[[0, PLACES]] = True
         bends = [_bend(first.ratio, last.ratio, after.ratio, last.strength)]
         if before is not None:
             bends.append(_bend(before.ratio, first.ratio, last.ratio, first.strength))
         whole = max(whole_echo(first), whole_echo(last))
         bent = np.flatnonzero(np.max(bends, axis=0) > self._tolerance * whole)
+        interval = _Interval(ratio, known)
         if index < self._end:
-            self._divide(index, ratio, known, 0, PIECES, bent, whole)
+            self._divide(index, interval, 0, PLACES, bent, whole)
         else:
             # Half-way it is as at the beginning, and does not bend there.
-            ratio[PIECES // 2][:, :, bent], known[PIECES // 2, bent] = first.ratio[:, :, bent], True
-        return _Interval(ratio, known)
+            ratio[PLACES // 2][:, :, bent], known[PLACES // 2, bent] = first.ratio[:, :, bent], True
+        return interval
 
     def _divide(
         self,
         index: int,
-        ratio: NDArray[np.complex128],
-        known: NDArray[np.bool_],
+        interval: _Interval,
         left: int,
         right: int,
         parts: NDArray[np.int64],
@@ -179,81 +168,23 @@ class Envelope:
         """Sample these parts half-way, and go on where they bend there."""
         if right - left < 2 or len(parts) == 0:
             return
-        middle = (left + right) // 2
-        found = self._sample(index + middle / PIECES, parts, whole)
+        middle, (ratio, known) = (left + right) // 2, interval
+        found = self._sample(index + middle / PLACES, parts, whole)
         ratio[middle][:, :, parts] = found.ratio
         known[middle, parts] = True
-        bend = _bend(
-            ratio[left][:, :, parts], found.ratio, ratio[right][:, :, parts], found.strength
-        )
+        before, after = ratio[left][:, :, parts], ratio[right][:, :, parts]
+        bent = _bend(before, found.ratio, after, found.strength) > self._tolerance * whole
         for ends in ((left, middle), (middle, right)):
-            self._divide(index, ratio, known, *ends, parts[bend > self._tolerance * whole], whole)
+            self._divide(index, interval, *ends, parts[bent], whole)
 
 
 def _bend(
-    before: NDArray[np.complex128],
-    here: NDArray[np.complex128],
-    after: NDArray[np.complex128],
-    strength: NDArray[np.float64],
+    before: Field, here: Field, after: Field, strength: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Second difference of the echo of each part (part,), the largest over frequencies and pairs [m]."""
+    """Second difference of the echo of each part (part,), largest over frequencies and pairs [m]."""
     return np.asarray((np.abs(before - 2 * here + after) * strength).max(axis=(0, 1)))
 
 
 def whole_echo(sample: Sample) -> float:
     """Root of the power of all parts, the mean over frequencies and pairs [m]."""
     return float(np.sqrt((np.abs(sample.ratio * sample.strength) ** 2).sum(axis=2).mean()))
-
-
-@compiled()
-def _find_slopes(inside, ratio_before, known_before, ratio, known, ratio_after, known_after, slope):
-    """Slopes per place (place, node, pair, part) where a part is known; at the very start that of a straight line."""
-    nodes, pairs, parts = ratio.shape[1:]
-    for part in range(parts):
-        left = -1
-        for place in range(PIECES + 1):
-            if not known[place, part]:
-                continue
-            right = place + 1
-            while right <= PIECES and not known[right, part]:
-                right += 1
-            # At both ends the neighbour on the other side belongs to the next interval, where this part has its own.
-            beyond = PIECES - 1 if left < 0 else 1
-            while left < 0 and not known_before[beyond, part]:
-                beyond -= 1
-            while right > PIECES and not known_after[beyond, part]:
-                beyond += 1
-            gap = place - left if left >= 0 else PIECES - beyond
-            next_gap = right - place if right <= PIECES else beyond
-            for node in range(nodes):
-                for pair in range(pairs):
-                    value = ratio[place, node, pair, part]
-                    last = (
-                        ratio[left, node, pair, part]
-                        if left >= 0
-                        else ratio_before[beyond, node, pair, part]
-                    )
-                    following = (
-                        ratio[right, node, pair, part]
-                        if right <= PIECES
-                        else ratio_after[beyond, node, pair, part]
-                    )
-                    rise, next_rise = (value - last) / gap, (following - value) / next_gap
-                    if left < 0 and not inside:
-                        rise = next_rise
-                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (
-                        gap + next_gap
-                    )
-            left = place
-
-
-@inlined()
-def stretch(known, place):
-    """The known places (place,) on either side of one in 0 to `PIECES`."""
-    left = min(int(place), PIECES - 1)
-    right = left + 1
-    while not known[left]:
-        left -= 1
-    while not known[right]:
-        right += 1
-    return left, right

@@ -1,4 +1,4 @@
-"""The echo model `physical-optics`: the exact carrier of the specular point at every chirp, times a slowly changing envelope."""
+"""The echo model `physical-optics`: a carrier at every chirp, times a slow envelope."""
 
 from __future__ import annotations
 
@@ -12,89 +12,48 @@ from rtradar.body import Body
 from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.blends import hermite_weights
-from rtradar.kernels.jit import compiled
+from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
-from rtradar.scatter.facets.envelope import (
-    PIECES,
-    TOGETHER,
-    Envelope,
-    Sample,
-    stretch,
-    whole_echo,
-)
-from rtradar.scatter.facets.moving_body import FacetBody
+from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, whole_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _COARSE, _FINE = (2, 1), (6, 2)
-"""Tx times Rx nodes per line of the array: of parts whose echo is alike all over it, and of the others."""
+"""Tx times Rx nodes per line of the array: for parts alike all over it, and for the others."""
 
 _MOST_FREQUENCIES = 9
 
 
-@compiled()
-def _fill(chirps, share, tx, weights, ratio, slope, known, strength, amplitude):
-    """Amplitude (node, chirp, rx, part) at these chirps, which stand at these shares of the way from anchor to anchor."""
-    nodes, pairs, parts = ratio.shape[1:]
-    receivers = weights.shape[1]
-    for i in range(len(chirps)):
-        chirp, place = chirps[i], share[i] * PIECES
-        ends, cubic = np.empty((2, parts), dtype=np.int64), np.empty((4, parts))
-        for part in range(parts):
-            left, right = stretch(known[:, part], place)
-            ends[0, part], ends[1, part] = left, right
-            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite_weights(
-                (place - left) / (right - left), right - left
-            )
-        own = weights[tx[chirp]]
-        value = np.empty(parts, dtype=np.complex128)
-        amplitude[:, chirp] = 0
-        for pair in range(pairs):
-            # Where nodes stand at antennas a transmitter needs but a few of the pairs.
-            used = False
-            for receiver in range(receivers):
-                used |= own[receiver, pair] != 0
-            if not used:
-                continue
-            for node in range(nodes):
-                for part in range(parts):
-                    left, right = ends[0, part], ends[1, part]
-                    value[part] = (
-                        cubic[0, part] * ratio[left, node, pair, part]
-                        + cubic[1, part] * ratio[right, node, pair, part]
-                        + cubic[2, part] * slope[left, node, pair, part]
-                        + cubic[3, part] * slope[right, node, pair, part]
-                    )
-                for receiver in range(receivers):
-                    weight, out = own[receiver, pair], amplitude[node, chirp, receiver]
-                    for part in range(parts):
-                        out[part] += weight * value[part] * strength[chirp, receiver, part]
-
-
 class PhysicalOptics(BuiltInModel):
-    """`physical-optics`: specular point at every chirp, facets at anchors, three frequencies and a few places of the array.
+    """`physical-optics`: facets at keyframes, three frequencies and a few places of the array.
 
     Parameters
     ----------
     radar : Radar
+        Radar in the scene.
     body : Body
+        Body in motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     facets : int, optional
-        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a grown person.
+        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
+        grown person.
     anchor_s : float
-        Between anchors [s]; where the echo bends they come down to an eighth of it.
+        Time between keyframes [s]; where the echo bends it comes down to an eighth of it.
     tolerance : float
-        Bend of a part's echo, over the root of the whole body's power, above which anchors come closer.
+        Bend of a part's echo, over the root of the whole body's power, above which keyframes come
+        closer.
     unevenness : float
-        Change of a part's echo over the array, over the same, above which it is computed at more places of the array.
+        Change of a part's echo over the array, over the same, above which it is computed at more
+        places of the array.
     frequencies : int
-        Over the sweep. Three leave 3 % where a part is half hidden at 12 GHz, five 1.5 %, and a longer synthesis of the IF.
+        Number of frequencies over the sweep. Three leave 3 % where a part is half hidden at 12 GHz,
+        five 1.5 %, and a longer synthesis of the IF.
 
     Raises
     ------
@@ -103,7 +62,7 @@ class PhysicalOptics(BuiltInModel):
 
     Notes
     -----
-    Equation :eq:`envelope` of the theory page; :eq:`po` in each anchor.
+    Equation :eq:`envelope` of the theory page; :eq:`po` in each keyframe.
     """
 
     accepts_meshes = True
@@ -124,13 +83,11 @@ class PhysicalOptics(BuiltInModel):
     ) -> None:
         if frequencies not in range(1, _MOST_FREQUENCIES + 1):
             raise InputError(
-                f"physical-optics: frequencies = {frequencies}; it must be a whole number from 1 to {_MOST_FREQUENCIES}"
+                f"physical-optics: frequencies = {frequencies}; it must be a whole number from "
+                f"1 to {_MOST_FREQUENCIES}"
             )
-        for name, value in (
-            ("anchor_s", anchor_s),
-            ("tolerance", tolerance),
-            ("unevenness", unevenness),
-        ):
+        positive = {"anchor_s": anchor_s, "tolerance": tolerance, "unevenness": unevenness}
+        for name, value in positive.items():
             if not (math.isfinite(value) and value > 0):
                 raise InputError(f"physical-optics: {name} = {value}; it must be positive")
         self._radar, self._body, self._spreading = radar, body, spreading
@@ -147,7 +104,7 @@ class PhysicalOptics(BuiltInModel):
         self._envelope = Envelope(self._sample, len(body.part_names), tolerance, end)
 
     def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
-        """Envelope at the fine nodes: computed there where it differs over the array, else spread from the coarse ones."""
+        """Envelope at the fine nodes: spread from the coarse ones unless it differs over the array."""
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose = self._body.at([time])
         coarse = self._at_nodes(pose, self._coarse, parts)
@@ -168,20 +125,14 @@ class PhysicalOptics(BuiltInModel):
         centres, frames = (
             np.repeat(array[:, parts], len(pairs), axis=0) for array in (pose.centres, pose.frames)
         )
+        ends = antennas[pairs[:, 0]], antennas[pairs[:, 1], None]
         length, strength, _ = solve_specular_points(
-            Geometry(
-                antennas[pairs[:, 0]],
-                antennas[pairs[:, 1], None],
-                centres,
-                frames,
-                pose.semi_axes[parts],
-            ),
+            Geometry(*ends, centres, frames, pose.semi_axes[parts]),
             polarization=self._radar.polarization,
             spreading=self._spreading,
         )
         amplitude = self._surface.amplitude(
-            pose.centres,
-            pose.frames,
+            (pose.centres, pose.frames),
             antennas[None],
             pairs,
             length[None, :, 0],
@@ -189,10 +140,11 @@ class PhysicalOptics(BuiltInModel):
             np.arange(len(antennas))[None],
             parts,
         )[:, 0]
-        mirrored = strength[:, 0]
-        # Without a specular point there is next to nothing to see either: antennas on opposite sides.
-        ratio = np.where(mirrored != 0, amplitude / np.where(mirrored != 0, mirrored, 1.0), 0.0)
-        return Sample(ratio, np.abs(mirrored))
+        specular = strength[:, 0]
+        # Without a specular point there is next to nothing to see either: antennas on opposite
+        # sides.
+        ratio = np.where(specular != 0, amplitude / np.where(specular != 0, specular, 1.0), 0.0)
+        return Sample(ratio, np.abs(specular))
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
@@ -203,33 +155,25 @@ class PhysicalOptics(BuiltInModel):
         )
         parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
-        intervals = chirps // self._step
-        # Power is measured at anchors, where nothing is asked of what comes after.
+        intervals, envelope, weights = chirps // self._step, self._envelope, self._fine.weights
+        # Power is measured at keyframes, where nothing is asked of what comes after.
         between = set(intervals[chirps % self._step != 0].tolist())
-        for _, group in groupby(
-            sorted(set(intervals.tolist())), key=lambda interval: interval // TOGETHER
-        ):
+        in_order = sorted(set(intervals.tolist()))
+        for _, group in groupby(in_order, key=lambda interval: interval // TOGETHER):
             together = list(group)
-            self._envelope.prepare_anchors(
-                interval for interval in together if interval not in between
-            )
-            self._envelope.prepare_courses(between.intersection(together))
+            envelope.prepare_keyframes(k for k in together if k not in between)
+            envelope.prepare_courses(between.intersection(together))
             for interval in together:
                 inside = np.flatnonzero(intervals == interval)
                 if interval in between:
-                    share, course = (
-                        chirps[inside] / self._step - interval,
-                        self._envelope.course(interval),
-                    )
-                    _fill(
-                        inside, share, at.tx_index, self._fine.weights, *course, strength, amplitude
-                    )
-                    continue
-                over_array = (
-                    self._fine.weights[at.tx_index[inside]]
-                    @ self._envelope.anchor(interval).ratio[:, None]
-                )
-                amplitude[:, inside] = over_array * strength[inside]
+                    fraction = chirps[inside] / self._step - interval
+                    course = tuple(envelope.course(interval))
+                    given = inside, fraction, at.tx_index, weights, course
+                    fill_envelope(*given, strength, amplitude)
+                else:
+                    ratio = envelope.keyframe(interval).ratio[:, None]
+                    over_array = weights[at.tx_index[inside]] @ ratio
+                    amplitude[:, inside] = over_array * strength[inside]
         return Echoes(
             length=length,
             amplitude=amplitude,

@@ -1,4 +1,4 @@
-"""The echo model `reference`: physical optics over every facet, at every chirp and receiver; slow, and the judge of speed."""
+"""The echo model `reference`: physical optics over every facet, at every chirp and receiver."""
 
 from __future__ import annotations
 
@@ -9,29 +9,32 @@ from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
-from rtradar.scatter.facets.moving_body import FacetBody
+from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
-"""Frequencies: what is left of a part whose specular point is hidden comes from beside it, and turns over the sweep. Against
-the integral at each frequency itself three leave 1 to 3 % at 12 GHz."""
+"""Frequencies: what is left of a part whose specular point is hidden comes from beside it, and turns
+over the sweep. Against the integral at each frequency three leave 1 to 3 % at 12 GHz."""
 
 
 class Reference(BuiltInModel):
-    """`reference`: path lengths and facets at every chirp; visibility from every Tx and Rx once in every TDM cycle.
+    """`reference`: path lengths and facets at every chirp, visibility once in every TDM cycle.
 
     In one cycle of the paper's radars a limb at 5 m/s goes 4 mm, less than a facet.
 
     Parameters
     ----------
     radar : Radar
+        Radar in the scene.
     body : Body
+        Body in motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
         Whether amplitudes hold 1 / (R1 R2).
     facets : int, optional
-        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a grown person.
+        Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
+        grown person.
     """
 
     accepts_meshes = True
@@ -74,8 +77,7 @@ class Reference(BuiltInModel):
             middle = self._body.at([time])
             seen = self._surface.seen(middle.centres[0], middle.frames[0], antennas, parts)
             amplitude[:, inside] = self._surface.amplitude(
-                at.centres[inside],
-                at.frames[inside],
+                (at.centres[inside], at.frames[inside]),
                 antennas[index.reshape(named.shape)],
                 pairs,
                 length[inside],

@@ -1,4 +1,4 @@
-"""The echo model `specular`: bistatic near-field geometric optics per chirp, with traced occlusion of the specular point."""
+"""The echo model `specular`: near-field geometric optics per chirp, with traced occlusion."""
 
 from __future__ import annotations
 
@@ -22,7 +22,9 @@ class Specular(BuiltInModel):
     Parameters
     ----------
     radar : Radar
+        Radar in the scene.
     body : Body
+        Body in motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool

@@ -29,8 +29,8 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled
 from rtradar.kernels.phasor import phasor
+from rtradar.kernels.scatter.triangles import mean_of_phasor
 from rtradar.scatter.common.polarization import STEEP
-from rtradar.scatter.facets.triangle_mean import mean_of_phasor
 
 Array = NDArray[np.float64]
 _TASKS = (

@@ -75,7 +75,7 @@ class EllipsoidGrid:
 
     def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
         """Those facets, each in four, on the sphere of the corners' own radius less what finer facets stand out less."""
-        quarters = _in_four(self.corners[which])
+        quarters = in_four(self.corners[which])
         # The corners stand out by 3/2 of what the middle lies below the sphere's mean; a quarter of it with half the edge.
         out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
         size = np.linalg.norm(quarters, axis=-1, keepdims=True)
@@ -163,7 +163,7 @@ class MeshGrid:
 
     def split(self, which: NDArray[np.int64]) -> MeshGrid:
         """Those facets, each in four."""
-        return MeshGrid(_in_four(self.corners[which]), np.repeat(self.face[which], 4))
+        return MeshGrid(in_four(self.corners[which]), np.repeat(self.face[which], 4))
 
 
 def _with_middle(corners: Array) -> Array:
@@ -219,5 +219,6 @@ def _sphere(n: int) -> Array:
     return corners / np.sqrt((areas * means).sum() / areas.sum())
 
 
-def _in_four(triangles: Array) -> Array:
+def in_four(triangles: Array) -> Array:
+    """Cut triangles (n, 3, 3) into four like ones each, (4 n, 3, 3)."""
     return np.einsum("fkc,tci->tfki", _cut(2), triangles).reshape(-1, 3, 3)

@@ -1,4 +1,4 @@
-"""The models `reference` and `physical-optics`: what they are made of, and how far they are apart."""
+"""The models `reference` and `physical-optics`: their parts, and how far they are apart."""
 
 import dataclasses
 from collections.abc import Callable
@@ -16,8 +16,9 @@ from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.scatter.envelope import PLACES, stretch
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
-from rtradar.scatter.facets.envelope import PIECES, TOGETHER, Envelope, Sample, stretch
+from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
@@ -79,7 +80,7 @@ def spectrum(echoes: rt.Echoes, frequency: float) -> NDArray[np.complex128]:
 
 
 def error(ours: rt.Echoes, reference: rt.Echoes) -> float:
-    """rms|H - Href| / rms|Href| over chirps, receivers and three frequencies, all parts together."""
+    """rms|H - Href| / rms|Href| over chirps, receivers and three frequencies, all parts."""
     pairs = [
         (spectrum(ours, f).sum(axis=2), spectrum(reference, f).sum(axis=2))
         for f in (12e9, 14e9, 16e9)
@@ -92,7 +93,8 @@ def error(ours: rt.Echoes, reference: rt.Echoes) -> float:
     )
 
 
-# -- reference --------------------------------------------------------------------------------------------------------
+# -- reference
+# ----------------------------------------------------------------------------------------------
 
 
 def test_reference_is_the_scattering_length_of_each_pose() -> None:
@@ -101,7 +103,8 @@ def test_reference_is_the_scattering_length_of_each_pose() -> None:
     echoes = Reference(radar, body, facets=1280).echoes(chirps)  # type: ignore[arg-type]
     for row, chirp in enumerate(chirps):
         pose = body.at([(chirp + 0.5) * radar.chirp_duration_s])
-        # About the middle of the sphere, so that the phase over the origin is that of metres, not of the radar's place.
+        # About the middle of the sphere, so that the phase over the origin is that of metres, not
+        # of the radar's place.
         tx = np.tile(radar.tx[chirp % 3], (2, 1))
         rx = radar.rx[radar.rx_of_tx[chirp % 3]]
         target = rt.Ellipsoids(pose.centres[0], pose.frames[0], pose.semi_axes)
@@ -111,7 +114,8 @@ def test_reference_is_the_scattering_length_of_each_pose() -> None:
             k = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
             expected = f / (far[0] * far[1]) * np.exp(-1j * k * (far[0] + far[1]))
             got = (np.conj(ours) * np.exp(-1j * k * echoes.length[row])).sum(axis=1)
-            # The limb turns by a thousandth of a radian between the chirp and the middle of its cycle, when it was seen.
+            # The limb turns by a thousandth of a radian between the chirp and the middle of its
+            # cycle, when it was seen.
             np.testing.assert_allclose(got, expected, atol=2e-3 * np.abs(expected).max())
 
 
@@ -129,7 +133,8 @@ def test_spreading_can_be_left_out() -> None:
         Reference(radar, body, facets=1280, spreading=spread).echoes(np.array([60]))  # type: ignore[arg-type]
         for spread in (True, False)
     )
-    # Nearly monostatic: R_T = R_R = length / 2 at the specular point, and facets that count stand within 2 cm of 3.5 m.
+    # Nearly monostatic: R_T = R_R = length / 2 at the specular point, and facets that count stand
+    # within 2 cm of 3.5 m.
     seen = np.abs(near.amplitude) > 1e-4
     np.testing.assert_allclose(
         np.abs(free.amplitude)[seen],
@@ -138,7 +143,8 @@ def test_spreading_can_be_left_out() -> None:
     )
 
 
-# -- physical optics --------------------------------------------------------------------------------------------------
+# -- physical optics
+# ----------------------------------------------------------------------------------------------
 
 
 def test_physical_optics_is_close_to_the_reference_while_a_shadow_passes() -> None:
@@ -153,7 +159,8 @@ def test_physical_optics_is_close_to_the_reference_while_a_shadow_passes() -> No
     np.testing.assert_array_equal(ours.length, reference.length)
     hidden = np.abs(reference.amplitude[3, :, :, 0])
     assert hidden.min() < 0.6 * hidden.max()  # the shadow is there
-    # The accuracy promised at 12 GHz of a body; where half of all there is is half hidden it takes five frequencies.
+    # The accuracy promised at 12 GHz of a body; where half of all there is is half hidden it takes
+    # five frequencies.
     assert error(ours, reference) < 0.02
     assert error(fewer, reference) < 0.04
     assert error(Specular(radar, body).echoes(chirps), reference) > 0.05  # type: ignore[arg-type]
@@ -177,7 +184,8 @@ def test_options_out_of_range_are_refused(option: str) -> None:
         PhysicalOptics(small_radar(), Passing(), **{option: -1})  # type: ignore[arg-type]
 
 
-# -- the array --------------------------------------------------------------------------------------------------------
+# -- the array
+# ----------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -216,13 +224,14 @@ def test_coarse_nodes_spread_to_fine_ones() -> None:
     )
 
 
-# -- the envelope -----------------------------------------------------------------------------------------------------
+# -- the envelope
+# ----------------------------------------------------------------------------------------------
 
 
 def envelope_of(
     law: Callable[[float], complex], tolerance: float = 0.05, end: int = 100
 ) -> tuple[Envelope, list[float]]:
-    """An envelope of two parts: one follows the law, the other stays at 1; and the places where it was asked."""
+    """An envelope of two parts, one by the law, the other 1; and the places where it was asked."""
     asked: list[float] = []
 
     def sample(place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
@@ -237,7 +246,7 @@ def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex1
     """Ratio (time, part) at these shares of the way from an anchor to the next."""
     ratio, slope, known = envelope.course(index)
     out = np.empty((len(share), 2), dtype=np.complex128)
-    for row, place in enumerate(share * PIECES):
+    for row, place in enumerate(share * PLACES):
         for part in range(2):
             left, right = stretch(known[:, part], place)
             values = ratio[left], ratio[right], slope[left], slope[right]
@@ -272,7 +281,7 @@ def test_where_it_bends_anchors_come_closer_and_the_error_falls() -> None:
     for tolerance in (10.0, 0.05):
         envelope, asked = envelope_of(law, tolerance)
         errors.append(np.abs(between(envelope, 4, share)[:, 0] - [law(4 + s) for s in share]).max())
-    assert {4 + 3 / PIECES, 4 + 4 / PIECES} <= set(asked)
+    assert {4 + 3 / PLACES, 4 + 4 / PLACES} <= set(asked)
     assert errors[0] > 0.3
     assert errors[1] < 0.05
 
@@ -334,5 +343,6 @@ def test_an_envelope_has_one_value_and_one_slope_at_an_anchor(seed: int) -> None
     before = between(envelope, 3, np.array([1 - step, 1.0]))[:, 0]
     after = between(envelope, 4, np.array([0.0, step]))[:, 0]
     np.testing.assert_allclose(before[1], after[0], atol=1e-12)
-    # Slopes reach tens an interval; the second derivative times the step is what they may differ by.
+    # Slopes reach tens an interval; the second derivative times the step is what they may differ
+    # by.
     np.testing.assert_allclose(before[1] - before[0], after[1] - after[0], atol=1e-6)

@@ -13,7 +13,6 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter import build_model
-from rtradar.scatter.facets.triangle_mean import mean_of_phasor
 from rtradar.scatter.models.rays import Rays
 from rtradar.scatter.ray_tubes.target import rays_scattering
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid
@@ -51,22 +50,6 @@ DIHEDRAL = sheet(
 TRIHEDRAL = sheet(
     [[0, 0, 0], [0.2, 0, 0], [0, 0.2, 0], [0, 0, 0.2]], [[0, 1, 2], [0, 2, 3], [0, 3, 1]]
 )
-
-
-@given(st.lists(st.floats(-20, 20), min_size=3, max_size=3), st.sampled_from([1.0, 1e-3, 1e-9]))
-def test_the_mean_phasor_is_the_integral_over_the_triangle(
-    phases: list[float], scale: float
-) -> None:
-    u = (np.array(phases) - np.mean(phases)) * scale
-    nodes, weights = np.polynomial.legendre.leggauss(40)
-    x, y = np.meshgrid((nodes + 1) / 2, (nodes + 1) / 2, indexing="ij")
-    second, third = x, y * (1 - x)
-    area = np.outer(weights, weights) / 2 * (1 - x)
-    integral = np.sum(
-        area * np.exp(-1j * (u[0] * (1 - second - third) + u[1] * second + u[2] * third))
-    )
-    # The series ends after its ninth term.
-    assert complex(*mean_of_phasor(*u)) == pytest.approx(integral, abs=1e-9)
 
 
 def test_facets_of_ellipsoids_have_the_mean_size_of_the_sphere_and_as_many_as_asked_for() -> None:

@@ -1,0 +1,154 @@
+"""Cubics through an envelope that is known at some places of each interval between keyframes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.jit import compiled, inlined
+
+PLACES = 8
+"""Parts of the interval between two keyframes where it is divided the most: 1.25 ms of 10 ms."""
+
+
+@compiled()
+def find_slopes(inside, before, here, after, slope):
+    """Fill the slopes per place (place, node, pair, part) where a part is known.
+
+    ``before``, ``here`` and ``after`` are intervals, each a ratio (place, node, pair, part) and
+    where it is known (place, part). Slopes are those of the parabola through three places; at the
+    very start, not ``inside``, that of a straight line.
+    """
+    (ratio_before, known_before), (ratio, known), (ratio_after, known_after) = before, here, after
+    nodes, pairs, parts = ratio.shape[1:]
+    for part in range(parts):
+        left = -1
+        for place in range(PLACES + 1):
+            if not known[place, part]:
+                continue
+            # Find the neighbours. At both ends the one on the other side belongs to the next
+            # interval, where this part has its own.
+            right = place + 1
+            while right <= PLACES and not known[right, part]:
+                right += 1
+            beyond = PLACES - 1 if left < 0 else 1
+            while left < 0 and not known_before[beyond, part]:
+                beyond -= 1
+            while right > PLACES and not known_after[beyond, part]:
+                beyond += 1
+            gap = place - left if left >= 0 else PLACES - beyond
+            next_gap = right - place if right <= PLACES else beyond
+            # Weigh the slopes to both by the width of the other.
+            for node in range(nodes):
+                for pair in range(pairs):
+                    value = ratio[place, node, pair, part]
+                    last = (
+                        ratio[left, node, pair, part]
+                        if left >= 0
+                        else ratio_before[beyond, node, pair, part]
+                    )
+                    following = (
+                        ratio[right, node, pair, part]
+                        if right <= PLACES
+                        else ratio_after[beyond, node, pair, part]
+                    )
+                    rise, next_rise = (value - last) / gap, (following - value) / next_gap
+                    if left < 0 and not inside:
+                        rise = next_rise
+                    slope[place, node, pair, part] = (rise * next_gap + next_rise * gap) / (
+                        gap + next_gap
+                    )
+            left = place
+
+
+@inlined()
+def stretch(known, place):
+    """The known places (place,) on either side of one in 0 to `PLACES`."""
+    left = min(int(place), PLACES - 1)
+    right = left + 1
+    while not known[left]:
+        left -= 1
+    while not known[right]:
+        right += 1
+    return left, right
+
+
+@compiled()
+def fill_envelope(chirps, fraction, tx, weights, course, strength, amplitude):
+    """Fill the amplitude (node, chirp, rx, part) at chirps, given by the fraction of the interval.
+
+    ``tx (chirp,)`` and ``weights (tx, rx, pair)`` say what receivers take of each pair of nodes;
+    ``course`` is the ratio and its slope (place, node, pair, part), and where it is known (place,
+    part); ``strength (chirp, rx, part)`` multiplies it.
+    """
+    ratio, slope, known = course
+    nodes, pairs, parts = ratio.shape[1:]
+    receivers = weights.shape[1]
+    for i in range(len(chirps)):
+        # Weights of the cubic of each part.
+        chirp, place = chirps[i], fraction[i] * PLACES
+        ends, cubic = np.empty((2, parts), dtype=np.int64), np.empty((4, parts))
+        for part in range(parts):
+            left, right = stretch(known[:, part], place)
+            ends[0, part], ends[1, part] = left, right
+            cubic[0, part], cubic[1, part], cubic[2, part], cubic[3, part] = hermite_weights(
+                (place - left) / (right - left), right - left
+            )
+        own = weights[tx[chirp]]
+        value = np.empty(parts, dtype=np.complex128)
+        amplitude[:, chirp] = 0
+        for pair in range(pairs):
+            # Where nodes are at antennas a transmitter needs but a few of the pairs.
+            used = False
+            for receiver in range(receivers):
+                used |= own[receiver, pair] != 0
+            if not used:
+                continue
+            # Each pair's value, added to the receivers.
+            for node in range(nodes):
+                for part in range(parts):
+                    left, right = ends[0, part], ends[1, part]
+                    value[part] = (
+                        cubic[0, part] * ratio[left, node, pair, part]
+                        + cubic[1, part] * ratio[right, node, pair, part]
+                        + cubic[2, part] * slope[left, node, pair, part]
+                        + cubic[3, part] * slope[right, node, pair, part]
+                    )
+                for receiver in range(receivers):
+                    weight, out = own[receiver, pair], amplitude[node, chirp, receiver]
+                    for part in range(parts):
+                        out[part] += weight * value[part] * strength[chirp, receiver, part]
+
+
+def find_slopes_reference(before, here, after):
+    """Slopes (place, node, pair, part) of `find_slopes` inside a capture, 0 where unknown."""
+    slope = np.zeros_like(here[0])
+    parts, intervals = slope.shape[3], (before, here, after)
+    for part in range(parts):
+        # Both intervals that meet at a keyframe have it.
+        places = [np.flatnonzero(known[:, part]) for _, known in intervals]
+        at = np.concatenate([places[0][:-1] - PLACES, places[1], places[2][1:] + PLACES])
+        values = [ratio[own, ..., part] for (ratio, _), own in zip(intervals, places, strict=True)]
+        y = np.concatenate([values[0][:-1], values[1], values[2][1:]])
+        gaps = np.diff(at)[:, None, None]
+        rises = np.diff(y, axis=0) / gaps
+        through = (rises[:-1] * gaps[1:] + rises[1:] * gaps[:-1]) / (gaps[:-1] + gaps[1:])
+        slope[places[1], ..., part] = through[(at[1:-1] >= 0) & (at[1:-1] <= PLACES)]
+    return slope
+
+
+def fill_envelope_reference(chirps, fraction, tx, weights, course, strength):
+    """Amplitude of `fill_envelope`, in plain NumPy."""
+    ratio, slope, known = course
+    amplitude = np.zeros((ratio.shape[1], *strength.shape), dtype=complex)
+    for chirp, place in zip(chirps, fraction * PLACES, strict=True):
+        for part in range(strength.shape[2]):
+            places = np.flatnonzero(known[:, part])
+            left = places[min(np.searchsorted(places, place, side="right"), len(places) - 1) - 1]
+            right = places[places > left][0]
+            h = hermite_weights((place - left) / (right - left), right - left)
+            y, d = ratio[..., part], slope[..., part]
+            value = h[0] * y[left] + h[1] * y[right] + h[2] * d[left] + h[3] * d[right]
+            own = weights[tx[chirp]]
+            amplitude[:, chirp, :, part] = value @ own.T * strength[chirp, :, part]
+    return amplitude

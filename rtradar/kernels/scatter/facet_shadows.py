@@ -1,0 +1,183 @@
+"""Fractions of facets that an antenna sees past other parts, exact at edges of shadows.
+
+A tracer says which part hides which vertex. Where it hides some vertices of a facet and not others,
+the edge of the shadow runs through that facet, and the fraction that it leaves is taken from how
+far the rays to its vertices pass outside the occluding ellipsoids, in float64, as linear over the
+facet. So a shadow moves over the body without jumps.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.triangles import midpoints, positive_fraction
+
+
+class _Room(NamedTuple):
+    """Arrays that serve one part and antenna after the other.
+
+    ``balls (part, 5, 3)``: from the part's axes to those in which another one is the unit ball, and
+    the antenna in these. ``clear, of (vertex,)``: how far the ray to a vertex passes outside of
+    which occluder. ``hidden (vertex,)`` and ``counts (facet,)``: hidden vertices, and how many a
+    facet has.
+    """
+
+    balls: NDArray[np.float64]
+    clear: NDArray[np.float64]
+    of: NDArray[np.int64]
+    hidden: NDArray[np.int32]
+    counts: NDArray[np.int32]
+
+
+@inlined()
+def into_ball(part, other, antenna, centres, frames, semi_axes, turn, shift, start):
+    """From a part's axes to those in which another is the unit ball, and the antenna in these."""
+    for i in range(3):
+        shift[i], start[i] = 0.0, 0.0
+        for j in range(3):
+            shift[i] += (
+                frames[other, j, i] * (centres[part, j] - centres[other, j]) / semi_axes[other, i]
+            )
+            start[i] += frames[other, j, i] * (antenna[j] - centres[other, j]) / semi_axes[other, i]
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += frames[other, k, i] * frames[part, k, j] / semi_axes[other, i]
+
+
+@inlined()
+def _clearance(ball, vertex):
+    """Least distance of the way to a vertex from the unit ball's middle, less 1."""
+    x, y, z = vertex[0], vertex[1], vertex[2]
+    start_square, along, span = 0.0, 0.0, 0.0
+    for i in range(3):
+        start = ball[4, i]
+        way = ball[i, 0] * x + ball[i, 1] * y + ball[i, 2] * z
+        way += ball[3, i] - start
+        start_square += start * start
+        along += start * way
+        span += way * way
+    nearest = min(1.0, max(0.0, -along / span))
+    return math.sqrt(max(start_square + nearest * (2 * along + nearest * span), 0.0)) - 1
+
+
+@inlined()
+def _cut(occluder, antenna, part, pose, vertices, corner, room):
+    """Fraction of a facet, with these corners, that occluders of some of them leave."""
+    centres, frames, semi_axes = pose
+    c0, c1, c2 = corner
+    h0, h1, h2 = occluder[c0], occluder[c1], occluder[c2]
+    v0, v1, v2 = math.inf, math.inf, math.inf
+    for n in range(3):
+        other = h0 if n == 0 else h1 if n == 1 else h2
+        if other < 0 or (n > 0 and other == h0) or (n > 1 and other == h1):
+            continue
+        ball = room.balls[other]
+        if math.isnan(ball[3, 0]):
+            into_ball(part, other, antenna, centres, frames, semi_axes, ball[:3], ball[3], ball[4])
+        # Facets that meet at a vertex ask for the same way one after the other.
+        for k in range(3):
+            vertex = c0 if k == 0 else c1 if k == 1 else c2
+            if room.of[vertex] != other:
+                room.clear[vertex], room.of[vertex] = _clearance(ball, vertices[vertex]), other
+        clear = room.clear
+        v0, v1, v2 = min(v0, clear[c0]), min(v1, clear[c1]), min(v2, clear[c2])
+    return positive_fraction(v0, v1, v2)
+
+
+@inlined()
+def _shade_part(occluder, antenna, part, pose, vertices, corners, room, out):
+    """Fractions of the facets of one part for one antenna; whether any of it is hidden."""
+    _, _, of, hidden, counts = room
+    any_hidden = 0
+    for vertex in range(len(occluder)):
+        hidden[vertex] = occluder[vertex] >= 0
+        any_hidden |= hidden[vertex]
+    if not any_hidden:
+        return False
+    for vertex in range(len(of)):
+        of[vertex] = -1
+    for other in range(len(room.balls)):
+        room.balls[other, 3, 0] = math.nan  # not known yet
+    first, second, third = corners[0], corners[1], corners[2]
+    for f in range(len(first)):
+        counts[f] = hidden[first[f]] + hidden[second[f]] + hidden[third[f]]
+    for f in range(len(first)):
+        out[f] = 1.0 if counts[f] == 0 else 0.0
+    for f in range(len(first)):
+        if counts[f] == 1 or counts[f] == 2:
+            corner = (first[f], second[f], third[f])
+            out[f] = _cut(occluder, antenna, part, pose, vertices, corner, room)
+    return True
+
+
+@compiled()
+def shade(hidden_by, antennas, parts, pose, vertices, corners, row, out):
+    """Fill in what antennas see of facets.
+
+    Parameters
+    ----------
+    hidden_by : (antenna, n, vertex) int
+        Part that hides each vertex, or -1.
+    antennas : (antenna, 3) float64
+        Positions, world [m].
+    parts : (n,) int64
+        Parts whose facets are asked for.
+    pose : (centres, frames, semi_axes)
+        Pose of the whole body.
+    vertices : (part, vertex, 3) float64
+        Vertices in the axes of the parts [m].
+    corners : (3, facet) uint32
+        Corners of the facets.
+    row : (antenna, n) int64
+        Filled: row of ``out`` for each antenna and part.
+    out : (row, facet) float32
+        Filled: fractions. The first row is that of parts in full view.
+
+    Returns
+    -------
+    int
+        Number of rows that are filled.
+    """
+    out[0] = 1.0
+    count, n_vertices, n_facets = 1, vertices.shape[1], corners.shape[1]
+    room = _Room(
+        np.empty((len(pose[0]), 5, 3)),
+        np.empty(n_vertices),
+        np.empty(n_vertices, dtype=np.int64),
+        np.empty(n_vertices, dtype=np.int32),
+        np.empty(n_facets, dtype=np.int32),
+    )
+    for a in range(len(antennas)):
+        for n in range(len(parts)):
+            part = parts[n]
+            row[a, n] = 0
+            given = (hidden_by[a, n], antennas[a], part, pose, vertices[part], corners, room)
+            if _shade_part(*given, out[count]):
+                row[a, n] = count
+                count += 1
+    return count
+
+
+def shade_reference(hidden_by, antennas, parts, pose, vertices, corners):
+    """Fractions (antenna, n, facet) of `shade`, by many points of each facet, in plain NumPy."""
+    (centres, frames, axes), faces = pose, corners.T
+    out = np.empty((*hidden_by.shape[:2], len(faces)))
+    for a, n in np.ndindex(hidden_by.shape[:2]):
+        occluder = hidden_by[a, n][faces]
+        world = centres[parts[n]] + vertices[parts[n]] @ frames[parts[n]].T
+        least = np.full(faces.shape, np.inf)
+        for other in set(occluder.ravel()) - {-1}:
+            place = antennas[a], world
+            start, end = ((p - centres[other]) @ frames[other] / axes[other] for p in place)
+            along = np.clip(-((end - start) @ start) / ((end - start) ** 2).sum(axis=1), 0, 1)
+            clear = np.linalg.norm(start + along[:, None] * (end - start), axis=1) - 1
+            own = (occluder == other).any(axis=1)
+            least[own] = np.minimum(least[own], clear[faces[own]])
+        cut = (np.where(np.isinf(least), 1e9, least) @ midpoints(40).T > 0).mean(axis=1)
+        out[a, n] = np.where((occluder >= 0).all(axis=1), 0.0, cut)
+    return out

@@ -1,0 +1,254 @@
+"""The physical-optics integral over facets: linear phase integrated exactly over each triangle.
+
+    F = jk / sqrt(pi) * sum over lit facets of  o w / (R_T R_R)  Int exp(-jk (R_T + R_R - L)) dS
+
+with the reciprocal obliquity o = (n.s_T + n.s_R) / 2, which is n.s where Tx and Rx are one: the
+Fresnel-Kirchhoff factor (Born and Wolf, *Principles of Optics*, section 8.3.2). Path lengths are
+exact at the three vertices, in float64, and taken as linear between them.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.kernels.jit import compiled, inlined
+from rtradar.kernels.scatter.triangles import (
+    FAST,
+    SERIES,
+    largest_spread,
+    midpoints,
+    sum_large,
+    sum_small,
+)
+
+Array = NDArray[np.float64]
+
+
+class Facets(NamedTuple):
+    """Triangles of one or more parts, all with the same faces; each part in its own axes.
+
+    ``vertices (part, vertex, 3)`` float64 [m]; ``faces (facet, 3)`` int32, anticlockwise seen from
+    outside; ``normals (part, facet, 3)``, outward; ``areas (part, facet)`` [m^2]. ``bend (part,
+    facet)`` is how far n.s swings to either side of its mean over the curved surface that a facet
+    represents, 0 where it is flat: the terminator is softened over it. With ``both_sides`` they are
+    a thin sheet, lit from either side.
+    """
+
+    vertices: Array
+    faces: NDArray[np.int32]
+    normals: Array
+    areas: Array
+    bend: Array
+    both_sides: bool = False
+
+
+class Views(NamedTuple):
+    """Tasks, each of which is one part in one pose, and what the antennas see of it.
+
+    ``part (task,)`` int64; ``antennas (task, antenna, 3)`` float64 in the axes of that part [m];
+    ``seen (row, facet)`` float32, the fraction of each facet that nothing hides; ``row (task,
+    antenna)`` int64, which of them is whose.
+    """
+
+    part: NDArray[np.int64]
+    antennas: Array
+    row: NDArray[np.int64]
+    seen: NDArray[np.float32]
+
+
+class Waves(NamedTuple):
+    """Pairs of antennas, and the waves between them.
+
+    ``pairs (pair, 2)`` int64, Tx and Rx among the antennas of a task; ``carrier (task, pair)`` the
+    path whose phase is taken out [m]; ``wavenumber (task, node)`` [rad/m]; ``spreading``, whether
+    each facet's field is divided by R_T R_R, normalised to 1 m.
+    """
+
+    pairs: NDArray[np.int64]
+    carrier: Array
+    wavenumber: Array
+    spreading: bool
+
+
+class _Chosen(NamedTuple):
+    """Facets (n,) that may be lit, ``corners (3, n)``, normal and plane ``facing (4, n)``, areas, bend."""
+
+    facet: NDArray[np.uint32]
+    corners: NDArray[np.uint32]
+    facing: Array
+    areas: Array
+    bend: Array
+
+
+class _Terms(NamedTuple):
+    """Mean path, two deviations from it and strength of facets under two views."""
+
+    mean: Array
+    u: Array
+    v: Array
+    strength: Array
+
+
+@inlined()
+def _may_be_lit(antennas, planes, normals, bend, both, size, seen, row, chosen):
+    """Facets that any of the antennas may light, by the ball round them all; their count."""
+    count_antennas = len(antennas)
+    x, y, z = antennas[:, 0].mean(), antennas[:, 1].mean(), antennas[:, 2].mean()
+    spread = 0.0
+    for antenna in antennas:
+        spread = max(
+            spread, math.sqrt((antenna[0] - x) ** 2 + (antenna[1] - y) ** 2 + (antenna[2] - z) ** 2)
+        )
+    farthest = math.sqrt(x * x + y * y + z * z) + spread + size
+    count = 0
+    for f in range(len(planes)):
+        height = normals[f, 0] * x + normals[f, 1] * y + normals[f, 2] * z - planes[f]
+        if both or height > -spread - bend[f] * farthest:
+            for antenna in range(count_antennas):
+                if seen[row[antenna], f] > 0:
+                    chosen[count] = f
+                    count += 1
+                    break
+    return count
+
+
+@inlined()
+def _choose(facets, own, antennas, row, seen, x, y, z):
+    """Facets of a part that may be lit; its vertices' coordinates are filled in."""
+    n_facets, size = len(facets.faces), 0.0
+    vertices, normals = facets.vertices[own], facets.normals[own]
+    for i in range(len(x)):
+        x[i], y[i], z[i] = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        size = max(size, x[i] * x[i] + y[i] * y[i] + z[i] * z[i])
+    planes = np.empty(n_facets)
+    for f in range(n_facets):
+        i = facets.faces[f, 0]
+        planes[f] = normals[f, 0] * x[i] + normals[f, 1] * y[i] + normals[f, 2] * z[i]
+    lit, both = np.empty(n_facets, dtype=np.uint32), facets.both_sides
+    reach = math.sqrt(size)
+    count = _may_be_lit(antennas, planes, normals, facets.bend[own], both, reach, seen, row, lit)
+    # Side by side, and without a sign: what may be counted from an array's end keeps a loop from
+    # vector lanes.
+    corners, facing = np.empty((3, count), dtype=np.uint32), np.empty((4, count))
+    areas, bend = np.empty(count), np.empty(count)
+    for i in range(count):
+        f = lit[i]
+        for axis in range(3):
+            corners[axis, i], facing[axis, i] = facets.faces[f, axis], normals[f, axis]
+        facing[3, i] = planes[f]
+        areas[i], bend[i] = facets.areas[own, f], facets.bend[own, f]
+    return _Chosen(lit[:count], corners, facing, areas, bend)
+
+
+@inlined(fastmath=FAST)
+def _excess(antenna, x, y, z, out):
+    """Path from the antenna to each vertex less that to the origin, which is returned."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    distance = math.sqrt(a * a + b * b + c * c)
+    for i in range(len(x)):
+        p, q, r = x[i], y[i], z[i]
+        away = math.sqrt((p - a) ** 2 + (q - b) ** 2 + (r - c) ** 2)
+        # |T - p| - |T| without the loss of digits of a far antenna.
+        out[i] = (p * (p - 2 * a) + q * (q - 2 * b) + r * (r - 2 * c)) / (away + distance)
+    return distance
+
+
+@inlined(fastmath=FAST)
+def _see(antenna, distance, excess, chosen, seen, view):
+    """Rows of ``view``: mean path, two deviations from it, n.s, and the fraction that is seen."""
+    a, b, c = antenna[0], antenna[1], antenna[2]
+    first_of, second_of, third_of = chosen.corners[0], chosen.corners[1], chosen.corners[2]
+    n0, n1, n2, plane = chosen.facing[0], chosen.facing[1], chosen.facing[2], chosen.facing[3]
+    means, first_less, second_less, along, open_ = view[0], view[1], view[2], view[3], view[4]
+    facet = chosen.facet
+    for i in range(len(facet)):
+        first, second, third = excess[first_of[i]], excess[second_of[i]], excess[third_of[i]]
+        mean = (first + second + third) / 3
+        means[i], first_less[i], second_less[i] = mean, first - mean, second - mean
+        open_[i] = seen[facet[i]]
+    # Apart from what is picked here and there, in vector lanes.
+    for i in range(len(facet)):
+        along[i] = (n0[i] * a + n1[i] * b + n2[i] * c - plane[i]) / (distance + means[i])
+
+
+@inlined(fastmath=FAST)
+def _light(tx, rx, chosen, both, far_t, far_r, carrier, spreading, terms):
+    """Fill the terms of facets under two views."""
+    tx_mean, tx_u, tx_v, tx_facing, tx_seen = tx[0], tx[1], tx[2], tx[3], tx[4]
+    rx_mean, rx_u, rx_v, rx_facing, rx_seen = rx[0], rx[1], rx[2], rx[3], rx[4]
+    areas, bend = chosen.areas, chosen.bend
+    mean, u, v, strength = terms
+    for i in range(len(mean)):
+        low, high = min(tx_facing[i], rx_facing[i]), max(tx_facing[i], rx_facing[i])
+        behind = both and high < 0
+        low, high = (-high, -low) if behind else (low, high)
+        # The part that falls to 0 at the terminator by itself, and the one between Tx and Rx, which
+        # has to be led there.
+        h = max(bend[i], 1e-300)
+        over = min(1.0, max(0.0, (low + h) / (2 * h)))
+        size = (max(low, 0.0) + over * (high - low) / 2) * min(tx_seen[i], rx_seen[i]) * areas[i]
+        if spreading:
+            size /= (far_t + tx_mean[i]) * (far_r + rx_mean[i])
+        mean[i] = tx_mean[i] + rx_mean[i] - carrier
+        u[i], v[i] = tx_u[i] + rx_u[i], tx_v[i] + rx_v[i]
+        strength[i] = size
+
+
+@compiled()
+def integrate(begin, end, facets, views, waves, out):
+    """Fill ``out (task, pair, node)`` with F [m] for the tasks from begin to end."""
+    count_antennas, count_vertices = views.antennas.shape[1], facets.vertices.shape[1]
+    # Coordinate by coordinate: loops over vertices run in vector lanes.
+    x, y, z = np.empty(count_vertices), np.empty(count_vertices), np.empty(count_vertices)
+    excess, far = np.empty(count_vertices), np.empty(count_antennas)
+    for task in range(begin, end):
+        antennas, row = views.antennas[task], views.row[task]
+        chosen = _choose(facets, views.part[task], antennas, row, views.seen, x, y, z)
+        count = len(chosen.facet)
+        # What each antenna sees of them.
+        view = np.empty((count_antennas, 5, count))
+        for antenna in range(count_antennas):
+            far[antenna] = _excess(antennas[antenna], x, y, z, excess)
+            seen = views.seen[row[antenna]]
+            _see(antennas[antenna], far[antenna], excess, chosen, seen, view[antenna])
+        # Pair by pair, the sum over facets at each frequency.
+        terms = _Terms(np.empty(count), np.empty(count), np.empty(count), np.empty(count))
+        room = np.empty(count + 1)
+        for pair in range(len(waves.pairs)):
+            t, r = waves.pairs[pair, 0], waves.pairs[pair, 1]
+            offset = waves.carrier[task, pair] - far[t] - far[r]
+            both, spreading = facets.both_sides, waves.spreading
+            _light(view[t], view[r], chosen, both, far[t], far[r], offset, spreading, terms)
+            mean, u, v, strength = terms
+            largest = largest_spread(u, v, room)
+            for node in range(waves.wavenumber.shape[1]):
+                k = waves.wavenumber[task, node]
+                if largest * k**2 <= SERIES:
+                    total = sum_small(mean, u, v, strength, k)
+                else:
+                    total = sum_large(mean, u, v, strength, k)
+                out[task, pair, node] = total * complex(0.0, k / math.sqrt(math.pi))
+
+
+def integrate_reference(facets, views, waves):
+    """`integrate` over flat facets that are lit, by middles of small triangles, in plain NumPy."""
+    corners = facets.vertices[:, facets.faces]
+    out = np.empty((*waves.carrier.shape, waves.wavenumber.shape[1]), dtype=complex)
+    for task, part in enumerate(views.part):
+        away = views.antennas[task][:, None, None] - corners[part]
+        ranges = np.linalg.norm(away, axis=-1)
+        middle = ranges.mean(axis=2)
+        facing = np.einsum("afx,fx->af", away[:, :, 0], facets.normals[part]) / middle
+        size = views.seen[views.row[task]] * facets.areas[part]
+        for pair, (t, r) in enumerate(waves.pairs):
+            path = (ranges[t] + ranges[r]) @ midpoints(16).T - waves.carrier[task, pair]
+            strength = (facing[t] + facing[r]) / 2 * np.minimum(size[t], size[r])
+            strength /= middle[t] * middle[r] if waves.spreading else 1.0
+            for node, k in enumerate(waves.wavenumber[task]):
+                total = strength @ np.exp(-1j * k * path).mean(axis=1)
+                out[task, pair, node] = 1j * k / math.sqrt(math.pi) * total
+    return out

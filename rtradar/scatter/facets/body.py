@@ -1,0 +1,186 @@
+"""The facets of a posed or moving body, and what antennas see of them past other parts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rtradar.body import Body
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.scatter.facet_shadows import shade
+from rtradar.kernels.scatter.facets import Facets, Views, Waves
+from rtradar.radar import Radar
+from rtradar.scatter.common.interpolation import sweep_nodes
+from rtradar.scatter.common.polarization import copolar
+from rtradar.scatter.facets.surfaces import (
+    body_facets,
+    ellipsoid_facets,
+    facet_integral,
+    subdivisions_for,
+)
+from rtradar.trace.backends.backend import select, use
+from rtradar.trace.facet_visibility import FacetTracer
+
+Array = NDArray[np.float64]
+
+
+class Seen(NamedTuple):
+    """What antennas see of facets: ``fraction (row, facet)``, and ``row (antenna, n)``, which is whose."""
+
+    fraction: NDArray[np.float32]
+    row: NDArray[np.int64]
+
+
+class FacetShadows:
+    """Fractions of the facets of a posed body that antennas see.
+
+    Parameters
+    ----------
+    tracer : FacetTracer
+        Tracer of the same body.
+    facets : Facets
+        Facets of ellipsoids with these semi-axes.
+    semi_axes : (part, 3) float64
+        Semi-axes of the parts [m].
+    """
+
+    def __init__(self, tracer: FacetTracer, facets: Facets, semi_axes: Array) -> None:
+        self._tracer, self._facets = tracer, facets
+        self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
+        # Coordinate by coordinate, as the tracer takes them.
+        self._places = np.ascontiguousarray(np.swapaxes(facets.vertices, 1, 2))
+        # Without a sign: what may be counted from an array's end keeps a loop from vector lanes.
+        self._corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)
+        # A facet is lit while its middle faces away by less than its bend; its corners by no more
+        # than thrice that.
+        self._margin = 3 * float(facets.bend.max())
+
+    def seen(
+        self, centres: Array, frames: Array, antennas: Array, parts: NDArray[np.int64]
+    ) -> Seen:
+        """Fraction of each facet that no other part hides.
+
+        Parameters
+        ----------
+        centres, frames : (part, 3), (part, 3, 3) float64
+            Pose of the whole body, world [m].
+        antennas : (antenna, 3) float64
+            Positions, world [m].
+        parts : (n,) int64
+            Parts whose facets are asked for.
+        """
+        facets, row = self._facets, np.zeros((len(antennas), len(parts)), dtype=np.int64)
+        if len(centres) == 1:
+            return Seen(np.ones((1, len(facets.faces)), dtype=np.float32), row)
+        hidden_by = self._tracer.occluders(
+            centres, frames, antennas, parts, self._places, self._margin
+        )
+        fraction = np.empty((1 + row.size, len(facets.faces)), dtype=np.float32)
+        given = (
+            hidden_by,
+            np.ascontiguousarray(antennas),
+            np.ascontiguousarray(parts),
+            (np.ascontiguousarray(centres), np.ascontiguousarray(frames), self._semi_axes),
+        )
+        count = shade(*given, facets.vertices, self._corners, row, fraction)
+        return Seen(fraction[:count], row)
+
+
+class FacetBody:
+    """The facets of a moving body, which the models `physical-optics` and `reference` share.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar in the scene.
+    body : Body
+        Body in motion.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    facets : int, optional
+        Least number per part; None: by the wavelength, see `body_facets`.
+    nodes : int
+        Number of frequencies over the sweep.
+
+    Attributes
+    ----------
+    variant : str
+        Kind of the backend in use.
+    frequency : (node,) float64
+        Frequencies [Hz].
+    """
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str,
+        spreading: bool,
+        facets: int | None,
+        nodes: int,
+    ) -> None:
+        self._radar, self._spreading = radar, spreading
+        count = body_facets(body.semi_axes, radar.centre_frequency_hz) if facets is None else facets
+        self._facets = ellipsoid_facets(body.semi_axes, subdivisions_for(count))
+        self.frequency = sweep_nodes(radar, nodes)
+        backend = select(variant)
+        self.variant = backend.kind
+        tracer = FacetTracer(use(backend), body.semi_axes)
+        self.seen = FacetShadows(tracer, self._facets, body.semi_axes).seen
+
+    def amplitude(
+        self,
+        pose: tuple[Array, Array],
+        antennas: Array,
+        pairs: NDArray[np.int64],
+        length: Array,
+        seen: Seen,
+        index: NDArray[np.integer],
+        parts: NDArray[np.int64],
+    ) -> NDArray[np.complex128]:
+        """Amplitude of `Echoes` for poses and pairs of antennas.
+
+        Parameters
+        ----------
+        pose : (pose, part, 3), (pose, part, 3, 3) float64
+            Centres and frames, world [m].
+        antennas : (pose, antenna, 3) float64
+            Positions, world [m].
+        pairs : (pair, 2) int
+            Tx and Rx, among the antennas of a pose.
+        length : (pose, pair, n) float64
+            Carriers [m].
+        seen : Seen
+            What some antennas see of these parts.
+        index : (pose, antenna) int
+            Number of each antenna among those.
+        parts : (n,) int64
+            Parts to compute.
+
+        Returns
+        -------
+        (node, pose, pair, n) complex128
+            Scattering lengths, conjugated [m].
+        """
+        centres, frames = (array[:, parts] for array in pose)
+        tasks, nodes = centres.shape[0] * len(parts), len(self.frequency)
+        local = np.einsum("tpji,tpaj->tpai", frames, antennas[:, None] - centres[:, :, None])
+        views = Views(
+            np.tile(parts, len(centres)),
+            local.reshape(tasks, *local.shape[2:]),
+            np.swapaxes(seen.row[index], 1, 2).reshape(tasks, index.shape[1]),
+            seen.fraction,
+        )
+        carrier = np.swapaxes(length, 1, 2).reshape(tasks, len(pairs))
+        k = 2 * np.pi * self.frequency / SPEED_OF_LIGHT_MPS
+        waves = Waves(pairs, carrier, np.broadcast_to(k, (tasks, nodes)), self._spreading)
+        field = facet_integral(self._facets, views, waves)
+        field = field.reshape(len(centres), len(parts), len(pairs), nodes)
+        field = np.moveaxis(field, (3, 0, 2, 1), (0, 1, 2, 3))
+        to_tx, to_rx = (antennas[:, pairs[:, side], None] - centres[:, None] for side in (0, 1))
+        return np.asarray(np.conj(field) * copolar(to_tx, to_rx, self._radar.polarization))
