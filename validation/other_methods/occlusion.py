@@ -19,10 +19,11 @@ float64.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numba import prange
@@ -36,6 +37,8 @@ from rtradar.kernels.jit import compiled
 from rtradar.motion import place
 from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
+from rtradar.scatter.fresnel_zones.visible_fraction import BISECTIONS
 from rtradar.scatter.specular_point.visibility import SpecularVisibility
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
@@ -377,10 +380,32 @@ class ClosedForm:
 
     def sees(self, origins: Array, targets: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
         """Whether each line stays outside of every part but its own, scaled to a unit sphere."""
+        return self._clear(origins, targets, own, self._centres, self._frames)
+
+    def clear(
+        self,
+        origins: Array,
+        targets: Array,
+        group: NDArray[np.int64],
+        own: NDArray[np.int64],
+        pose: NDArray[np.int64],
+        poses: Poses,
+    ) -> NDArray[np.bool_]:
+        """The same for lines in groups, past the body in several poses, as the tracer has it."""
+        seen = np.empty(len(group), dtype=bool)
+        for number in range(len(poses.centres)):
+            some = np.flatnonzero(pose[group] == number)
+            posed = poses.centres[number], poses.frames[number]
+            seen[some] = self._clear(origins[some], targets[some], own[group[some]], *posed)
+        return seen
+
+    def _clear(
+        self, origins: Array, targets: Array, own: NDArray[np.int64], centres: Array, frames: Array
+    ) -> NDArray[np.bool_]:
         seen = np.ones(len(origins), dtype=bool)
         for part, axes in enumerate(self._axes):
-            start = (origins - self._centres[part]) @ self._frames[part] / axes
-            line = (targets - origins) @ self._frames[part] / axes
+            start = (origins - centres[part]) @ frames[part] / axes
+            line = (targets - origins) @ frames[part] / axes
             nearest = np.clip(-np.sum(start * line, axis=1) / np.sum(line * line, axis=1), 0, 1)
             distance = np.linalg.norm(start + nearest[:, None] * line, axis=1)
             seen &= (own == part) | (distance >= 1)
@@ -391,7 +416,8 @@ class Both:
     """The tracer's answers, with a count of those that the closed form contradicts."""
 
     def __init__(self, tracer: BodyTracer, reference: ClosedForm) -> None:
-        self._tracer, self._reference, self.lines, self.different = tracer, reference, 0, 0
+        self._tracer, self._reference, self._calls = tracer, reference, 0
+        self.lines, self.different = 0, 0
 
     def pose(self, centres: Array, frames: Array) -> None:
         self._tracer.pose(centres, frames)
@@ -403,27 +429,57 @@ class Both:
         self.different += int((seen != self._reference.sees(origins, targets, own)).sum())
         return seen
 
+    def clear(
+        self, origins: Array, targets: Array, group: NDArray[np.int64], *given: Any
+    ) -> NDArray[np.bool_]:
+        seen = self._tracer.clear(origins, targets, group, *given)
+        # Lines to corners of cells; those that bisect a side come ever nearer to an outline.
+        if self._calls % (1 + BISECTIONS) == 0:
+            self.lines += len(seen)
+            expected = self._reference.clear(origins, targets, group, *given)
+            self.different += int((seen != expected).sum())
+        self._calls += 1
+        return seen
+
 
 def tracer_rows(quick: bool) -> Iterator[Row]:
     """Mitsuba's answers on moving bodies against the closed form, and the power of the parts."""
-    radar = rt.Radar.preset("paper-12ghz")
-    mi = use(select("cpu"))
+    yield from compared_rows("lines of sight", visibilities, quick, 3.0)
+    # The closed form takes a second for a keyframe of the corners of all cells.
+    yield from compared_rows("corners of Fresnel zones", zone_fractions, quick, 0.3)
+
+
+def visibilities(radar: rt.Radar, body: rt.Body, tracer: Any, chirps: NDArray[np.int64]) -> Array:
+    """Fraction of the amplitude (chirp, rx, part) that is left of each part by `specular`."""
+    visibility = SpecularVisibility(radar, body, tracer)
+    return np.concatenate([visibility.at(chirp)[0] for chirp in chirps[:, None]])
+
+
+def zone_fractions(radar: rt.Radar, body: rt.Body, tracer: Any, chirps: NDArray[np.int64]) -> Array:
+    """The same by `fresnel`, at the middle of the sweep."""
+    frequency = np.array([radar.centre_frequency_hz])
+    fractions = ZoneFractions(radar, body, frequency, tracer)
+    return np.abs(np.concatenate([fractions.at(chirp)[0] for chirp in chirps[:, None]]))
+
+
+def compared_rows(
+    what: str, fractions_of: Callable[..., Array], quick: bool, duration_s: float
+) -> Iterator[Row]:
+    radar, mi = rt.Radar.preset("paper-12ghz"), use(select("cpu"))
     lines, different, worst, cases = 0, 0, 0.0, 0
     for activity in ("walk",) if quick else ("walk", "kick", "punch", "jumping_jack"):
         motion = rt.synthetic_motion(activity, seed=0)
-        body = rt.Body.from_motion(place(motion, start_s=0.0, duration_s=0.5 if quick else 3.0))
-        free = build_model("analytic", radar, body)
+        duration = duration_s / 6 if quick else duration_s
+        body = rt.Body.from_motion(place(motion, start_s=0.0, duration_s=duration))
         traced = Both(BodyTracer(mi, body.semi_axes), ClosedForm(body.semi_axes))
         # Power of each part at one chirp of every keyframe, by the tracer and by the closed form.
         step = keyframe_step(radar)
         chirps = np.arange(0, int(body.duration_s / radar.chirp_interval_s) - 1, step)
-        amplitudes = [free.echoes(chirp).amplitude[0] for chirp in chirps[:, None]]
+        amplitude = build_model("analytic", radar, body).echoes(chirps).amplitude[0]
         powers = []
         for tracer in (traced, ClosedForm(body.semi_axes)):
-            visibility = SpecularVisibility(radar, body, tracer)
-            fractions = [visibility.at(chirp)[0] for chirp in chirps[:, None]]
-            pairs = zip(amplitudes, fractions, strict=True)
-            powers.append(np.stack([(np.abs(a) ** 2 * f**2).sum(axis=(0, 1)) for a, f in pairs]))
+            fractions = fractions_of(radar, body, tracer, chirps)
+            powers.append((np.abs(amplitude) ** 2 * fractions**2).sum(axis=1))
         lines, different = lines + traced.lines, different + traced.different
         # Averages over 0.1 s, of parts within 30 dB of the strongest.
         n = round(0.1 / (step * radar.chirp_interval_s))
@@ -435,21 +491,22 @@ def tracer_rows(quick: bool) -> Iterator[Row]:
         worst, cases = max(worst, float(np.sqrt(np.mean(decibels**2)))), cases + int(strong.sum())
     yield judged(
         "tracer against closed form",
-        f"fraction of {lines} lines of sight with another answer",
+        f"fraction of {lines} {what} with another answer",
         "",
         different / lines,
         1e-5,
-        says="fraction of lines of sight on which Mitsuba and the closed form differ",
+        says=f"fraction of {what} on which Mitsuba and the closed form differ",
         cases=lines,
         key="tracer",
     )
+    parts = "parts" if what == "lines of sight" else "parts by `fresnel`"
     yield judged(
         "tracer against closed form",
-        "power of parts within 30 dB of the strongest, over 0.1 s: rms difference",
+        f"power of {parts} within 30 dB of the strongest, over 0.1 s: rms difference",
         "dB",
         worst,
         0.01,
-        says="power of the parts of a moving body, occluded by Mitsuba or in closed form: rms",
+        says=f"power of the {parts} of a moving body, occluded by Mitsuba or in closed form: rms",
         cases=cases,
         key="tracer",
     )

@@ -62,16 +62,6 @@ def _near_parts(origins, targets, group, own, pose, centres, longest):
     return near
 
 
-@inlined()
-def _stretched(frame, axes, x, y, z):
-    """Return a vector in the axes of a part, where it is the unit sphere."""
-    return (
-        (frame[0, 0] * x + frame[1, 0] * y + frame[2, 0] * z) / axes[0],
-        (frame[0, 1] * x + frame[1, 1] * y + frame[2, 1] * z) / axes[1],
-        (frame[0, 2] * x + frame[1, 2] * y + frame[2, 2] * z) / axes[2],
-    )
-
-
 @compiled()
 def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
     """Return one ray for each line of sight and each part that this line comes near.
@@ -91,32 +81,52 @@ def near_rays(origins, targets, group, own, pose, centres, frames, semi_axes):
             longest[part] = max(longest[part], semi_axes[part, i])
     # First pass over the bounding balls alone, which says how much room the rays take.
     near = _near_parts(origins, targets, group, own, pose, centres, longest)
+    near_count, near_part = np.zeros(len(own), dtype=np.int64), np.empty(near.shape, dtype=np.int64)
+    for g in range(len(own)):
+        for part in range(parts):
+            if near[g, part]:
+                near_part[g, near_count[g]] = part
+                near_count[g] += 1
     most = 0
-    for line in range(len(origins)):
+    for line in range(len(group)):
+        most += near_count[group[line]]
+    # World axes to those in which a part is the unit sphere, row by row.
+    maps = np.empty(frames.shape)
+    for p in range(len(frames)):
         for part in range(parts):
-            most += near[group[line], part]
+            for i in range(3):
+                for j in range(3):
+                    maps[p, part, i, j] = frames[p, part, j, i] / semi_axes[part, i]
     rays, whose, count = np.empty((7, most), dtype=np.float32), np.empty(most, dtype=np.int64), 0
-    for line in range(len(origins)):
-        o, t, g = origins[line], targets[line], group[line]
-        for part in range(parts):
-            if not near[g, part]:
-                continue
-            # The line in axes where the part is the unit sphere.
-            c, f, axes = centres[pose[g], part], frames[pose[g], part], semi_axes[part]
-            x, y, z = _stretched(f, axes, o[0] - c[0], o[1] - c[1], o[2] - c[2])
-            u, v, w = _stretched(f, axes, t[0] - o[0], t[1] - o[1], t[2] - o[2])
-            span = u * u + v * v + w * w
-            nearest = min(1.0, max(0.0, -(x * u + y * v + z * w) / span))
-            p, q, r = x + nearest * u, y + nearest * v, z + nearest * w
-            if p * p + q * q + r * r > NEAR * NEAR:
+    for line in range(len(group)):
+        g = group[line]
+        a, b, c = origins[line, 0], origins[line, 1], origins[line, 2]
+        d, e, f = targets[line, 0] - a, targets[line, 1] - b, targets[line, 2] - c
+        for n in range(near_count[g]):
+            part = near_part[g, n]
+            centre, m = centres[pose[g], part], maps[pose[g], part]
+            o0, o1, o2 = a - centre[0], b - centre[1], c - centre[2]
+            x = m[0, 0] * o0 + m[0, 1] * o1 + m[0, 2] * o2
+            y = m[1, 0] * o0 + m[1, 1] * o1 + m[1, 2] * o2
+            z = m[2, 0] * o0 + m[2, 1] * o1 + m[2, 2] * o2
+            u = m[0, 0] * d + m[0, 1] * e + m[0, 2] * f
+            v = m[1, 0] * d + m[1, 1] * e + m[1, 2] * f
+            w = m[2, 0] * d + m[2, 1] * e + m[2, 2] * f
+            span, back = u * u + v * v + w * w, -(x * u + y * v + z * w)
+            # The least square of the distance along the line, times its span: no division.
+            square = x * x + y * y + z * z
+            least = (
+                square * span - back * back if back < span else (square - 2 * back + span) * span
+            )
+            if (least if back > 0 else square * span) > NEAR * NEAR * span:
                 continue
             # float32 is too coarse for a far antenna: the ray starts two radii before that point.
-            distance = math.sqrt(span)
-            ahead = max(nearest - 2 / distance, 0.0)
+            scale = 1 / math.sqrt(span)
+            ahead = max(min(1.0, max(0.0, back * scale * scale)) - 2 * scale, 0.0)
             rays[0, count], rays[1, count] = x + ahead * u, y + ahead * v
-            rays[2, count], rays[3, count] = z + ahead * w, u / distance
-            rays[4, count], rays[5, count] = v / distance, w / distance
-            rays[6, count], whose[count] = (1 - ahead) * distance, line
+            rays[2, count], rays[3, count] = z + ahead * w, u * scale
+            rays[4, count], rays[5, count] = v * scale, w * scale
+            rays[6, count], whose[count] = (1 - ahead) * span * scale, line
             count += 1
     return rays[:, :count].copy(), whose[:count].copy()
 

@@ -7,7 +7,7 @@ On cells along the meridians of `rtradar.kernels.scatter.fresnel_zones`
 with dL exact in float64 for each pair of antennas, f the open fraction of a cell, and w a window
 that falls to 0 at the rim: without it the rim itself would diffract. Mitsuba decides whether an
 antenna sees a corner of a cell. Where it sees one end of a side and not the other, more rays bisect
-that side until the edge is known to 1 / 16384 of it. So V changes smoothly as an edge
+that side until the edge is known to 1 / 4096 of it. So V changes smoothly as an edge
 wanders over the zones, and is exactly 1 in full view and 0 behind.
 """
 
@@ -33,11 +33,11 @@ from rtradar.kernels.scatter.fresnel_zones import (
 from rtradar.system.threads import in_threads
 from rtradar.trace.body_tracer import BodyTracer
 
-_BISECTIONS = 13
+BISECTIONS = 11
 """Rays that find an edge on a side of a cell."""
 
-_AT_ONCE = 128
-"""Zones whose rays are traced together; so many take some 50 MB."""
+_AT_ONCE = 64
+"""Zones whose rays are traced together; so many take some 20 MB."""
 
 _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
@@ -185,11 +185,11 @@ def _edges(tracer: BodyTracer, zones: Zones, poses: Poses, maps: ZoneMaps, bands
     swap = blocked[z, a, m, j][:, None]
     start, way = np.where(swap, last, first), np.where(swap, first - last, last - first)
     origins, low = zones.antennas[z, a], np.zeros((len(z), 1))
-    for step in range(_BISECTIONS):
+    for step in range(BISECTIONS):
         middle = low + 0.5 ** (step + 1)
         seen = tracer.clear(origins, _points(maps, z, start + middle * way), z, *whose)
         low = np.where(seen[:, None], middle, low)
-    found = start + (low + 0.5 ** (_BISECTIONS + 1)) * way
+    found = start + (low + 0.5 ** (BISECTIONS + 1)) * way
     radial = np.zeros((n, antennas, MERIDIANS, bands, 2))
     ring = np.zeros((n, antennas, MERIDIANS, bands + 1, 2))
     radial[sides[0]], ring[sides[1]] = np.split(found, lengths[:1])
