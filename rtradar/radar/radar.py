@@ -124,7 +124,7 @@ class Radar:
 
     @classmethod
     def preset(cls, name: str) -> Radar:
-        """Make the preset of a name.
+        """Make the preset of a name; an `InputError` is raised where there is none.
 
         Parameters
         ----------
@@ -134,13 +134,6 @@ class Radar:
         Returns
         -------
         Radar
-
-        Raises
-        ------
-        InputError
-            Where there is no such preset.
-        ExtensionError
-            Where the preset comes from another package, and fails.
         """
         from rtradar.radar.presets import make_preset  # which needs this class
 
@@ -220,9 +213,8 @@ class Radar:
     @property
     def n_rx(self) -> int:
         """Length of the rx axis: the number of receivers that are kept in one chirp."""
-        if self.channels == "all":
-            return self.rx_y + self.rx_z
-        return self.rx_y if self.tx_y else self.rx_z
+        one_line = self.rx_y if self.tx_y else self.rx_z
+        return self.rx_y + self.rx_z if self.channels == "all" else one_line
 
     @property
     def n_channels(self) -> int:
@@ -458,14 +450,10 @@ class Radar:
         P_t G_t G_r lambda^2 / (4 pi)^3; `conventions` has the rest. An `InputError` is raised where
         the radar does not state its transmit power.
         """
-        if self.transmit_power_dbm is None:
-            raise InputError(
-                f"radar '{self.name}' does not state transmit_power_dbm, so powers in watts are "
-                "not known; give it"
-            )
+        power_dbm = self._stated("transmit_power_dbm", "powers in watts are not known")
         antennas = (self.tx_antenna, self.rx_antenna)
         gains = math.prod(antenna.peak_gain for antenna in antennas if antenna is not None)
-        power_w = 1e-3 * 10 ** (self.transmit_power_dbm / 10)
+        power_w = 1e-3 * 10 ** (power_dbm / 10)
         return float(power_w * gains * self.wavelength_m**2 / (4 * math.pi) ** 3)
 
     @property
@@ -476,11 +464,13 @@ class Radar:
         defined for a source at 290 K, and B the sample rate. An `InputError` is raised where the
         radar does not state its noise figure.
         """
-        if self.noise_figure_db is None:
-            raise InputError(
-                f"radar '{self.name}' does not state noise_figure_db, so its noise is not known; "
-                "give it"
-            )
-        receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (self.noise_figure_db / 10) - 1)
+        figure_db = self._stated("noise_figure_db", "its noise is not known")
+        receiver_k = NOISE_FIGURE_TEMPERATURE_K * (10 ** (figure_db / 10) - 1)
         noise_k = self.noise_temperature_k + receiver_k
         return float(BOLTZMANN_J_PER_K * noise_k * self.sample_rate_hz)
+
+    def _stated(self, field: str, otherwise: str) -> float:
+        value: float | None = getattr(self, field)
+        if value is None:
+            raise InputError(f"radar '{self.name}' does not state {field}, so {otherwise}; give it")
+        return value

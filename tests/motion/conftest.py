@@ -64,7 +64,7 @@ second 90
 
 @pytest.fixture
 def asf_files(tmp_path: Path) -> tuple[Path, Path]:
-    """Write a motion of two frames and its skeleton of two bones, in Latin-1 with mixed line ends."""
+    """Write a motion of two frames and a skeleton of two bones, with mixed line ends."""
     asf, amc = tmp_path / "two.asf", tmp_path / "two.amc"
     asf.write_bytes(ASF.replace("\n", "\r\n").encode("latin-1"))
     amc.write_bytes(AMC.replace("\n", "\r\n", 2).encode("latin-1"))
