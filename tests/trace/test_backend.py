@@ -32,7 +32,7 @@ Machine = Callable[..., None]
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
-    """Let the machine have these libraries, and a GPU or none; nothing is probed, and Dr.Jit is as if never imported."""
+    """Let the machine have these libraries, and a GPU or none, without probing or Dr.Jit."""
 
     def set_up(
         *libraries: Library,
@@ -134,7 +134,7 @@ def test_use_refuses_llvm_when_another_library_was_loaded_since(
         use(Backend("llvm", "llvm_ad_rgb", WHEEL.path, "23.1.4"))
 
 
-# -- where libraries are looked for ----------------------------------------------------------------------------------
+# -- where libraries are looked for ----------------------------------------------------------------
 
 
 def test_environment_then_wheel_then_system_newest_first(
@@ -180,7 +180,7 @@ def test_version_by_name(name: str, version: str | None) -> None:
     assert Library(f"/lib/{name}", "system").version == version
 
 
-# -- probing ---------------------------------------------------------------------------------------------------------
+# -- probing ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Lines of sight past ellipsoids: what Mitsuba says of them, held against a closed form in float64."""
+"""Lines of sight past ellipsoids: Mitsuba's answers against a closed form in float64."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def random_body(seed: int, parts: int = 6) -> tuple[Array, Array, Array]:
 
 
 def distances(origins: Array, targets: Array, centres: Array, frames: Array, axes: Array) -> Array:
-    """Least distance (line, part) of each line from each part's centre, where the part is the unit sphere."""
+    """Least distance (line, part) of each line from each part's centre, as a unit sphere."""
     starts = np.einsum("pji,lpj->lpi", frames, origins[:, None] - centres) / axes
     lines = np.einsum("pji,lj->lpi", frames, targets - origins) / axes
     along = -np.sum(starts * lines, axis=2) / np.sum(lines * lines, axis=2)
@@ -55,7 +55,7 @@ def test_mitsuba_says_what_the_closed_form_says(seed: int, backend: Backend) -> 
 
 
 def test_a_target_on_no_part_is_occluded_by_any(backend: Backend) -> None:
-    """Three points on one line: before a ball of 0.1 m, inside, and behind it; and a line that passes 1 mm beside it."""
+    """Points before, inside and behind a ball of 0.1 m, and a line that passes 1 mm beside it."""
     tracer = BodyTracer(use(backend), np.full((2, 3), 0.1))
     tracer.pose(np.array([[1.0, 0.0, 0.0], [9.0, 9.0, 9.0]]), np.tile(np.eye(3), (2, 1, 1)))
     origins = np.zeros((5, 3))
@@ -70,7 +70,7 @@ def test_a_target_on_no_part_is_occluded_by_any(backend: Backend) -> None:
 
 
 class BesideADisc:
-    """A walker and, as the last part, a vast thin disc that all lines of sight pass at 1.03 to 1.07 of its radius."""
+    """A walker, and a vast thin disc that all lines of sight pass at 1.03 to 1.07 of its radius."""
 
     def __init__(self, body: Body) -> None:
         self._body, self.duration_s = body, body.duration_s

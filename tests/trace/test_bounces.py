@@ -1,4 +1,4 @@
-"""What rays meet between bounces: part or face from Mitsuba, place in float64, once on each backend that works here."""
+"""What rays meet between bounces, by Mitsuba with places in float64, on each backend here."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,8 @@ def test_a_ray_that_leaves_a_part_meets_the_other_and_not_its_own(backend: Backe
     met, distance = surfaces.meets(points, normals, directions, np.zeros(3, dtype=np.int64))
     np.testing.assert_array_equal(met, [1, -1, -1])
     exact = surfaces.distance(np.array([1]), points[:1], directions[:1])
-    # In its own axes the ray is (sin 30, cos 30): 1 m less the radius of the ellipse in that direction, less 0.1 m.
+    # In its own axes the ray is (sin 30, cos 30): 1 m less the radius of the ellipse in that
+    # direction, less 0.1 m.
     radius = 1 / np.hypot(np.sin(np.pi / 6) / 0.2, np.cos(np.pi / 6) / 0.1)
     np.testing.assert_allclose(exact, 0.9 - radius, rtol=1e-13)
     # The triangles' sagitta and the lift off the part: 1e-3 of the semi-axes.

@@ -1,4 +1,4 @@
-"""What rays meet on a posed body: against the closed form of ellipsoids, once on each backend that works here."""
+"""What rays meet on a posed body, against closed forms of ellipsoids, on each backend here."""
 
 from typing import NamedTuple
 
@@ -13,7 +13,8 @@ from rtradar.trace.bounces import BodySurfaces
 
 Array = NDArray[np.float64]
 CHEST = np.array([0.0, 0.0, 1.0])
-# The triangles' middles lie 0.03 % of the radius inside a sphere and their corners 0.07 % outside; alike for each semi-axis.
+# The triangles' middles lie 0.03 % of the radius inside a sphere and their corners 0.07 % outside;
+# alike for each semi-axis.
 SAGITTA = 8e-4
 
 
@@ -38,7 +39,7 @@ def through(surfaces: BodySurfaces, origins: Array, targets: Array) -> Hits:
 
 
 def clearances(body: Ellipsoids, origins: Array, targets: Array) -> tuple[Array, Array]:
-    """Closed form, (ray, part): distance to the first crossing, and the least of |A^-1 p| along the ray less 1."""
+    """Distance to the first crossing, and the least |A^-1 p| - 1 along the ray, (ray, part)."""
     directions = targets - origins
     length = np.linalg.norm(directions, axis=1, keepdims=True)
     o = np.einsum("pji,rpj->rpi", body.frames, origins[:, None] - body.centres) / body.semi_axes
@@ -67,7 +68,7 @@ def test_the_first_part_is_that_of_the_smooth_ellipsoids(
     hits = first_hits(backend, crowd, origins, targets)
     distance, clearance = clearances(crowd, origins, targets)
     expected = np.where(np.isfinite(distance.min(axis=1)), distance.argmin(axis=1), -1)
-    # Near an outline, or where two parts cross, triangles may answer otherwise than what they stand for.
+    # Near an outline, or where two parts cross, triangles may answer otherwise than ellipsoids.
     first, second = np.sort(np.minimum(distance, 1e3), axis=1)[:, :2].T
     sure = (np.abs(clearance).min(axis=1) > 2 * SAGITTA) & (
         (second - first > 2e-3) | (expected < 0)
@@ -144,7 +145,7 @@ def test_thin_needles_are_met(backend: Backend) -> None:
 
 
 def test_many_parts_keep_their_numbers(backend: Backend) -> None:
-    # In a row side by side: what is aimed at must be what is met, however the scene orders its shapes.
+    # The parts are in a row: rays must meet what they aim at, however the scene orders its shapes.
     n = 130
     centres = np.column_stack([np.zeros(n), np.arange(n) * 0.3, np.ones(n)])
     body = Ellipsoids(centres, np.tile(np.eye(3), (n, 1, 1)), np.full((n, 3), 0.1))

@@ -1,4 +1,4 @@
-"""Threads of Dr.Jit, which grow only, and threads of ours that trace: the same rays, the same kernel."""
+"""Threads of Dr.Jit, which only grow, and our threads that trace the same rays by one kernel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What stands between two points of a room: against the closed form of boxes, once on each backend that works here."""
+"""What is between two points of a room, against closed forms of boxes, on each backend here."""
 
 from pathlib import Path
 
@@ -30,7 +30,7 @@ def box(tmp_path: Path) -> Scene:
 
 
 def in_box(origins: Array, targets: Array) -> tuple[Array, Array]:
-    """Shares of each leg at which it enters and leaves the slabs of the box; it is in the box where the first is less."""
+    """Fractions of each leg where it enters and leaves the box; the first is larger in a miss."""
     with np.errstate(divide="ignore"):
         low, high = (
             (CORNER - origins) / (targets - origins),
@@ -48,7 +48,8 @@ def test_legs_through_a_box_are_blocked(backend: Backend, box: Scene, distance: 
     enters, leaves = in_box(origins, targets)
     enters, leaves = np.maximum(enters, 0), np.minimum(leaves, 1)
     expected = enters < leaves
-    # Near its edges, and near the ends of a leg, float32 and the drawn-in ends may answer otherwise.
+    # Near its edges, and near the ends of a leg, float32 and the drawn-in ends may answer
+    # otherwise.
     sure = np.abs(leaves - enters) * distance > 3 * CLEAR_M
     blocked = RoomTracer(use(backend), box).blocked(origins, targets)
     assert sure.mean() > 0.9

@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 
 
 def body_and_lines(seed: int, poses: int = 2) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
-    """A body of 6 parts in some poses; 300 lines, of each to one part or to none, in one of them."""
+    """A body of 6 parts in some poses; 300 lines, of each to one part or to none, in one of
+    them."""
     rng = np.random.default_rng(seed)
     centres = rng.uniform(-0.6, 0.6, (poses, 6, 3))
     frames = Rotation.random(poses * 6, rng=rng).as_matrix().reshape(poses, 6, 3, 3)
