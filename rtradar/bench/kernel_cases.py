@@ -438,3 +438,54 @@ def _envelope() -> tuple[Call, Call]:
 
 
 # -- rooms -----------------------------------------------------------------------------------------
+
+
+@kernel_case("scatter.rooms.path_amplitudes", "273 echoes, 100 chirps, 8 receivers, 3 nodes", 1e-5)
+def _path_amplitudes() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter import rooms
+
+    rng, shape = np.random.default_rng(0), (2, 2, 4, 273)
+    before, after = (
+        rooms.PathFactors(
+            rng.normal(size=(2, 3, *shape, 2)).astype(np.float32).view(np.complex64)[..., 0],
+            rng.random((2, *shape)) > 0.2,
+        )
+        for _ in range(2)
+    )
+    interval, line = rng.integers(0, 2, (2, 100))
+    ends = rng.random((100, 2)), rng.random((100, 8, 4))
+    at = rooms.Blend(interval, rng.random(100), line, *ends)
+    given = rng.normal(size=(100, 8, 273)), before, after, at
+    out = (np.empty((3, 100, 8, 273), dtype=np.complex64),)
+    call = filled(rooms.path_amplitudes, *given, out=out)
+    return call, lambda: rooms.path_amplitudes_reference(*given)
+
+
+@kernel_case("scatter.rooms.delayed_lengths", "273 echoes, 100 chirps, 8 receivers, 3 passages")
+def _delayed_lengths() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter import rooms
+    from rtradar.kernels.scatter.nearby_points import Ellipsoids
+
+    rng, at = np.random.default_rng(0), _geometry(100, 8, 21)
+    antennas = rooms.LegAntennas(*(rng.normal(-5, 1, shape) for shape in ((2, 4, 3), (2, 4, 8, 3))))
+    points = rooms.PartPoints(rng.normal(size=(100, 273, 3)), np.arange(273) % 21)
+    slabs = [[1.0, 0, 0, 0.1, 4.0], [0, 0.6, 0.8, 0.2, 3.0], [0, 1.0, 0, 0.05, 2.5]]
+    # Without a slab, with two of them on the way out, and with one on each way.
+    legs = [[[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [0, 2, 2]], [[1, 1, 2], [0, 2, 3]]] * 91
+    passes = np.array([1, 2, 3])
+    delays = rooms.SlabDelays(np.arange(273), np.array(legs), passes, np.array(slabs))
+    bodies, tx = Ellipsoids(*at[2:]), rng.integers(0, 4, 100)
+    given = antennas, tx, points, bodies, delays, 8 + rng.random((100, 8, 273))
+    call = filled(rooms.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
+    return call, lambda: rooms.delayed_lengths_reference(*given)
+
+
+@kernel_case("scatter.rooms.add_fading", "IF of 100 chirps, 8 receivers, 256 samples", 1e-6)
+def _fading() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.rooms import add_fading, add_fading_reference
+
+    rng = np.random.default_rng(0)
+    pair = rng.normal(size=(2, 12, 8, 256, 2)).astype(np.float32).view(np.complex64)[..., 0]
+    given = *pair, rng.random(100, dtype=np.float32), rng.integers(0, 12, 100)
+    out = (np.empty((100, 8, 256), dtype=np.complex64),)
+    return filled(add_fading, *given, out=out, adds=True), lambda: add_fading_reference(*given)

@@ -42,23 +42,9 @@ def indoors(
 ) -> Indoors:
     """Trace a room with a person in it, and leave out what stays below the noise.
 
-    Parameters
-    ----------
-    model : RoomModel
-        Echo model in the room; what is not worth its cost is taken out of it.
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Person in the scene.
-    scene : Scene
-        Walls and furniture.
-    settings : RunSettings
-        Settings of the run: the backend, the order of the paths, the seed of diffuse returns, and
-        whether everything is kept.
-    n_chirps : int
-        Number of chirps in the capture.
-    person_power_m2, noise_power_m2 : float
-        Mean power of the person's echoes without the room, and of noise, per IF sample [m^2].
+    The settings give the backend, the order of the paths, the seed of diffuse returns, and whether
+    everything is kept. The powers are those of the person's echoes without the room, and of noise,
+    per IF sample [m^2]. What is not worth its cost is taken out of the model.
     """
     noise, variant = 0.0 if settings.keep_all else noise_power_m2, settings.variant
     paths = model.prune(n_chirps, noise)

@@ -24,15 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Inside:
-    """Record of which parts were inside walls and furniture over a capture.
-
-    Parameters
-    ----------
-    scene : Scene
-        Walls and furniture.
-    part_names : tuple of str
-        Names of the body parts.
-    """
+    """Record of which parts were inside walls and furniture over a capture."""
 
     def __init__(self, scene: Scene, part_names: tuple[str, ...]) -> None:
         self._scene, self._names = scene, part_names
@@ -47,19 +39,8 @@ class Inside:
     def look(self, times: Array, poses: Poses, power: Array) -> None:
         """Test the next instants.
 
-        Parameters
-        ----------
-        times : (time,) float64
-            Instants [s].
-        poses : Poses
-            Poses of the body at these times.
-        power : (time, part) float64
-            Echo power of its parts [m^2].
-
-        Raises
-        ------
-        InputError
-            If the pelvis is inside a wall.
+        Given are the times (time,) [s], the body's poses, and its echo power (time, part) [m^2]. An
+        `InputError` is raised if the pelvis is inside a wall.
         """
         pelvis = [part for part, name in enumerate(self._names) if name in _PELVIS]
         for number, wall in enumerate(self._scene.walls):
@@ -82,15 +63,8 @@ class Inside:
     def found(self, part_power: Array) -> list[tuple[str, float, str]]:
         """Return the name, power while inside [m^2] and message of each limit.
 
-        Parameters
-        ----------
-        part_power : (part,) float64
-            Echo power of each part, over all instants [m^2].
-
-        Raises
-        ------
-        InputError
-            If a part with more than 5 % of the echo power was inside a wall.
+        ``part_power (part,)`` is the echo power of each part, over all instants [m^2]. An
+        `InputError` is raised if a part with more than 5 % of it was inside a wall.
         """
         walls, inside = len(self._scene.walls), np.isfinite(self._first_s)
         large = part_power > REFUSED_FRACTION * part_power.sum()

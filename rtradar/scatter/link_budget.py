@@ -37,23 +37,11 @@ _CHIRPS_AT_ONCE = 64
 class LinkBudget:
     """Echo power of a person over a capture, and limits of validity.
 
-    Parameters
-    ----------
-    power : float
-        Sum of |amplitude|^2 over the visible echoes of the person, averaged over rx and one chirp
-        every 10 ms [m^2].
-    visible : bool
-        Whether there is any echo at all.
-    part_power : dict
-        The same power by name of body part [m^2].
-    times : (time,) float64
-        Instants evaluated, since the start of the capture [s].
-    power_at : (time, part) float64
-        The same power by instant and part [m^2].
-    hidden_at : (time, part) float64
-        Fraction of the channels that do not see the part, 0 to 1.
-    limits : tuple of Limit
-        Limits of validity that were met.
+    ``power`` is the sum of |amplitude|^2 over the visible echoes, averaged over rx and one chirp
+    every 10 ms, ``part_power`` the same by name of body part [m^2]; ``visible`` says whether there
+    is any echo. At ``times (time,)`` since the start of the capture [s], ``power_at (time, part)``
+    is the power [m^2], and ``hidden_at (time, part)`` the fraction of the channels that do not see
+    the part.
     """
 
     power: float

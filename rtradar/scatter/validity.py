@@ -28,14 +28,8 @@ _STEP_S = 1e-3
 class Limit:
     """A limit of validity that the capture came near or went past.
 
-    Parameters
-    ----------
-    name : str
-        Short name, for machines.
-    share : float
-        Fraction of the person's echo power that is concerned, 0 to 1.
-    message : str
-        One line for people.
+    ``name`` is short, for machines, ``message`` one line for people; ``share`` is the fraction of
+    the person's echo power that is concerned, 0 to 1.
     """
 
     name: str
@@ -44,12 +38,7 @@ class Limit:
 
 
 def warn_of(limit: Limit) -> None:
-    """Warn of a limit that concerns more than 5 % of the echo power.
-
-    Warns
-    -----
-    ValidityWarning
-    """
+    """Issue a `ValidityWarning` for a limit that concerns more than 5 % of the echo power."""
     if limit.share > WARN_FRACTION:
         warnings.warn(f"{limit.share:.0%} of the {limit.message}", ValidityWarning, stacklevel=3)
 
@@ -58,19 +47,10 @@ def warn_of(limit: Limit) -> None:
 
 
 def smaller_radius(semi_axes: Array, direction: Array) -> Array:
-    """Compute the smaller radius of curvature where the normal has a direction.
+    """Compute the smaller radius of curvature where the normal has a direction (..., part) [m].
 
-    Parameters
-    ----------
-    semi_axes : (part, 3) float64
-        Semi-axes of ellipsoids [m].
-    direction : (..., part, 3) float64
-        Directions in the axes of the parts, of any length.
-
-    Returns
-    -------
-    (..., part) float64
-        Radius [m]; that of the z-axis for no direction.
+    ``semi_axes (part, 3)`` are those of ellipsoids [m], directions (..., part, 3) are in their
+    axes, of any length.
     """
     size = np.maximum(np.linalg.norm(direction, axis=-1, keepdims=True), 1e-12)
     x, y, z = np.moveaxis(direction / size, -1, 0)
@@ -90,27 +70,11 @@ def warn_of_small_radii(
 ) -> None:
     """Warn where much of an echo comes from radii below `MINIMUM_KA` over the wavenumber.
 
-    Parameters
-    ----------
-    target : Ellipsoids
-        Target.
-    tx, rx : (n, 3) float64
-        Antennas, pair by pair [m].
-    wavenumber : (n,) float64
-        Wavenumber of each pair [1/m].
-    amplitude : (n, part) float64
-        Amplitude of each part's echo; only its ratio to the others counts.
-    stacklevel : int
-        Stack level of the warning, counted from the caller; see `warnings.warn`.
+    The antennas (n, 3) are given pair by pair [m], with their wavenumbers (n,) [1/m] and the
+    amplitudes (n, part) of each part's echo, of which only the ratio counts. A `ValidityWarning` is
+    issued if such radii, taken where the normal halves the angle between both antennas, give more
+    than 5 % of the power. ``stacklevel`` is counted from the caller; see `warnings.warn`.
 
-    Warns
-    -----
-    ValidityWarning
-        If such radii, taken where the normal halves the angle between both antennas, give more
-        than 5 % of the power.
-
-    Notes
-    -----
     Equation :eq:`validity` of the theory page.
     """
     normal = np.zeros((len(tx), *target.centres.shape))
@@ -162,17 +126,8 @@ def folded_angle_deg(radar: Radar) -> float:
 
     With a range rate that is wrong by twice the unambiguous velocity, the phase of one Tx after the
     other is wrong by 1 / n_tx of a turn. On a line of Tx with spacing d this is the phase of a
-    direction whose sine differs by lambda / (n_tx d).
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar, whose schedule and Tx spacing count.
-
-    Returns
-    -------
-    float
-        Angle [deg]; 0 where Tx do not take turns, or no line has two of them.
+    direction whose sine differs by lambda / (n_tx d). The error is 0 if Tx do not take turns, or no
+    line has two of them.
     """
     taking_turns = radar.tx_delay_s[-1] > 0
     on_a_line = (radar.tx_y > 1 and radar.rx_y > 0) or (radar.tx_z > 1 and radar.rx_z > 0)
@@ -191,12 +146,9 @@ def sampled(length: Array, radar: Radar) -> NDArray[np.bool_]:
 
 
 def refuse_too_near(radar: Radar, body: Body, times: Array) -> None:
-    """Refuse parts nearer than `MINIMUM_ANTENNA_DISTANCE_M` to an antenna at some times [s].
+    """Raise an `InputError` if a part is nearer than `MINIMUM_ANTENNA_DISTANCE_M` to an antenna.
 
-    Raises
-    ------
-    InputError
-        The message names the part and the time.
+    The message names the part and the time, one of ``times`` [s].
     """
     centres, frames, semi_axes = body.at(times)
     antennas = np.concatenate([radar.tx, radar.rx])

@@ -74,16 +74,9 @@ class RoomIf:
 
     The IF of the whole room is that of one TDM cycle, the same in all of them. At keyframes 20 ms
     apart the IF of what the body occludes is computed, from that of the keyframe before by what has
-    changed. Between keyframes it fades as the echoes do, for the sum is linear in them.
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the room.
-    objects : iterable of Echoes
-        Echoes of each object for one TDM cycle, as `Clutter.cycle` yields them.
-    shadow : MovingShadow, optional
-        Shadow of a person in the room; if left out, the room is exactly still.
+    changed. Between keyframes it fades as the echoes do, for the sum is linear in them. ``objects``
+    are the echoes of each object for one cycle, as `Clutter.cycle` yields them; without a shadow
+    the room is exactly still.
     """
 
     def __init__(
@@ -112,14 +105,9 @@ class RoomIf:
         return out
 
     def add(self, samples: NDArray[np.complex64], chirps: NDArray[np.int64]) -> None:
-        """Add the IF samples of the room in place.
+        """Add the IF samples of the room to ``samples (chirp, rx, sample)`` complex64, in place.
 
-        Parameters
-        ----------
-        samples : (chirp, rx, sample) complex64
-            IF samples of the person.
-        chirps : (chirp,) int64
-            Chirps, numbered from the start of the capture, ascending.
+        The chirps (chirp,) are numbered from the start of the capture, ascending.
         """
         chirps = np.asarray(chirps, dtype=np.int64)
         tx = self._radar.tx_of_chirp(chirps)

@@ -1,10 +1,13 @@
 """The IF of a room: exactly still without a person, and with one as each chirp made by itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
+from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
@@ -57,9 +60,24 @@ def test_a_room_alone_is_exactly_still(clutter: Clutter) -> None:
     cycles = samples.reshape(5, RADAR.n_tx, RADAR.n_rx, -1)
     assert samples.dtype == np.complex64
     np.testing.assert_array_equal(cycles, np.broadcast_to(cycles[0], cycles.shape))
-    expected = synthesize(clutter.echoes(), RADAR, RADAR.chirp_times(RADAR.n_tx))
+    times = RADAR.chirp_times(RADAR.n_tx)
+    expected = sum(synthesize(echoes, RADAR, times) for echoes in clutter.cycle())
     # complex64.
     np.testing.assert_allclose(cycles[0], expected, rtol=0, atol=1e-6 * np.abs(expected).max())
+
+
+def weights_of(
+    shadow: ClutterShadow, chirps: NDArray[np.int64], n_echoes: int
+) -> NDArray[np.float64]:
+    """What is left of each echo at some chirps (chirp, rx, echo), one by one."""
+    out = np.ones((len(chirps), RADAR.n_rx, n_echoes))
+    for own, chirp, tx in zip(out, chirps, RADAR.tx_of_chirp(chirps), strict=True):
+        keyframe, rest = divmod(int(chirp), shadow.step)
+        after = smoothstep(rest / shadow.step)
+        for number, weight in ((keyframe, 1 - after), (keyframe + 1, after)):
+            lost = shadow.at(number)
+            own[:, lost.echo] -= weight * lost.fraction[tx]
+    return out
 
 
 @pytest.mark.parametrize("blocks", [1, 3])
@@ -71,20 +89,14 @@ def test_a_shadow_moves_as_in_chirps_made_one_by_one(clutter: Clutter, blocks: i
     )
     chirps = np.arange(9, 900, 37)
     got = np.concatenate([room.clutter_if(part) for part in np.array_split(chirps, blocks)])
-    whole = clutter.echoes()
-    tx = RADAR.tx_of_chirp(chirps)
-    weights = shadow.weights(chirps)
-    assert weights.min() < 1e-12  # some are hidden altogether
-    echoes = type(whole)(
-        length=whole.length[tx],
-        amplitude=whole.amplitude[:, tx] * weights,
-        frequency=whole.frequency,
-        tx=tx,
-        part=whole.part,
-        bounces=whole.bounces,
-    )
+    tx, weights = RADAR.tx_of_chirp(chirps), weights_of(shadow, chirps, clutter.n_echoes)
+    assert weights.min() < 1e-12  # some are occluded altogether
     # Not in a row and none of them moves: their times are those of any chirps.
-    expected = synthesize(echoes, RADAR, RADAR.chirp_times(len(chirps)))
+    times, expected = RADAR.chirp_times(len(chirps)), np.zeros_like(got)
+    for own, first in zip(clutter.cycle(), shadow.starts, strict=False):
+        left = weights[..., first : first + len(own.part)]
+        echoes = replace(own, length=own.length[tx], amplitude=own.amplitude[:, tx] * left, tx=tx)
+        expected += synthesize(echoes, RADAR, times)
     np.testing.assert_allclose(got, expected, rtol=0, atol=1e-6 * np.abs(expected).max())
 
 

@@ -231,7 +231,7 @@ def reflector_rows(quick: bool) -> Iterator[Row]:
                 position_m=(0, 0, 1),
                 yaw_deg=180,
             )
-            echoes = Clutter(radar, rt.Scene(furniture=(piece,))).echoes()
+            (echoes,) = Clutter(radar, rt.Scene(furniture=(piece,))).cycle()
             middle = len(echoes.frequency) // 2
             turn = np.exp(2j * np.pi * echoes.frequency[middle] / C * (echoes.length - 2 * away))
             power = abs((echoes.amplitude[middle] * turn).sum()) ** 2 * away**4

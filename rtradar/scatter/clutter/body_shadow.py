@@ -20,7 +20,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
-from rtradar.kernels.blends import smoothstep
 from rtradar.kernels.scatter.rooms import Shadow
 from rtradar.scatter.clutter.static_clutter import Clutter
 from rtradar.scatter.common.interpolation import shadow_nodes
@@ -46,21 +45,8 @@ SHADOW_RAYS = 24
 class ClutterShadow:
     """Shadow of a moving body in the clutter of a room.
 
-    Parameters
-    ----------
-    clutter : Clutter
-        Echoes of the room.
-    body : Body
-        Person in the room.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-
-    Attributes
-    ----------
-    step : int
-        Number of chirps between keyframes.
-    starts : (object + 1,) int64
-        First echo of each object in the count through all.
+    ``step`` is the number of chirps between keyframes, ``starts (object + 1,)`` the first echo of
+    each object in the count through all.
     """
 
     def __init__(self, clutter: Clutter, body: Body, *, variant: str = "auto") -> None:
@@ -80,20 +66,6 @@ class ClutterShadow:
     def at(self, keyframe: int) -> Shadow:
         """Return the shadow at a keyframe, the pose of chirp ``keyframe * step``."""
         return self._kept.get(keyframe, partial(self._trace, keyframe))
-
-    def weights(self, chirps: Indices) -> Array:
-        """Compute what is left of each echo at chirps from the start: (chirp, rx, echo)."""
-        keyframes, rest = np.divmod(np.asarray(chirps, dtype=np.int64), self.step)
-        fraction, tx = smoothstep(rest / self.step), self._radar.tx_of_chirp(chirps)
-        out = np.ones((len(chirps), self._radar.n_rx, int(self.starts[-1])))
-        for own, keyframe, line, after in zip(
-            out, keyframes.tolist(), tx.tolist(), fraction.tolist(), strict=True
-        ):
-            for number, weight in ((keyframe, 1 - after), (keyframe + 1, after)):
-                if weight > 0:
-                    lost = self.at(number)
-                    own[:, lost.echo] -= weight * lost.fraction[line]
-        return out
 
     def _trace(self, keyframe: int) -> Shadow:
         at = chirp_poses(self._radar, self._body, np.array([keyframe * self.step]))

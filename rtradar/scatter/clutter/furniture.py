@@ -77,26 +77,10 @@ class _Piece:
 
 
 def furniture_returns(mi: Any, radar: Radar, scene: Scene) -> Iterator[RoomEchoes]:
-    """Compute the returns of every piece of furniture.
+    """Yield the returns of every piece of furniture that some channel sees.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    radar : Radar
-        Radar in the scene.
-    scene : Scene
-        Furniture and walls.
-
-    Yields
-    ------
-    RoomEchoes
-        ``furniture``, or ``reflector`` for sheets, of pieces that some channel sees.
-
-    Raises
-    ------
-    InputError
-        If a mesh cannot be used, or would take too many facets.
+    They are of the kind ``furniture``, or ``reflector`` for sheets. Mitsuba, ``mi``, has its
+    variant set. An `InputError` is raised if a mesh cannot be used, or would take too many facets.
     """
     pieces = [(piece, piece.triangles()) for piece in scene.furniture]
     if not pieces:
@@ -163,19 +147,8 @@ def _facets(corners: Array, first: int, edge: float) -> MeshGrid:
 class FacetGroups:
     """Groups of facets that are one echo each: half a range bin deep, `_WIDTH_BINS` wide.
 
-    The depth is that from the array's centre, the width across the way to the piece.
-
-    Parameters
-    ----------
-    middles : (facet, 3) float64
-        Middles of the facets [m].
-    radar : Radar
-        Radar in the scene.
-
-    Attributes
-    ----------
-    centres : (group, 3) float64
-        Mean of the middles in each [m].
+    The depth is that from the array's centre, the width across the way to the piece. ``centres
+    (group, 3)`` are the means of the facets' middles [m].
     """
 
     def __init__(self, middles: Array, radar: Radar) -> None:
@@ -210,19 +183,7 @@ class FacetGroups:
 class PathGroups:
     """Groups of echoes with one number of bounces, half a range bin of path length each.
 
-    Parameters
-    ----------
-    places : (facet, 4, 3) float64
-        Positions of the corners and middles of the object's facets [m].
-    radar : Radar
-        Radar in the scene.
-    order : int
-        Number of bounces.
-
-    Attributes
-    ----------
-    count : int
-        Number of groups.
+    ``places (facet, 4, 3)`` are the corners and middles of the object's facets [m].
     """
 
     def __init__(self, places: Array, radar: Radar, order: int) -> None:

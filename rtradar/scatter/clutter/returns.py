@@ -43,27 +43,14 @@ ENOUGH = 0.3 * FREQUENCY_ERROR
 class RoomEchoes:
     """Echoes of one object for one TDM cycle.
 
-    Parameters
-    ----------
-    name : str
-        Name of the wall, of the walls in the order of their reflections, or of the piece of
-        furniture.
-    kind : {"mirror", "furniture", "reflector", "rough"}
-        Specular reflection by walls; facets of furniture; sheets of metal with several bounces;
-        diffuse return of a rough wall.
-    length : (tx, rx, echo) float64
-        Length of the path [m], for the rx that are kept with that Tx.
-    amplitude : (node, tx, rx, echo) complex128
-        Scattering lengths, defined as in `Echoes` [m].
-    frequency : (node,) float64
-        Frequencies of the nodes [Hz].
-    bounces : (echo,) int64
-        Number of bounces.
-    points : (tx or 1, rx or 1, echo, hop, 3) float64
-        Corners of the path, world [m]; 1 where all antennas share them.
-    off_m : float
-        Largest known error of the polynomial through the nodes, if it is above what was asked for
-        [m].
+    ``kind`` is ``mirror`` for specular reflection by walls, ``furniture`` for facets, ``reflector``
+    for sheets of metal with several bounces, ``rough`` for the diffuse return of a wall; ``name``
+    is that of the object, or of the walls in the order of reflection. ``length (tx, rx, echo)`` [m]
+    is for the rx that are kept with that Tx; ``amplitude (node, tx, rx, echo)`` are scattering
+    lengths, defined as in `Echoes` [m], at ``frequency (node,)`` [Hz]. ``points (tx or 1, rx or 1,
+    echo, hop, 3)`` are the corners of the path, world [m]; 1 where all antennas share them.
+    ``off_m`` is the largest known error of the polynomial through the nodes, if it is above what
+    was asked for [m].
     """
 
     name: str
@@ -165,17 +152,8 @@ class _Pair(NamedTuple):
 def behind_walls(returns: RoomEchoes, radar: Radar, scene: Scene) -> RoomEchoes:
     """Apply what walls on the way transmit, on both legs, to echoes of points.
 
-    Waves that pass a slab equally often, out and back together, are one echo: their delays differ
-    by the distance of Tx and Rx.
-
-    Parameters
-    ----------
-    returns : RoomEchoes
-        Echoes without the walls, of points that all antennas share.
-    radar : Radar
-        Radar in the scene.
-    scene : Scene
-        Scene with its walls.
+    All antennas share the points. Waves that pass a slab equally often, out and back together, are
+    one echo: their delays differ by the distance of Tx and Rx.
     """
     points = returns.points[0, 0, :, 0]
     behind = np.zeros(len(points), dtype=bool)

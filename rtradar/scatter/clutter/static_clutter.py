@@ -23,7 +23,6 @@ from rtradar.radar import Radar
 from rtradar.scatter.clutter.furniture import furniture_returns
 from rtradar.scatter.clutter.returns import FREQUENCY_ERROR, RoomEchoes
 from rtradar.scatter.clutter.wall_returns import rough_returns, specular_returns
-from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.multipath.path_summary import MARGIN_DB
 from rtradar.scene import Scene
 from rtradar.trace.backends.backend import select, use
@@ -36,22 +35,10 @@ MOST_ORDER = 3
 class ClutterItem:
     """One line of the list of what a room returns.
 
-    Parameters
-    ----------
-    name : str
-        Name of the wall, of the walls in the order of reflection, or of the piece of furniture.
-    kind : {"mirror", "furniture", "reflector", "rough"}
-        Kind of the return; see `RoomEchoes`.
-    bounces : int
-        Largest number of bounces.
-    echoes : int
-        Number of echoes.
-    power_m2 : float
-        Sum of the squared amplitudes, averaged over the channels [m^2].
-    cell_m2 : float
-        Largest power that any channel has of it in one range bin [m^2].
-    reason : str
-        Why it was dropped; empty if it is kept.
+    ``name`` and ``kind`` are those of `RoomEchoes`, ``bounces`` is the largest number of bounces,
+    ``echoes`` the number of echoes. ``power_m2`` is the sum of the squared amplitudes, averaged
+    over the channels, ``cell_m2`` the largest power that any channel has of it in one range bin
+    [m^2]. ``reason`` says why it was dropped; it is empty if it is kept.
     """
 
     name: str
@@ -74,8 +61,6 @@ class Clutter:
         Walls and furniture.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / R; must be True if there is anything to reflect.
     seed : int
         Seed of the positions and phases of diffuse returns.
     order : int
@@ -83,10 +68,6 @@ class Clutter:
 
     Attributes
     ----------
-    radar : Radar
-        Same as the parameter.
-    variant : str
-        Kind of the backend in use.
     objects : tuple of RoomEchoes
         Echoes that are kept, the strongest object first.
     kept, dropped : tuple of ClutterItem
@@ -107,7 +88,6 @@ class Clutter:
         scene: Scene,
         *,
         variant: str = "auto",
-        spreading: bool = True,
         seed: int = 0,
         order: int = 2,
     ) -> None:
@@ -115,15 +95,8 @@ class Clutter:
             raise InputError(
                 f"clutter: order = {order}; allowed are 0 to {MOST_ORDER} walls on a path"
             )
-        if not spreading and (scene.walls or scene.furniture):
-            raise InputError(
-                f"clutter: no spreading in scene '{scene.name}'; it can be left out in free space "
-                "only"
-            )
-        backend = select(variant)
-        mi = use(backend)
-        self.radar, self.variant = radar, backend.kind
-        tracer = RoomTracer(mi, scene)
+        mi = use(select(variant))
+        self.radar, tracer = radar, RoomTracer(mi, scene)
         found = [
             *specular_returns(radar, scene, tracer, order),
             *furniture_returns(mi, radar, scene),
@@ -189,28 +162,6 @@ class Clutter:
                 part=np.full(own.n_echoes, -1 - index),
                 bounces=own.bounces,
             )
-
-    def echoes(self) -> Echoes:
-        """Return all echoes of one TDM cycle, at the nodes of the object that needs most.
-
-        ``part`` is that of `cycle`.
-        """
-        most = max((len(own.frequency) for own in self.objects), default=1)
-        frequency = sweep_nodes(self.radar, most)
-        empty = np.empty((self.radar.n_tx, self.radar.n_rx, 0))
-        lengths = [own.length for own in self.objects]
-        amplitudes = [own.at_nodes(frequency) for own in self.objects]
-        none = np.empty((len(frequency), *empty.shape), dtype=np.complex128)
-        counts = [own.n_echoes for own in self.objects]
-        bounces = [np.empty(0, dtype=np.int64), *(own.bounces for own in self.objects)]
-        return Echoes(
-            length=np.concatenate([empty, *lengths], axis=-1),
-            amplitude=np.concatenate([none, *amplitudes], axis=-1),
-            frequency=frequency,
-            tx=np.arange(self.radar.n_tx),
-            part=-1 - np.repeat(np.arange(len(counts)), counts),
-            bounces=np.concatenate(bounces),
-        )
 
 
 def _refuse_not_followed(found: Sequence[RoomEchoes], scene: Scene) -> None:

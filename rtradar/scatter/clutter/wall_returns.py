@@ -67,23 +67,10 @@ MOST_POINTS = 40_000
 def specular_returns(
     radar: Radar, scene: Scene, tracer: RoomTracer, order: int
 ) -> Iterator[RoomEchoes]:
-    """Compute the specular reflections of up to ``order`` walls.
+    """Yield the specular reflections of up to ``order`` walls that some channel sees.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    scene : Scene
-        Walls and furniture.
-    tracer : RoomTracer
-        Tracer of the room's furniture, which may occlude legs.
-    order : int
-        Largest number of walls on a path.
-
-    Yields
-    ------
-    RoomEchoes
-        One object for each sequence of walls that some channel sees.
+    There is one object for each sequence of walls. Furniture, which the tracer knows, occludes
+    legs.
     """
     faces = [Face(wall, back) for wall in scene.walls for back in (False, True)]
     lit, received = (
@@ -162,22 +149,10 @@ def _follow(radar: Radar, scene: Scene, tracer: RoomTracer, leg: Leg) -> RoomEch
 def rough_returns(
     radar: Radar, scene: Scene, tracer: RoomTracer, seed: int
 ) -> Iterator[RoomEchoes]:
-    """Compute the diffuse returns of every face of a rough wall that has antennas before it.
+    """Yield the diffuse returns of every face of a rough wall that has antennas before it.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    scene : Scene
-        Walls and furniture.
-    tracer : RoomTracer
-        Tracer of the room's furniture, which may occlude points.
-    seed : int
-        Seed, which with the wall and the face fixes positions and phases.
-
-    Yields
-    ------
-    RoomEchoes
+    Furniture, which the tracer knows, occludes points. The seed, with the wall and the face, fixes
+    positions and phases.
     """
     for (number, wall), back in product(enumerate(scene.walls), (False, True)):
         before = [(height(wall, places, back=back) > 0).any() for places in (radar.tx, radar.rx)]

@@ -21,40 +21,20 @@ Indices = NDArray[np.int64]
 
 
 def sweep_nodes(radar: Radar, count: int) -> Array:
-    """Return the Chebyshev nodes of the sweep, zeros of the polynomial of that degree over it.
+    """Return the Chebyshev nodes of the sweep (node,) [Hz], in ascending order.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar, whose sweep is meant.
-    count : int
-        Number of nodes.
-
-    Returns
-    -------
-    (node,) float64
-        Frequencies in ascending order [Hz].
+    They are the zeros of the Chebyshev polynomial of that degree over it.
     """
     place = -np.cos((np.arange(count) + 0.5) * np.pi / count)
     return np.asarray(radar.centre_frequency_hz + radar.bandwidth_hz / 2 * place)
 
 
 def interpolation_weights(nodes: Array, places: Array) -> Array:
-    """Compute the values at some places of the Lagrange polynomials of nodes.
+    """Compute the values (place, node) at some places of the Lagrange polynomials of nodes.
 
-    Their product with values at the nodes is the polynomial through these. SciPy's barycentric form
-    takes the nodes in a random order: its last bits would change from one run to the next.
-
-    Parameters
-    ----------
-    nodes : (node,) float64
-        Nodes, all different, in any unit.
-    places : (place,) float64
-        Positions at which to interpolate, in the unit of the nodes.
-
-    Returns
-    -------
-    (place, node) float64
+    Their product with values at the nodes is the polynomial through these. Nodes and places are in
+    the same unit, and the nodes are all different. SciPy's barycentric form takes the nodes in a
+    random order: its last bits would change from one run to the next.
     """
     others = ~np.eye(len(nodes), dtype=bool)
     columns = [
@@ -98,20 +78,11 @@ def _straight(count: int) -> Array:
 class ArrayEnds:
     """Ends of the lines of a radar, for linear interpolation in between.
 
-    A line is a line of Tx with the Rx that are kept with it.
-
-    Parameters
-    ----------
-    line_of_tx : (tx,) int64
-        Line of each Tx.
-    tx, rx : (line, 2, 3), (line, rx_end, 3) float64
-        Ends [m]: two of the Tx, and two for each line of Rx.
-    tx_middle, rx_middle : (line, 3) float64
-        Mean positions [m].
-    tx_weight : (tx, 2) float64
-        Weight of each end in each Tx.
-    rx_weight : (tx, rx, rx_end) float64
-        Weight of each end in each Rx that is kept with that Tx.
+    A line is a line of Tx with the Rx that are kept with it; ``line_of_tx (tx,)`` is that of each
+    Tx. ``tx (line, 2, 3)`` and ``rx (line, rx_end, 3)`` are the ends [m], two of the Tx and two for
+    each line of Rx; ``tx_middle`` and ``rx_middle (line, 3)`` are mean positions [m]. ``tx_weight
+    (tx, 2)`` and ``rx_weight (tx, rx, rx_end)`` are the weights of the ends in each Tx and each Rx
+    kept with it.
     """
 
     line_of_tx: Indices
@@ -148,14 +119,9 @@ class ArrayEnds:
 
 
 def shadow_nodes(radar: Radar) -> tuple[Array, Array, Array]:
-    """Return the ends of the lines of Tx and the middles of the lines of Rx.
+    """Return the ends of the lines of Tx and the middles of the lines of Rx (node, 3) [m].
 
-    Returns
-    -------
-    places : (node, 3) float64
-        Positions of the nodes, world [m].
-    tx_weight, rx_weight : (tx, node), (rx, node) float64
-        Weight of each node in each antenna.
+    Their weights in each antenna, (tx, node) and (rx, node), follow.
     """
     blocks = []
     for antennas, along_y, ends in ((radar.tx, radar.tx_y, 2), (radar.rx, radar.rx_y, 1)):

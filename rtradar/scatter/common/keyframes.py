@@ -22,18 +22,12 @@ def keyframe_step(radar: Radar, apart_s: float = 10e-3) -> int:
 
 
 class KeyframeCache(Generic[_Key, _Value]):
-    """Values of keyframes: the first that come stay, later ones pass through.
+    """Values of keyframes: the first ``stay`` that come stay, later ones pass through.
 
     A recording is processed twice from its start, once for its power and once for its signal. If
     the last values were kept, a recording a little longer than this cache would find nothing left
-    of them when it starts again.
-
-    Parameters
-    ----------
-    stay : int
-        Number of values that stay.
-    passing : int
-        Number of later values that are held at a time, the last that were asked for.
+    of them when it starts again. Of later values those that were last asked for are held,
+    ``passing`` of them.
     """
 
     def __init__(self, stay: int, passing: int) -> None:

@@ -38,19 +38,9 @@ def antenna_field(
 ) -> Array:
     """Compute the polarisation of the field that an antenna sends in some directions.
 
-    Parameters
-    ----------
-    directions : (..., 3) float64
-        Unit vectors.
-    polarization : {"v", "h"}
-        v is world z projected across the direction, h is across both.
-    x_for_steep : bool
-        Whether x is used in place of z straight above and below; else the field is 0 there.
-
-    Returns
-    -------
-    (..., 3) float64
-        Unit vectors, or 0.
+    The directions (..., 3) are unit vectors, and so is the result: v is world z projected across
+    the direction, h is across both. Straight above and below, x is used in place of z with
+    ``x_for_steep``; else the field is 0 there.
     """
     up = np.array([0.0, 0.0, 1.0])
     if x_for_steep:
@@ -79,21 +69,9 @@ def apply_te_tm(
 ) -> NDArray[Any]:
     """Multiply the TE and the TM part of a plane wave by a coefficient each.
 
-    Parameters
-    ----------
-    field : (node, ..., 3) complex or float
-        Electric field of the incident wave, transverse to ``arriving``.
-    arriving, leaving : (..., 3) float64
-        Unit vectors along which the incident and the outgoing wave travel.
-    normal : (3,) or (..., 3) float64
-        Unit normal of the surface.
-    te, tm : (node, ...) complex or float
-        Coefficients.
-
-    Returns
-    -------
-    (node, ..., 3) complex or float
-        Electric field of the outgoing wave.
+    The field (node, ..., 3), which travels along the unit vectors ``arriving (..., 3)``, leaves
+    along ``leaving`` a surface with the unit normal (3,) or (..., 3). ``te`` and ``tm`` are (node,
+    ...).
     """
     across = np.cross(arriving, normal)
     sine = np.linalg.norm(across, axis=-1, keepdims=True)
@@ -108,23 +86,11 @@ def apply_te_tm(
 def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Array:
     """Compute the co-polar fraction of the field that a conductor reflects from Tx to Rx.
 
-    Parameters
-    ----------
-    to_tx, to_rx : (..., 3) float64
-        Vectors from the target to the antennas, of any length, world axes.
-    polarization : {"v", "h"}
-        v is world z projected across each line of sight, h is across both.
-
-    Returns
-    -------
-    (...) float64
-        E_r = 2 (n.E) n - E_i between unit vectors of polarisation, n their bisector; 1 where Tx
-        and Rx are one, where they are exactly opposite, and where v has no direction.
-
-    Notes
-    -----
-    On that surface the current of physical optics, 2 n x H, radiates just this times the scalar
-    with the mean of n.s_T and n.s_R, once averaged with its own reciprocal.
+    ``to_tx`` and ``to_rx (..., 3)`` are vectors from the target to the antennas, of any length. The
+    fraction (...) is that of E_r = 2 (n.E) n - E_i between unit vectors of polarisation, n their
+    bisector; it is 1 where Tx and Rx are one, where they are exactly opposite, and where v has no
+    direction. On that surface the current of physical optics, 2 n x H, radiates just this times the
+    scalar with the mean of n.s_T and n.s_R, once averaged with its own reciprocal.
 
     Equation :eq:`polarization` of the theory page.
     """
@@ -144,10 +110,7 @@ def copolar(to_tx: Array, to_rx: Array, polarization: Literal["v", "h"]) -> Arra
 def body_material(name: str, frequency_hz: Array) -> Material:
     """Return the material of that name, if it is known at these frequencies.
 
-    Raises
-    ------
-    InputError
-        If a body is not made of that, or a frequency is outside the material's limits.
+    An `InputError` is raised if a body is not made of that, or a frequency is outside its limits.
     """
     if name not in BODY_MATERIALS:
         raise InputError(f"body material '{name}' is unknown; allowed: {', '.join(BODY_MATERIALS)}")
@@ -159,21 +122,10 @@ def body_material(name: str, frequency_hz: Array) -> Material:
 def body_reflection(field: Field, directions: Array, normals: Array, eta: Field) -> Field:
     """Compute the field right after reflection by a half-space, at the specular point.
 
-    Parameters
-    ----------
-    field : (node, ..., 3) complex
-        Incident field.
-    directions : (..., 3) float64
-        Unit vectors along which the incident wave travels.
-    normals : (..., 3) float64
-        Unit normals, out of the body.
-    eta : (node,) complex128
-        Relative permittivity; infinite for a perfect conductor: E_r = 2 (n.E) n - E_i.
-
-    Returns
-    -------
-    (node, ..., 3) complex128
-        Reflected field, without the divergence of curved surfaces.
+    The incident field (node, ..., 3) travels along the unit vectors ``directions (..., 3)``; the
+    unit normals are out of the body. ``eta (node,)`` is the relative permittivity, infinite for a
+    perfect conductor, for which E_r = 2 (n.E) n - E_i. The divergence of curved surfaces is left
+    out.
     """
     eta = np.asarray(eta, dtype=np.complex128)
     if np.isinf(eta).all():
@@ -191,19 +143,9 @@ def material_factor(
 ) -> Field:
     """Compute the co-polar echo over that of a perfect conductor of the same shape.
 
-    Parameters
-    ----------
-    to_tx, to_rx : (..., 3) float64
-        Vectors from the specular point to the antennas, of any length.
-    eta : (node,) complex128
-        Relative complex permittivity of the body at each frequency node.
-    polarization : {"v", "h"}
-        Polarisation of both antennas.
-
-    Returns
-    -------
-    (node, ...) complex128
-        Factor for exp(+j omega t); amplitudes of `Echoes` take its conjugate.
+    ``to_tx`` and ``to_rx (..., 3)`` are vectors from the specular point to the antennas, of any
+    length; ``eta (node,)`` is the relative permittivity of the body. The factor (node, ...) is for
+    exp(+j omega t); amplitudes of `Echoes` take its conjugate.
     """
     tx, rx = (way / np.linalg.norm(way, axis=-1, keepdims=True) for way in (to_tx, to_rx))
     sent, received = antenna_field(-tx, polarization), antenna_field(-rx, polarization)
@@ -224,22 +166,8 @@ def over_copolar(
 class Surface:
     """The surface of the body in free space, for models whose amplitudes are those of a conductor.
 
-    Parameters
-    ----------
-    name : {"perfect-conductor", "skin"}
-        Material of the body.
-    radar : Radar
-        Radar that receives the echoes.
-
-    Attributes
-    ----------
-    material : Material
-        The same material, known over the sweep.
-
-    Raises
-    ------
-    InputError
-        If a body is not made of that, or it is not known over the sweep.
+    It is a perfect conductor or skin. An `InputError` is raised for other names, and if the
+    material is not known over the radar's sweep.
     """
 
     def __init__(self, name: str, radar: Radar) -> None:

@@ -54,14 +54,8 @@ class WallPath:
 def wall_paths(walls: Sequence[Wall], place: Array, order: int) -> tuple[WallPath, ...]:
     """List all paths with up to ``order`` reflections at walls, the direct one first.
 
-    Parameters
-    ----------
-    walls : sequence of Wall
-        Walls of the scene.
-    place : (3,) float64
-        Middle of the array [m]. It, or its image, settles which face of a wall reflects.
-    order : int
-        Largest number of reflections; 0 gives the direct path alone.
+    The middle of the array, ``place (3,)`` [m], or its image, settles which face of a wall
+    reflects.
     """
     legs: list[Leg] = [()]
     for depth in range(1, order + 1):
@@ -128,25 +122,12 @@ def crossed(wall: Wall, origins: Array, targets: Array) -> Bools:
 def specular_point(
     wall: Wall, origins: Array, targets: Array, *, back: bool = False, margin_m: float = 0.0
 ) -> tuple[Array, Bools]:
-    """Find where a wall reflects a wave from an origin to a target.
+    """Find where a wall reflects a wave from origins to targets (..., 3) [m].
 
-    Parameters
-    ----------
-    wall : Wall
-        Wall that reflects.
-    origins, targets : (..., 3) float64
-        Ends of the path, world [m]; they broadcast.
-    back : bool
-        Whether the back reflects, not the front.
-    margin_m : float
-        Margin around the rectangle, and before the face for the target [m]; negative if narrower.
-
-    Returns
-    -------
-    point : (..., 3) float64
-        Specular point on the plane of that face [m]; NaN where the ends are on different sides.
-    valid : (...) bool
-        Whether both ends are before that face and the point lies in the rectangle.
+    The margin [m] is added to the rectangle, and before the face for the target. Returned are the
+    point on the plane of the front, or of the back (..., 3) [m], which is NaN where the ends are on
+    different sides, and whether both ends are before that face and the point lies in the rectangle
+    (...).
     """
     origins, targets = np.broadcast_arrays(origins, targets)
     first, second = height(wall, origins, back=back), height(wall, targets, back=back)
@@ -178,24 +159,12 @@ def images(leg: Leg, antennas: Array) -> Array:
 def corners(
     leg: Leg, antennas: Array, points: Array, margin_m: float = 0.0
 ) -> tuple[list[Array], Bools]:
-    """Find where a leg runs.
+    """Find where a leg from antennas to points (..., 3) [m] runs.
 
-    Parameters
-    ----------
-    leg : Leg
-        Faces that reflect, none for a straight leg.
-    antennas, points : (..., 3) float64
-        Ends of the leg [m]; they broadcast.
-    margin_m : float
-        Margin of `specular_point` [m].
-
-    Returns
-    -------
-    corners : list of (..., 3) float64
-        Antenna, places of reflection, and the point at the other end [m].
-    valid : (...) bool
-        Whether each place of reflection lies in its rectangle, before the face. Where both ends
-        are on different sides of a face, the next corner takes the place of the missing one.
+    Returned are the antenna, the places of reflection and the point at the other end, a list of
+    (..., 3) [m], and whether each place of reflection lies in its rectangle, before the face (...),
+    with the margin of `specular_point`. Where both ends are on different sides of a face, the next
+    corner takes the place of the missing one.
     """
     antennas, points = np.broadcast_arrays(antennas, points)
     valid = np.ones(points.shape[:-1], dtype=bool)

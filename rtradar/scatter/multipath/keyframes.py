@@ -79,15 +79,8 @@ class Surroundings(NamedTuple):
 def path_keyframes(around: Surroundings, columns: EchoColumns, poses: Poses) -> PathKeyframes:
     """Compute what is left of the echoes at some poses.
 
-    Parameters
-    ----------
-    around : Surroundings
-        Room, antennas and paths.
-    columns : EchoColumns
-        Echoes, which get the columns that are met for the first time. Whether other parts occlude
-        a direct echo is decided by `SpecularVisibility`, not here.
-    poses : Poses
-        Poses of the body at the keyframes.
+    Columns that are met for the first time are added. Whether other parts occlude a direct echo is
+    decided by `SpecularVisibility`, not here.
     """
     points, start, exists = _specular_points(around, columns, poses)
     legs = [
@@ -120,9 +113,7 @@ def path_keyframes(around: Surroundings, columns: EchoColumns, poses: Poses) -> 
 
 
 def _in_columns(
-    columns: EchoColumns,
-    factors: Sequence[tuple[NDArray[np.int64], Met, Field]],
-    strength: Array,
+    columns: EchoColumns, factors: Sequence[tuple[NDArray[np.int64], Met, Field]], strength: Array
 ) -> Field:
     """Factors (node, keyframe, line, 2, rx_end, column), without terms that are faint anywhere."""
     owners = []
@@ -145,13 +136,9 @@ def _specular_points(
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Specular points, and whether there is one at all.
 
-    Returns
-    -------
-    points : (keyframe, line, echo, 3)
-        Points for the middles of the lines, world [m].
-    starts : (keyframe, line, 2, echo, 3)
-        Points for the ends of the lines of Tx, in the axes of the parts [m].
-    exists : (keyframe, line, echo) bool
+    Returned are points for the middles of the lines (keyframe, line, echo, 3), world [m]; for the
+    ends of the lines of Tx (keyframe, line, 2, echo, 3), in the axes of the parts [m]; and
+    (keyframe, line, echo) bool.
     """
     ends, count, part = around.ends, len(poses.centres), columns.part
     # The middle of each line of Tx and its ends, all with the middle of the receivers kept.

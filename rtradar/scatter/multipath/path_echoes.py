@@ -36,12 +36,7 @@ AT_ONCE: Met = ((), ())
 class LegImages:
     """Images of the antennas over the legs of paths, which do not move.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    paths : sequence of WallPath
-        Paths that echoes may take.
+    ``of_path (path, 2)`` are the legs out and back of each path, ``antennas`` the images over each.
     """
 
     def __init__(self, radar: Radar, paths: Sequence[WallPath]) -> None:
@@ -64,23 +59,12 @@ class LegImages:
         near: Nearby,
         image_echo: ImageEcho | None,
     ) -> tuple[Array, Array]:
-        """Compute lengths and amplitudes (chirp, rx, echo) of conductors over perfect mirrors.
+        """Compute lengths and amplitudes (chirp, rx, echo) of conductors over perfect mirrors [m].
 
-        Parameters
-        ----------
-        path, part : (echo,) int64
-            Path and body part of each echo.
-        poses : ChirpPoses
-            Poses of the body, and transmitters.
-        near : Nearby
-            Expected specular points. Echoes that are not wanted return nothing.
-        image_echo : callable, optional
-            The echo model's own formula, which needs no specular points and computes all echoes.
-
-        Returns
-        -------
-        length, amplitude : (chirp, rx, echo) float64
-            Lengths and, without regard to polarisation, amplitudes [m].
+        Each echo has its ``path (echo,)`` and its body part. ``near`` are expected specular points;
+        echoes that are not wanted return nothing. The echo model's own formula, ``image_echo``,
+        needs no specular points and computes all echoes. Amplitudes are without regard to
+        polarisation.
         """
         shape = (*poses.rx.shape[:2], len(path))
         length, amplitude = np.empty(shape), np.empty(shape)
@@ -103,26 +87,8 @@ class EchoColumns:
     """The list of echoes of a room.
 
     First come all parts over each path without delays of slabs, then delayed ones as they are met.
-
-    Parameters
-    ----------
-    paths : sequence of WallPath
-        Paths that echoes may take.
-    n_parts : int
-        Number of body parts.
-    walls : WallResponse
-        Walls of the room.
-    legs : LegImages
-        Images of the antennas over the legs of these paths.
-
-    Attributes
-    ----------
-    path, part : (echo,) int64
-        Path and body part of each echo.
-    echo : list of int
-        Echo of each column.
-    met : list of Met
-        What the wave of each column has met.
+    ``path`` and ``part (echo,)`` int64 are those of each echo; ``echo`` lists the echo of each
+    column, ``met`` what its wave has met.
     """
 
     def __init__(
@@ -184,21 +150,10 @@ class EchoColumns:
         ]
 
     def lengths(self, at: ChirpPoses, points: Array, length: Array) -> Array:
-        """Compute the lengths of all columns.
+        """Compute the lengths (chirp, rx, column) of all columns [m].
 
-        Parameters
-        ----------
-        at : ChirpPoses
-            Poses of the body, and transmitters.
-        points : (chirp, echo, 3) float64
-            Points towards which echoes leave the body, in the axes of their part [m].
-        length : (chirp, rx, echo) float64
-            Lengths without the delays of slabs [m].
-
-        Returns
-        -------
-        (chirp, rx, column) float64
-            Lengths [m].
+        They are ``length (chirp, rx, echo)`` and the delays of slabs. The points towards which
+        echoes leave the body (chirp, echo, 3) are in the axes of their part [m].
         """
         if self._delays is None:
             self._delays = self._list_delays()

@@ -26,21 +26,11 @@ _GHOST_STEP_CYCLES = 4
 class PathSummary:
     """What became of the echoes over one path.
 
-    Parameters
-    ----------
-    path : str
-        Walls in the order in which the wave meets them.
-    order : int
-        Number of reflections at walls.
-    power_m2 : float
-        Echo power of all parts, averaged over rx and one chirp every 20 ms [m^2].
-    over_noise_db : float or None
-        Echo power over noise, after the gain of samples, cycles and channels [dB]; None without
-        noise or without an echo.
-    kept, dropped : list of str
-        Body parts whose echoes were kept and left out.
-    why : str
-        Why echoes were left out; empty if none were.
+    ``path`` names its walls in the order in which the wave meets them, ``order`` is the number of
+    reflections at walls. ``power_m2`` is the echo power of all parts, averaged over rx and one
+    chirp every 20 ms [m^2]; ``over_noise_db`` the same over noise, after the gain of samples,
+    cycles and channels [dB], or None without noise or without an echo. ``kept`` and ``dropped`` are
+    the body parts whose echoes were kept and left out, ``why`` the reason for the latter.
     """
 
     path: str
@@ -66,15 +56,8 @@ def summarize(
 ) -> PathSummary:
     """Summarize one path.
 
-    Parameters
-    ----------
-    path : WallPath
-        Path.
-    own, keep, power, names : (echo,)
-        Which echoes take this path and which of all are kept, their power [m^2], and the names of
-        their parts.
-    noise : float
-        Noise power over the gain of processing [m^2].
+    By echo: whether it takes this path and whether it is kept, its power [m^2], and the name of its
+    part. ``noise`` is the noise power over the gain of processing [m^2].
     """
     total = float(power[own].sum())
     lost = own & ~keep

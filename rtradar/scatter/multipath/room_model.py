@@ -58,17 +58,10 @@ _CHIRPS_AT_ONCE = 64
 class RoomReady(EchoModel, Protocol):
     """What `RoomModel` asks of the model that it wraps, one whose ``supports_rooms`` is True.
 
-    Parameters
-    ----------
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
-    surface : Surface
-        Surface of the body.
-    tracer : BodyTracer or None
-        Tracer of the body, which occludes legs; None if nothing occludes anything.
-    image_echo : callable or None
-        Formula for the echoes of conductors before any antennas, which is used with their images
-        over walls; None for specular points, which are then followed.
+    ``spreading`` says whether amplitudes hold 1 / (R1 R2); ``surface`` is that of the body;
+    ``tracer`` is that of the body, which occludes legs, or None if nothing occludes anything.
+    ``image_echo`` is a formula for the echoes of conductors before any antennas, which is used with
+    their images over walls, or None if specular points are followed.
     """
 
     spreading: bool
@@ -79,21 +72,11 @@ class RoomReady(EchoModel, Protocol):
     def conductor_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: Array | None = None
     ) -> tuple[Array, Array]:
-        """Compute direct echoes as if the body were a conductor.
+        """Compute direct echoes at some chirps as if the body were a conductor.
 
-        Parameters
-        ----------
-        chirps : (chirp,) int64
-            Chirps, numbered from the start of the capture.
-        at : ChirpPoses
-            Poses at these chirps.
-        start : (chirp, part, 3) float64, optional
-            Points near the specular points, in the axes of the parts [m], to save steps.
-
-        Returns
-        -------
-        length, amplitude : (chirp, rx, part) float64
-            Lengths and co-polar amplitudes, with occlusion [m].
+        Points ``start (chirp, part, 3)`` near the specular points, in the axes of the parts [m],
+        save steps. Returned are lengths and co-polar amplitudes, with occlusion (chirp, rx, part)
+        [m].
         """
         ...
 
@@ -104,32 +87,24 @@ class RoomModel:
     Parameters
     ----------
     model : RoomReady
-        Echo model of the person alone.
+        Echo model of the person alone, `person`.
     scene : Scene
         Walls and furniture.
     radar : Radar
-        Radar of the model, where it is in the scene.
+        Radar of the model, at its position in the scene.
     body : Body
         Body of the model.
     order : int
-        Largest number of reflections at walls on both legs together; 0 leaves the direct echoes,
-        through walls and behind furniture.
+        Largest number of reflections at walls on both legs together, 0 to 3; 0 leaves the direct
+        echoes, through walls and behind furniture.
 
     Attributes
     ----------
-    person : RoomReady
-        The wrapped model.
     paths : tuple of WallPath
         All paths, the direct one first.
     not_followed : dict of str to float
         Walls whose frequency response is not known to `FIELD_ERROR`, and the fraction of the echo
         power that meets each; known after `prune`.
-
-    Raises
-    ------
-    InputError
-        If spreading is off though there are walls or furniture, or the order is no whole number
-        from 0 to 3.
     """
 
     def __init__(
@@ -269,22 +244,13 @@ class RoomModel:
     # -- what is worth its cost --------------------------------------------------------------------
 
     def prune(self, n_chirps: int, noise_power_m2: float) -> tuple[PathSummary, ...]:
-        """Leave out echoes over walls that stay below the noise.
+        """Leave out echoes over walls that stay below the noise, and summarize each path.
 
-        Parameters
-        ----------
-        n_chirps : int
-            Number of chirps of the capture; one every 20 ms is evaluated.
-        noise_power_m2 : float
-            Noise power of one IF sample [m^2]; 0 leaves out only what is never visible. Left out
-            is an echo whose mean power over the capture, after the gain of the samples, cycles and
-            channels of a frame, is more than `MARGIN_DB` below the noise. Window functions, which
-            lose 1.8 dB each (Hann), are not counted: what is left out is weaker than that.
-
-        Returns
-        -------
-        tuple of PathSummary
-            Summary of each path. Direct echoes always stay.
+        One chirp every 20 ms of the capture is evaluated. Left out is an echo whose mean power,
+        after the gain of the samples, cycles and channels of a frame, is more than `MARGIN_DB`
+        below the noise of one IF sample [m^2]; without noise, what is never visible. Window
+        functions, which lose 1.8 dB each (Hann), are not counted: what is left out is weaker than
+        that. Direct echoes always stay.
         """
         radar, columns = self._radar, self._columns
         evaluated = np.arange(0, n_chirps, self._step)

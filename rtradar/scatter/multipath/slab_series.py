@@ -112,20 +112,10 @@ def room_series(
 ) -> RoomSeries:
     """Find the fewest terms of each wall, and the fewest nodes that follow their coefficients.
 
-    Parameters
-    ----------
-    walls : sequence of Wall
-        Walls of the room.
-    radar : Radar
-        Radar, whose sweep counts.
-    most_nodes : int
-        Largest number of Chebyshev nodes of the polynomial over the sweep.
-    enough : float
-        Error that the polynomial may have, over the rms of the coefficient over the sweep, for the
-        stronger of both polarisations.
-    bounces : int
-        Reflections by walls on a path, of whose product this is asked; at most 2 count. A wall is
-        always transmitted through both ways.
+    There are at most ``most_nodes`` Chebyshev nodes of the polynomial over the radar's sweep. Its
+    error may be ``enough`` of the rms of the coefficient over the sweep, for the stronger of both
+    polarisations, and for the product of as many coefficients as there are reflections,
+    ``bounces``, on a path; at most 2 count. A wall is always transmitted through both ways.
     """
     powers = min(max(bounces, 1), 2), 2
     known: dict[tuple[Material, float], tuple[WallSeries, int]] = {}

@@ -30,23 +30,10 @@ def reflect(
 ) -> Field:
     """Compute the field after reflection, at the face that reflects.
 
-    Parameters
-    ----------
-    wall : Wall
-        Its roughness s takes exp(-2 (k s cos)^2) off the field (Ament, Proc. IRE 41 (1953) 142).
-    field : (node, ..., 3) complex
-        Incident field; (..., 3) stands for all nodes.
-    directions : (..., 3) float64
-        Unit vectors along which the incident wave travels.
-    frequency_hz : (node,) float64
-        Frequencies of the nodes [Hz].
-    term : Term
-        Term of the slab's coefficient; the phase of its extra length is left out.
-
-    Returns
-    -------
-    (node, ..., 3) complex128
-        Field of the reflected wave, without the phase of its path.
+    The incident field (node, ..., 3), or (..., 3) for all nodes, travels along the unit vectors
+    ``directions (..., 3)``. The roughness s of the wall takes exp(-2 (k s cos)^2) off it (Ament,
+    Proc. IRE 41 (1953) 142). Returned is the field (node, ..., 3) of one term of the slab, without
+    the phase of its path and of the term's extra length.
     """
     normal = wall.normal
     against = directions @ normal
@@ -115,23 +102,10 @@ class WallResponse(NamedTuple):
     def along(
         self, leg: Leg, corners: Sequence[Array], directions: Sequence[Array], field: Array
     ) -> Waves:
-        """Follow a wave over a leg.
+        """Follow a wave over a leg, whose faces reflect, from its field at the antenna (..., 3).
 
-        Parameters
-        ----------
-        leg : Leg
-            Faces that reflect.
-        corners : sequence of (..., 3) float64
-            Both ends of the leg and the places of reflection between them [m].
-        directions : sequence of (..., 3) float64
-            Unit vectors of the sections between corners.
-        field : (..., 3) float64
-            Field at the antenna.
-
-        Returns
-        -------
-        list of Wave
-            Waves at the end of the leg.
+        The corners (..., 3) [m] are both ends of the leg and the places of reflection between them,
+        the directions (..., 3) the unit vectors of the sections between corners.
         """
         waves = self.start(field)
         for section, (origins, targets) in enumerate(pairwise(corners)):
@@ -161,21 +135,9 @@ class WallResponse(NamedTuple):
     def transmitted(self, section: int, waves: Waves, origins: Array, targets: Array) -> Waves:
         """Send waves along a straight section of a leg, through all walls on the way.
 
-        Parameters
-        ----------
-        section : int
-            Index of the section in its leg.
-        waves : list of Wave
-            Waves at the origins.
-        origins, targets : (..., 3) float64
-            Ends of the section, world [m]; they broadcast to the shape of the waves. A section
-            that ends on a face of a wall does not cross that wall.
-
-        Returns
-        -------
-        list of Wave
-            Waves at the targets, without spreading and without the phase of the section's length;
-            0 behind metal.
+        The ends of the section (..., 3) [m] broadcast to the shape of the waves; if one is on a
+        face of a wall, the section does not cross that wall. The waves at the targets are without
+        spreading and without the phase of the section's length, and 0 behind metal.
         """
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)

@@ -7,7 +7,6 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.blends import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter
@@ -134,21 +133,6 @@ def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> N
     assert len(lost.echo) > 20
 
 
-def test_weights_fade_smoothly_from_anchor_to_anchor(clutter: Clutter) -> None:
-    shadow = ClutterShadow(clutter, Ball(), variant="scalar")
-    step, n_tx = shadow.step, RADAR.n_tx
-    chirps = np.arange(0, 3 * step, n_tx)  # one Tx
-    weights = shadow.weights(chirps)
-    before, after = (1 - _dense(shadow, anchor, clutter)[0] for anchor in (0, 1))
-    share = smoothstep(np.array([step // 2 // n_tx * n_tx]) / step)
-    np.testing.assert_allclose(weights[0], before)
-    np.testing.assert_allclose(
-        weights[step // 2 // n_tx], before + share * (after - before), atol=1e-12
-    )
-    # No jump: the fastest fade goes 1.5 / step a chirp.
-    assert np.abs(np.diff(weights, axis=0)).max() < 1.6 * n_tx / step
-
-
 def _dense(shadow: ClutterShadow, anchor: int, clutter: Clutter) -> Array:
     share = np.zeros((RADAR.n_tx, RADAR.n_rx, clutter.n_echoes))
     lost = shadow.at(anchor)
@@ -159,4 +143,3 @@ def _dense(shadow: ClutterShadow, anchor: int, clutter: Clutter) -> Array:
 def test_a_body_outside_hides_nothing(clutter: Clutter) -> None:
     shadow = ClutterShadow(clutter, Ball(place=(30.0, 0.0, 1.0)), variant="scalar")
     assert len(shadow.at(3).echo) == 0
-    np.testing.assert_array_equal(shadow.weights(np.arange(5)), 1)

@@ -140,10 +140,7 @@ def test_tx_and_rx_may_change_places() -> None:
     for name, echoes in first.items():
         other = second[" + ".join(reversed(name.split(" + ")))]
         np.testing.assert_allclose(echoes.length, other.length.transpose(1, 0, 2), rtol=1e-12)
-        mine, its = (
-            echoes.at_nodes(frequency),
-            other.at_nodes(frequency).transpose(0, 2, 1, 3),
-        )
+        mine, its = (echoes.at_nodes(frequency), other.at_nodes(frequency).transpose(0, 2, 1, 3))
         np.testing.assert_allclose(mine, its, rtol=0, atol=1e-9)
 
 
