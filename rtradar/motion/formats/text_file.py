@@ -50,12 +50,7 @@ class TextFile:
         self._lines.close()
 
     def __iter__(self) -> Iterator[str]:
-        return self
-
-    def __next__(self) -> str:
-        text = next(self._lines)
-        self.line += 1
-        return text
+        return self._lines
 
     def fail(self, what: str, line: int | None = None) -> InputError:
         """Make an error at a line, counted from 1; by default at the one that was read last."""
@@ -67,8 +62,9 @@ class TextFile:
             values = [float(word) for word in words]
         except ValueError:
             values = [math.nan]
-        if not (all(map(math.isfinite, values)) and max(map(abs, values), default=0.0) <= _LARGEST):
-            raise self.fail(next(filter(None, map(_complaint, words))))
+        if not sum(map(abs, values)) <= _LARGEST:  # which NaN and infinity are not, either
+            for complaint in filter(None, map(_complaint, words)):
+                raise self.fail(complaint)
         return values
 
     def check_size(self, joints: int, frames: int = 1) -> None:
@@ -113,6 +109,7 @@ class TextFile:
                         if behind > _CHARACTERS_A_STEP:
                             bar.update(behind)
                             behind = 0
+                        self.line += 1
                         yield line
         except OSError as error:
             raise InputError(
