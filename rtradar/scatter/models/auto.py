@@ -1,4 +1,4 @@
-"""The echo model `auto`: each part at each time by the cheapest way that keeps the whole within a tolerance."""
+"""The echo model `auto`: each part at each time by the cheapest candidate within a tolerance."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.models.analytic import far_field_echo
-from rtradar.scatter.models.auto_errors import (
+from rtradar.scatter.models.auto_selection import (
     ANALYTIC,
+    CANDIDATES,
     FRESNEL,
     LEFT_OUT,
     PHYSICAL_OPTICS,
     SPECULAR,
-    WAYS,
-    Forecast,
-    forecast,
+    ErrorBudget,
+    error_budget,
+    select_candidates,
 )
-from rtradar.scatter.models.auto_plan import choose
 from rtradar.scatter.models.fresnel import zone_nodes
 from rtradar.scatter.models.physical_optics import PhysicalOptics
 from rtradar.scatter.models.reference import Reference
@@ -41,29 +41,30 @@ from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
 _INSTANTS_S = 25e-3
-"""Between the instants at which ways are chosen; a limb at 5 m/s goes 12 cm."""
+"""Time between the instants at which candidates are selected; a limb at 5 m/s goes 12 cm."""
 
 _INSTANTS_AT_ONCE = 32
 
 _MARGIN = 0.7
-"""Of a complex tolerance that forecasts may use: they do not know the array's far ends, nor the time between instants."""
+"""Fraction of a complex tolerance that the error budget may use: it does not know the far ends of the
+array, nor the time between instants."""
 
 _LEAST_COMPLEX = 1e-3
 
 
 _KEPT_CHUNKS, _PASSING = 25, 4
-"""Of so many instants: the first 20 s of a recording, which is gone through twice, and of what comes later what a block needs."""
+"""Chunks of instants kept: the first 20 s of a recording, read twice, and what a block needs."""
 
 
 class Planned(NamedTuple):
-    """Some instants: ``chosen (time, part)``, and ``in_view (time, part)`` of a `Forecast`."""
+    """Some instants: ``chosen (time, part)``, and ``in_view (time, part)`` of a `ErrorBudget`."""
 
     chosen: NDArray[np.int64]
     in_view: NDArray[np.bool_]
 
 
 class _Group(NamedTuple):
-    """Echoes of some parts, all modelled in one way, as in `Echoes`; amplitudes may be real."""
+    """Echoes of some parts, all by one candidate, as in `Echoes`; amplitudes may be real."""
 
     length: NDArray[np.float64]
     amplitude: NDArray[np.inexact]
@@ -73,12 +74,14 @@ class _Group(NamedTuple):
 
 
 class Auto(BuiltInModel):
-    """`auto`: only what the tolerance requires of each part is modelled; where the way changes, echoes are faded over.
+    """`auto`: each part by what the tolerance requires, faded over where that changes.
 
     Parameters
     ----------
     radar : Radar
+        Radar in the scene.
     body : Body
+        Body in motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend; nothing is loaded as long as nothing has to be traced.
     spreading : bool
@@ -86,7 +89,7 @@ class Auto(BuiltInModel):
     tolerance_db : float
         Largest error of the power of a frame [dB].
     tolerance_complex : float, optional
-        Largest rms error of the received field over its rms, as a share; None: only the power matters.
+        Largest rms error of the received field over its rms; None: only the power matters.
 
     Raises
     ------
@@ -112,40 +115,44 @@ class Auto(BuiltInModel):
             math.isfinite(tolerance_complex) and tolerance_complex >= _LEAST_COMPLEX
         ):
             raise InputError(
-                f"auto: tolerance_complex = {tolerance_complex}; it must be at least {_LEAST_COMPLEX}, a share of the rms field "
-                "(--tolerance-complex)"
+                f"auto: tolerance_complex = {tolerance_complex}; it must be at least "
+                f"{_LEAST_COMPLEX}, a fraction of the rms field (--tolerance-complex)"
             )
         self._radar, self._body, self._variant, self._spreading = radar, body, variant, spreading
-        # A decibel down is a smaller share than one up.
-        self._power_share = 1 - 10 ** (-tolerance_db / 10)
-        self._complex_share = None if tolerance_complex is None else _MARGIN * tolerance_complex
+        # A decibel down is a smaller fraction than one up.
+        self._power_fraction = 1 - 10 ** (-tolerance_db / 10)
+        self._complex_fraction = None if tolerance_complex is None else _MARGIN * tolerance_complex
         self._starts = StartPoints(radar, body)
         self._step = max(1, round(_INSTANTS_S / radar.chirp_interval_s))
         self._planned: KeyframeCache[int, Planned] = KeyframeCache(_KEPT_CHUNKS, _PASSING)
-        # What `account` tells: parts and instants (way, part) and by reason, and as bits of a number the chunks that are in it.
-        self._ways = np.zeros((len(WAYS), len(body.part_names)), dtype=np.int64)
+        # For `account`: parts and instants (candidate, part) and by reason, and as bits of a number
+        # the chunks that are in it.
+        self._counts = np.zeros((len(CANDIDATES), len(body.part_names)), dtype=np.int64)
         self._why: Counter[str] = Counter()
         self._counted = 0
         self.variant: str | None = None
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps: one for each part and way of modelling it that these chirps have."""
+        """Echoes at these chirps: one for each part and each candidate that it goes by."""
         chirps = np.asarray(chirps, dtype=np.int64)
         at = chirp_poses(self._radar, self._body, chirps)
         weights, cut = self._weights(chirps)
         found = []
-        for way in range(ANALYTIC, len(WAYS)):
-            parts = np.flatnonzero((weights[way] > 0).any(axis=0))
+        for candidate in range(ANALYTIC, len(CANDIDATES)):
+            parts = np.flatnonzero((weights[candidate] > 0).any(axis=0))
             if len(parts):
-                found.append((self._by(way, at, chirps, parts, cut), weights[way][:, parts]))
+                found.append(
+                    (self._by(candidate, at, chirps, parts, cut), weights[candidate][:, parts])
+                )
         if not found:
-            # Nobody is seen: one part stands for all, with nothing to return.
+            # Nobody is seen: one part represents all, with nothing to return.
             found.append(
                 (self._by(ANALYTIC, at, chirps, np.array([0]), cut), np.zeros((len(chirps), 1)))
             )
         frequency = max((group.frequency for group, _ in found), key=len)
         part = np.concatenate([group.part for group, _ in found])
-        # Filled in place: to make each group complex and join them afterwards would cost more than the closed forms.
+        # Filled in place: to make each group complex and join them afterwards would cost more than
+        # the closed forms.
         length = np.empty((*found[0][0].length.shape[:2], len(part)))
         amplitude = np.empty((len(frequency), *length.shape), dtype=np.complex128)
         begin = 0
@@ -164,54 +171,54 @@ class Auto(BuiltInModel):
         )
 
     def account(self) -> dict[str, Any]:
-        """What was modelled how, and why, as shares of part and time so far: ``ways``, ``parts`` and ``why``, for JSON."""
+        """What was modelled how, and why, as fractions of part and time so far, for JSON."""
         names = self._body.part_names
-        whole = self._ways.sum()
+        whole = self._counts.sum()
         return {
             "ways": {
                 name: float(count / whole)
-                for name, count in zip(WAYS, self._ways.sum(axis=1), strict=True)
+                for name, count in zip(CANDIDATES, self._counts.sum(axis=1), strict=True)
             },
             "why": {reason: float(count / whole) for reason, count in self._why.items()},
             "parts": {
                 part: {
-                    name: float(share)
-                    for name, share in zip(WAYS, counts / counts.sum(), strict=True)
+                    name: float(fraction)
+                    for name, fraction in zip(CANDIDATES, counts / counts.sum(), strict=True)
                 }
-                for part, counts in zip(names, self._ways.T, strict=True)
+                for part, counts in zip(names, self._counts.T, strict=True)
             },
         }
 
-    def _count(self, chosen: NDArray[np.int64], told: Forecast) -> None:
-        """Add some instants, chosen (time, part), to what `account` tells."""
-        # Of what the next cheaper way leaves wrong, is most due to curvature?
+    def _count(self, chosen: NDArray[np.int64], budget: ErrorBudget) -> None:
+        """Add some instants, chosen (time, part), to what `account` returns."""
+        # Of what the next cheaper candidate leaves wrong, is most due to curvature?
         cheaper = np.maximum(chosen[:, None] - 1, ANALYTIC)
         wrong, optics = (
             np.take_along_axis(errors, cheaper, axis=1)[:, 0]
-            for errors in (told.wrong, told.optics)
+            for errors in (budget.wrong, budget.optics)
         )
         curved = optics > wrong
         higher = chosen > ANALYTIC
         for reason, where in {
             "left out: hidden": chosen == LEFT_OUT,
             "analytic: enough": chosen == ANALYTIC,
-            "higher: hidden": higher & told.hidden,
-            "higher: cut by an edge": higher & ~told.hidden & ~told.in_view,
-            "higher: in full view, curvature": higher & told.in_view & curved,
-            "higher: in full view, near field": higher & told.in_view & ~curved,
+            "higher: hidden": higher & budget.hidden,
+            "higher: cut by an edge": higher & ~budget.hidden & ~budget.in_view,
+            "higher: in full view, curvature": higher & budget.in_view & curved,
+            "higher: in full view, near field": higher & budget.in_view & ~curved,
         }.items():
             self._why[reason] += int(where.sum())
-        self._ways += (chosen == np.arange(len(WAYS))[:, None, None]).sum(axis=1)
+        self._counts += (chosen == np.arange(len(CANDIDATES))[:, None, None]).sum(axis=1)
 
     def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Weights (way, chirp, part), which sum to 1 or, left out, to less; and parts that others cut there (part,)."""
+        """Weights (candidate, chirp, part), which sum to at most 1, and parts that others cut (part,)."""
         parts = np.arange(len(self._body.part_names))
         interval = chirps // self._step
-        share = (chirps - interval * self._step) / self._step
-        share = smoothstep(share)[:, None]
-        weights = np.zeros((len(WAYS), len(chirps), len(parts)))
+        fraction = (chirps - interval * self._step) / self._step
+        fraction = smoothstep(fraction)[:, None]
+        weights = np.zeros((len(CANDIDATES), len(chirps), len(parts)))
         cut = np.zeros(len(parts), dtype=bool)
-        for end, weight in ((interval, 1 - share), (interval + 1, share)):
+        for end, weight in ((interval, 1 - fraction), (interval + 1, fraction)):
             for instant in np.unique(end):
                 planned, row = self._plan(int(instant))
                 here = np.flatnonzero(end == instant)
@@ -236,28 +243,27 @@ class Auto(BuiltInModel):
         instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
         times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
         poses = self._body.at(np.minimum(times, self._body.duration_s))
-        told = forecast(self._radar, poses, self._tracer, spreading=self._spreading)
-        chosen = choose(told, self._power_share, self._complex_share)[1:-1]
-        told = Forecast(**{name: array[1:-1] for name, array in told._asdict().items()})
+        budget = error_budget(self._radar, poses, self._tracer, spreading=self._spreading)
+        chosen = select_candidates(budget, self._power_fraction, self._complex_fraction)[1:-1]
+        budget = ErrorBudget(**{name: array[1:-1] for name, array in budget._asdict().items()})
         # Later ones are looked at again in the next pass, and are not to count twice.
         if not self._counted >> chunk & 1:
             self._counted |= 1 << chunk
-            self._count(chosen, told)
+            self._count(chosen, budget)
         # Copies, which do not hold what they are cut from.
-        return Planned(chosen.copy(), told.in_view.copy())
+        return Planned(chosen.copy(), budget.in_view.copy())
 
     def _by(
         self,
-        way: int,
+        candidate: int,
         at: ChirpPoses,
         chirps: NDArray[np.int64],
         parts: NDArray[np.int64],
         cut: NDArray[np.bool_],
     ) -> _Group:
-        if way >= PHYSICAL_OPTICS:
-            echoes = (self._physical_optics if way == PHYSICAL_OPTICS else self._reference).echoes(
-                chirps
-            )
+        if candidate >= PHYSICAL_OPTICS:
+            facets = candidate == PHYSICAL_OPTICS
+            echoes = (self._physical_optics if facets else self._reference).echoes(chirps)
             return _Group(
                 echoes.length[..., parts],
                 echoes.amplitude[..., parts],
@@ -265,23 +271,24 @@ class Auto(BuiltInModel):
                 echoes.part[parts],
                 echoes.bounces[parts],
             )
-        poses = (at.tx, at.rx, at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts])
+        bodies = at.centres[:, parts], at.frames[:, parts], at.semi_axes[parts]
+        geometry = Geometry(at.tx, at.rx, *bodies)
         frequency = np.array([self._radar.centre_frequency_hz])
         values: NDArray[np.inexact]
-        if way == ANALYTIC:
-            length, values = far_field_echo(Geometry(*poses), spreading=self._spreading)
+        if candidate == ANALYTIC:
+            length, values = far_field_echo(geometry, spreading=self._spreading)
         else:
             start = self._starts.at(chirps, parts)
             length, values, _ = solve_specular_points(
-                Geometry(*poses),
+                geometry,
                 start=start,
                 polarization=self._radar.polarization,
                 spreading=self._spreading,
             )
-            if way == SPECULAR and cut[parts].any():
+            if candidate == SPECULAR and cut[parts].any():
                 values *= self._specular_points.at(chirps, parts)[0]
         values = values[None]
-        if way == FRESNEL and cut[parts].any():
+        if candidate == FRESNEL and cut[parts].any():
             frequency = zone_nodes(self._radar)
             values = values * self._zones.at(chirps, parts).conj()
         return _Group(length, values, frequency, parts, np.ones(len(parts), dtype=np.int64))
@@ -307,25 +314,20 @@ class Auto(BuiltInModel):
 
     @cached_property
     def _physical_optics(self) -> EchoModel:
-        return self._traced(
-            PhysicalOptics(
-                self._radar, self._body, variant=self._variant, spreading=self._spreading
-            )
-        )
+        return self._traced(PhysicalOptics)
 
     @cached_property
     def _reference(self) -> EchoModel:
-        return self._traced(
-            Reference(self._radar, self._body, variant=self._variant, spreading=self._spreading)
-        )
+        return self._traced(Reference)
 
-    def _traced(self, model: EchoModel) -> EchoModel:
+    def _traced(self, kind: type[PhysicalOptics | Reference]) -> EchoModel:
+        model = kind(self._radar, self._body, variant=self._variant, spreading=self._spreading)
         self.variant = model.variant
         return model
 
 
 def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:
-    """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through their own nodes."""
+    """Amplitudes (node, chirp, rx, echo) at other frequencies, by a polynomial through their nodes."""
     if len(echoes.frequency) == 1:
         return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
     if np.array_equal(echoes.frequency, frequency):

@@ -21,18 +21,18 @@ from rtradar.motion import place
 from rtradar.radar import Radar
 from rtradar.scatter import build_model
 from rtradar.scatter.models.auto import Auto
-from rtradar.scatter.models.auto_errors import (
+from rtradar.scatter.models.auto_selection import (
     ANALYTIC,
+    CANDIDATES,
     FRESNEL,
     LEFT_OUT,
     PHYSICAL_OPTICS,
     REFERENCE,
     SPECULAR,
-    WAYS,
-    Forecast,
-    forecast,
+    ErrorBudget,
+    error_budget,
+    select_candidates,
 )
-from rtradar.scatter.models.auto_plan import choose
 from rtradar.trace.backends.backend import Backend, select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -49,41 +49,41 @@ def two_spheres(aside: float) -> Poses:
     return Poses(centres, np.broadcast_to(np.eye(3), (1, 2, 3, 3)), SPHERE)
 
 
-def look(radar: Radar, poses: Poses) -> Forecast:
-    return forecast(radar, poses, BodyTracer(use(select("cpu")), poses.semi_axes))
+def look(radar: Radar, poses: Poses) -> ErrorBudget:
+    return error_budget(radar, poses, BodyTracer(use(select("cpu")), poses.semi_axes))
 
 
-def test_a_sphere_behind_another_is_told_to_be_hidden_and_the_other_in_view() -> None:
-    told = look(RADAR, two_spheres(0.0))
-    assert told.hidden.tolist() == [[True, False]]
-    assert told.in_view.tolist() == [[False, True]]
-    assert told.true[0, 0] == 0
-    assert told.power[0, SPECULAR, 0] == 0
-    assert told.power[0, ANALYTIC, 0] > 0
+def test_a_sphere_behind_another_counts_as_hidden_and_the_other_in_view() -> None:
+    budget = look(RADAR, two_spheres(0.0))
+    assert budget.hidden.tolist() == [[True, False]]
+    assert budget.in_view.tolist() == [[False, True]]
+    assert budget.true[0, 0] == 0
+    assert budget.power[0, SPECULAR, 0] == 0
+    assert budget.power[0, ANALYTIC, 0] > 0
 
 
-def test_a_sphere_beside_another_is_told_to_be_in_view() -> None:
-    told = look(RADAR, two_spheres(1.0))
-    assert told.in_view.all()
+def test_a_sphere_beside_another_counts_as_in_view() -> None:
+    budget = look(RADAR, two_spheres(1.0))
+    assert budget.in_view.all()
     # In full view only the near field is left: pi a^2 / (R1 R2)^2 with R to the specular point, by
     # both ways.
     distance = np.linalg.norm(np.asarray(RADAR.position_m)) - 0.2
-    assert told.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
-    assert told.true[0, 0] == pytest.approx(
+    assert budget.power[0, ANALYTIC, 0] == pytest.approx(np.pi * 0.2**2 / distance**4, rel=0.02)
+    assert budget.true[0, 0] == pytest.approx(
         np.pi * 0.2**2 / (distance**2 * (distance + 0.2) ** 2), rel=0.02
     )
-    assert told.wrong[0, SPECULAR, 0] == 0
+    assert budget.wrong[0, SPECULAR, 0] == 0
 
 
 def test_a_part_counts_by_what_the_antennas_let_through_of_it() -> None:
     poses = two_spheres(1.0)
     beam = dataclasses.replace(RADAR, tx_antenna=Antenna(pattern="cosine", exponent=9.0))
-    told, plain = (look(radar, poses) for radar in (beam, RADAR))
+    budget, plain = (look(radar, poses) for radar in (beam, RADAR))
     way = poses.centres[0] - np.asarray(RADAR.position_m)
     # By the directions of the centres; those of the specular points lie up to a degree beside them.
     expected = (way[:, 0] / np.linalg.norm(way, axis=1)) ** 9
     for name in ("true", "wrong", "optics", "power"):
-        before, after = getattr(plain, name)[0], getattr(told, name)[0]
+        before, after = getattr(plain, name)[0], getattr(budget, name)[0]
         np.testing.assert_allclose(after, before * expected, rtol=0.05, err_msg=name)
 
 
@@ -94,23 +94,23 @@ def test_half_behind_an_edge_a_quarter_of_the_power_is_left_and_specular_errs_by
     # sin of the angle between both is that of the edge, 0.2 / distance of the nearer centre: a
     # right triangle.
     near = distance - 1.0
-    told = look(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
+    budget = look(RADAR, two_spheres(0.2 * near / np.sqrt(near**2 - 0.2**2)))
     free = np.pi * 0.2**2 / ((distance - 0.2) ** 2 * distance**2)
     # A curved edge leaves a little more or less than the straight one's half of the field.
-    assert np.sqrt(told.true[0, 0] / free) == pytest.approx(0.5, abs=0.1)
-    assert np.sqrt(told.wrong[0, SPECULAR, 0] / free) == pytest.approx(0.5, abs=0.1)
-    assert told.wrong[0, FRESNEL, 0] < 0.01 * free
+    assert np.sqrt(budget.true[0, 0] / free) == pytest.approx(0.5, abs=0.1)
+    assert np.sqrt(budget.wrong[0, SPECULAR, 0] / free) == pytest.approx(0.5, abs=0.1)
+    assert budget.wrong[0, FRESNEL, 0] < 0.01 * free
 
 
-def forecast_of(
+def budget_of(
     wrong: list[list[float]], true: list[float], hidden: list[bool] | None = None
-) -> Forecast:
+) -> ErrorBudget:
     """One instant: ``wrong`` a part, without reference; powers are off by nothing."""
-    squares = np.zeros((1, len(WAYS), len(true)))
+    squares = np.zeros((1, len(CANDIDATES), len(true)))
     for part, row in enumerate(wrong):
         squares[0, : len(row), part] = row
-    power = np.repeat(np.array(true)[None, None], len(WAYS), axis=1)
-    return Forecast(
+    power = np.repeat(np.array(true)[None, None], len(CANDIDATES), axis=1)
+    return ErrorBudget(
         true=np.array([true]),
         power=power,
         wrong=squares,
@@ -122,59 +122,59 @@ def forecast_of(
 
 def test_the_cheapest_way_that_will_do_is_chosen_for_each_part() -> None:
     #                        left out, analytic, specular, fresnel, physical-optics
-    told = forecast_of(
+    budget = budget_of(
         [[1, 1e-6, 1e-6, 1e-6, 1e-6], [1, 0.5, 1e-6, 1e-6, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]],
         [1, 1, 1],
     )
-    assert choose(told, 10.0, 0.1).tolist() == [[ANALYTIC, SPECULAR, FRESNEL]]
-    assert choose(told, 10.0, 1.0).tolist() == [[ANALYTIC, ANALYTIC, ANALYTIC]]
+    assert select_candidates(budget, 10.0, 0.1).tolist() == [[ANALYTIC, SPECULAR, FRESNEL]]
+    assert select_candidates(budget, 10.0, 1.0).tolist() == [[ANALYTIC, ANALYTIC, ANALYTIC]]
 
 
 def test_what_needs_facets_brings_the_edges_along_and_nothing_less_than_all_is_the_reference() -> (
     None
 ):
-    told = forecast_of([[1, 0.5, 0.5, 0.5, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1])
-    assert choose(told, 10.0, 0.1).tolist() == [[PHYSICAL_OPTICS, PHYSICAL_OPTICS]]
-    told = forecast_of([[1, 0.5, 0.5, 0.5, 0.5]], [1])
-    assert choose(told, 10.0, 0.1).tolist() == [[REFERENCE]]
+    budget = budget_of([[1, 0.5, 0.5, 0.5, 1e-6], [1, 0.5, 0.5, 1e-6, 1e-6]], [1, 1])
+    assert select_candidates(budget, 10.0, 0.1).tolist() == [[PHYSICAL_OPTICS, PHYSICAL_OPTICS]]
+    budget = budget_of([[1, 0.5, 0.5, 0.5, 0.5]], [1])
+    assert select_candidates(budget, 10.0, 0.1).tolist() == [[REFERENCE]]
 
 
 def test_only_what_is_hidden_is_left_out_and_not_where_it_is_seen_next() -> None:
-    told = forecast_of([[1e-6, 1e-6], [1e-6, 1e-6]], [1, 1], [True, False])
-    assert choose(told, 10.0, None).tolist() == [[LEFT_OUT, ANALYTIC]]
-    seen = told._replace(hidden=np.array([[False, False]]))
-    both = Forecast(
+    budget = budget_of([[1e-6, 1e-6], [1e-6, 1e-6]], [1, 1], [True, False])
+    assert select_candidates(budget, 10.0, None).tolist() == [[LEFT_OUT, ANALYTIC]]
+    seen = budget._replace(hidden=np.array([[False, False]]))
+    both = ErrorBudget(
         *(
             np.concatenate([np.asarray(a), np.asarray(a), np.asarray(b)])
-            for a, b in zip(told, seen, strict=True)
+            for a, b in zip(budget, seen, strict=True)
         )
     )
-    assert choose(both, 10.0, None)[:, 0].tolist() == [LEFT_OUT, ANALYTIC, ANALYTIC]
+    assert select_candidates(both, 10.0, None)[:, 0].tolist() == [LEFT_OUT, ANALYTIC, ANALYTIC]
 
 
 @settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.floats(0.001, 0.5), st.floats(0.001, 0.5))
-def test_what_is_chosen_keeps_the_tolerances_that_were_forecast(
-    seed: int, power_share: float, complex_share: float
+def test_what_is_chosen_keeps_the_tolerances_that_were_error_budget(
+    seed: int, power_fraction: float, complex_fraction: float
 ) -> None:
     rng = np.random.default_rng(seed)
     true = rng.random((5, 6))
     scale = np.array([1, 0.3, 0.1, 0.03, 0.01, 0])[:, None]
-    told = Forecast(
+    budget = ErrorBudget(
         true=true,
-        power=true[:, None] * (1 + scale * rng.normal(size=(5, len(WAYS), 6))),
-        wrong=true[:, None] * (scale * rng.random((5, len(WAYS), 6))) ** 2,
-        optics=np.zeros((5, len(WAYS), 6)),
+        power=true[:, None] * (1 + scale * rng.normal(size=(5, len(CANDIDATES), 6))),
+        wrong=true[:, None] * (scale * rng.random((5, len(CANDIDATES), 6))) ** 2,
+        optics=np.zeros((5, len(CANDIDATES), 6)),
         in_view=np.zeros((5, 6), dtype=bool),
         hidden=rng.random((5, 6)) < 0.1,
     )
-    chosen = choose(told, power_share, complex_share)[:, None]
+    chosen = select_candidates(budget, power_fraction, complex_fraction)[:, None]
     whole = true.sum(axis=1)
-    wrong = np.take_along_axis(told.wrong, chosen, axis=1).sum(axis=(1, 2))
-    power = np.take_along_axis(told.power, chosen, axis=1).sum(axis=(1, 2))
-    assert (wrong <= complex_share**2 * whole * (1 + 1e-9)).all()
-    assert (np.abs(power - whole) <= power_share * whole * (1 + 1e-9)).all()
-    assert (told.hidden | (chosen[:, 0] > LEFT_OUT)).all()
+    wrong = np.take_along_axis(budget.wrong, chosen, axis=1).sum(axis=(1, 2))
+    power = np.take_along_axis(budget.power, chosen, axis=1).sum(axis=(1, 2))
+    assert (wrong <= complex_fraction**2 * whole * (1 + 1e-9)).all()
+    assert (np.abs(power - whole) <= power_fraction * whole * (1 + 1e-9)).all()
+    assert (budget.hidden | (chosen[:, 0] > LEFT_OUT)).all()
 
 
 @dataclass(frozen=True)
