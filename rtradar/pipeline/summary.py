@@ -14,7 +14,7 @@ import numpy as np
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.processing import Clouds
 from rtradar.pipeline.timing import peak_memory_mb
-from rtradar.scatter import Accountable
+from rtradar.scatter import account_of
 
 _PACKAGES = (
     *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba"),
@@ -73,8 +73,8 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
             "noise_power_w": capture.noise.power * scale,
         }
     summary["limits"] = _limits(capture)
-    if isinstance(capture.model, Accountable):
-        summary["modelled"] = capture.model.account()
+    if (modelled := account_of(capture.model)) is not None:
+        summary["modelled"] = modelled
     if capture.inside:
         summary["room"] = capture.inside.account
     return summary

@@ -1,13 +1,13 @@
 """Echo models: from a posed body to `Echoes`."""
 
-from rtradar.scatter.common.poses import Accountable, EchoModel, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import EchoModel, account_of, chirp_poses, one_echo_a_part
 from rtradar.scatter.echo_models import MODELS, build_model, register_model, takes_backend
 from rtradar.scatter.scattering_length import scattering_length
 
 __all__ = [
     "MODELS",
-    "Accountable",
     "EchoModel",
+    "account_of",
     "build_model",
     "chirp_poses",
     "one_echo_a_part",

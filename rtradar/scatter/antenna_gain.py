@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import Accountable, ChirpPoses, EchoModel, chirp_poses
+from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 
 
 def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
@@ -61,13 +60,13 @@ def is_shaped(antenna: Antenna | None) -> bool:
 class _ThroughAntennas:
     """Echoes of several bounces are given the directions of the part they bounce off last."""
 
-    account: Callable[[], dict[str, Any]]
-
     def __init__(self, model: EchoModel, radar: Radar, body: Body) -> None:
         self._model, self._radar, self._body = model, radar, body
         self.variant = model.variant
-        if isinstance(model, Accountable):
-            self.account = model.account
+
+    def account(self) -> dict[str, Any] | None:
+        """Report what the model did."""
+        return account_of(self._model)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

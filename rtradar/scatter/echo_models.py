@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 import json
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scatter.antenna_gain import is_shaped, through_antennas
-from rtradar.scatter.common.poses import Accountable, EchoModel
+from rtradar.scatter.common.poses import EchoModel, account_of
 from rtradar.scene import Scene
 from rtradar.system.registry import Registry
 
@@ -154,24 +153,21 @@ def takes_backend(fidelity: str) -> bool:
 class _Checked:
     """A model of another package, which must give what the rest relies on."""
 
-    account: Callable[[], dict[str, Any]]
-
     def __init__(self, name: str, model: EchoModel, radar: Radar, body: Body) -> None:
         self._name, self._model, self._radar, self._parts = name, model, radar, len(body.part_names)
         with MODELS.guarded(name):
             self.variant: str | None = getattr(model, "variant", None)
-            if isinstance(model, Accountable):
-                self.account = self._account
         if not isinstance(self.variant, str | None):
             raise MODELS.refuse(
                 name, f"has a variant that is a {type(self.variant).__name__}, not a string or None"
             )
 
-    def _account(self) -> dict[str, Any]:
+    def account(self) -> dict[str, Any] | None:
+        """Report what the model did, if it can be written."""
         with MODELS.guarded(self._name):
-            told: dict[str, Any] = self._model.account()  # type: ignore[attr-defined]
-            json.dumps(told, allow_nan=False)  # as it will be written
-        return told
+            found = account_of(self._model)
+            json.dumps(found, allow_nan=False)
+        return found
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""

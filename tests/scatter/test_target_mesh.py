@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import rtradar as rt
 from rtradar.errors import InputError
-from rtradar.scatter.scattering_length import _HOMES
+from rtradar.scatter.echo_models import models_that
 
 WITH_MESHES = ("physical-optics", "reference", "rays")
 WITHOUT = ("analytic", "specular", "fresnel")
@@ -77,7 +77,7 @@ BAD: dict[str, tuple[Callable[[], Any], str]] = {
 
 
 def test_every_model_is_told_of() -> None:
-    assert {*WITH_MESHES, *WITHOUT} == set(_HOMES)
+    assert {*WITH_MESHES, *WITHOUT} == set(models_that("scattering"))
 
 
 @pytest.mark.parametrize("pairs", [1, 0])

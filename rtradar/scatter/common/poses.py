@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, NamedTuple, Protocol, runtime_checkable
+from collections.abc import Callable
+from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,10 @@ class BuiltInModel:
     relative_cost: ClassVar[float | None] = None
     """Rough time per part and chirp over that of `analytic`; None if it depends on the pose."""
 
+    scattering: ClassVar[Callable[..., NDArray[np.complex128]] | None] = None
+    """Scattering length of one target (target, tx, rx, frequency, polarization, options of the
+    model), which `scattering_length` calls; None where there is none."""
+
 
 class EchoModel(Protocol):
     """An echo model of a body seen by a radar, for any chirps of the capture.
@@ -54,13 +59,21 @@ class EchoModel(Protocol):
         ...
 
 
-@runtime_checkable
-class Accountable(Protocol):
-    """A model that can report, for ``summary.json``, which of its choices it made and why."""
+def account_of(model: EchoModel) -> dict[str, Any] | None:
+    """Report what a model has modelled how so far.
 
-    def account(self) -> dict[str, Any]:
-        """Report what was modelled how so far, ready for JSON."""
-        ...
+    Parameters
+    ----------
+    model : EchoModel
+        Model, which may have a method ``account()`` without arguments.
+
+    Returns
+    -------
+    dict or None
+        What the method returns, ready for JSON; None where there is none.
+    """
+    account: Callable[[], dict[str, Any] | None] | None = getattr(model, "account", None)
+    return None if account is None else account()
 
 
 class ChirpPoses(NamedTuple):

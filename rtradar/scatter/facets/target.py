@@ -29,7 +29,7 @@ from rtradar.scatter.facets.surfaces import (
     subdivisions_for,
 )
 from rtradar.scatter.ray_tubes.tubes import in_four
-from rtradar.scatter.target_mesh import target_mesh
+from rtradar.scatter.target import target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import MeshSurfaces

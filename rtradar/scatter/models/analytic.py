@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
+from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
 from rtradar.kernels.scatter.far_field import far_field
 from rtradar.kernels.scatter.specular_point import Geometry
@@ -13,6 +15,7 @@ from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.common.polarization import Surface
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.target import sum_of_echoes, target_geometry
 
 
 def far_field_echo(
@@ -95,6 +98,19 @@ class Analytic(BuiltInModel):
     traces = False
     supports_rooms = True
     relative_cost = 1.0
+
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target, alike in both polarisations."""
+        at = target_geometry(target, tx, rx)
+        return sum_of_echoes(*far_field_echo(at), at, frequency)
+
     tracer = None
     image_echo = staticmethod(far_field_echo)
 
@@ -131,6 +147,7 @@ class AnalyticPaper(Analytic):
     """`analytic-paper`: ranges of centres and plane waves over the array, as in the paper."""
 
     supports_rooms = False
+    scattering = None  # type: ignore[assignment]
 
     def conductor_echo(
         self,

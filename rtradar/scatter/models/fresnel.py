@@ -30,71 +30,6 @@ _WIDE = 0.1
 """Bandwidth over centre frequency above which fractions differ over the sweep."""
 
 
-class Fresnel(BuiltInModel):
-    """`fresnel`: lengths and returns of `specular`, times the visible fraction V of Fresnel zones.
-
-    Mitsuba decides for each antenna which corners of the zones' cells it sees.
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar that sees the body.
-    body : Body
-        Body whose parts return echoes.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
-    shadow_rays : int
-        Points on each part to which rays are traced from each node of the array, 8 to 4096.
-
-    Raises
-    ------
-    InputError
-        Where ``shadow_rays`` is out of range.
-    """
-
-    relative_cost = 6.0
-
-    def __init__(
-        self,
-        radar: Radar,
-        body: Body,
-        *,
-        variant: str = "auto",
-        spreading: bool = True,
-        shadow_rays: int = SHADOW_RAYS,
-    ) -> None:
-        bands_of(shadow_rays)  # refuses what is out of range
-        self._radar, self._body, self._spreading = radar, body, spreading
-        backend = select(variant)
-        self.variant: str | None = backend.kind
-        self._frequency = zone_nodes(radar)
-        self._starts = StartPoints(radar, body)
-        tracer = BodyTracer(use(backend), body.semi_axes)
-        self.fractions = ZoneFractions(
-            radar, body, self._frequency, tracer, shadow_rays=shadow_rays
-        )
-
-    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps."""
-        at = chirp_poses(self._radar, self._body, chirps)
-        start, fractions = self._starts.at(chirps), self.fractions.at(chirps)
-        length, amplitude, _ = solve_specular_points(
-            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
-        )
-        parts = length.shape[2]
-        return Echoes(
-            length=length,
-            # The amplitude of an echo is the conjugate of the scattering length.
-            amplitude=amplitude * fractions.conj(),
-            frequency=self._frequency,
-            tx=at.tx_index,
-            part=np.arange(parts),
-            bounces=np.ones(parts, dtype=np.int64),
-        )
-
-
 def zone_nodes(radar: Radar) -> NDArray[np.float64]:
     """Frequencies (node,) at which fractions are computed [Hz]: Chebyshev nodes over the sweep.
 
@@ -165,3 +100,69 @@ def fresnel_scattering(
     phase = np.exp(-1j * wavenumber[:, None] * (length[:, 0] - (ranges[0] + ranges[1])[:, None]))
     field = (amplitude[:, 0] * fractions.reshape(pairs, parts) * phase).sum(axis=1)
     return np.asarray(field * ranges[0] * ranges[1])
+
+
+class Fresnel(BuiltInModel):
+    """`fresnel`: lengths and returns of `specular`, times the visible fraction V of Fresnel zones.
+
+    Mitsuba decides for each antenna which corners of the zones' cells it sees.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar that sees the body.
+    body : Body
+        Body whose parts return echoes.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
+    shadow_rays : int
+        Points on each part to which rays are traced from each node of the array, 8 to 4096.
+
+    Raises
+    ------
+    InputError
+        Where ``shadow_rays`` is out of range.
+    """
+
+    relative_cost = 6.0
+    scattering = staticmethod(fresnel_scattering)
+
+    def __init__(
+        self,
+        radar: Radar,
+        body: Body,
+        *,
+        variant: str = "auto",
+        spreading: bool = True,
+        shadow_rays: int = SHADOW_RAYS,
+    ) -> None:
+        bands_of(shadow_rays)  # refuses what is out of range
+        self._radar, self._body, self._spreading = radar, body, spreading
+        backend = select(variant)
+        self.variant: str | None = backend.kind
+        self._frequency = zone_nodes(radar)
+        self._starts = StartPoints(radar, body)
+        tracer = BodyTracer(use(backend), body.semi_axes)
+        self.fractions = ZoneFractions(
+            radar, body, self._frequency, tracer, shadow_rays=shadow_rays
+        )
+
+    def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
+        """Echoes at these chirps."""
+        at = chirp_poses(self._radar, self._body, chirps)
+        start, fractions = self._starts.at(chirps), self.fractions.at(chirps)
+        length, amplitude, _ = solve_specular_points(
+            at, start=start, polarization=self._radar.polarization, spreading=self._spreading
+        )
+        parts = length.shape[2]
+        return Echoes(
+            length=length,
+            # The amplitude of an echo is the conjugate of the scattering length.
+            amplitude=amplitude * fractions.conj(),
+            frequency=self._frequency,
+            tx=at.tx_index,
+            part=np.arange(parts),
+            bounces=np.ones(parts, dtype=np.int64),
+        )

@@ -19,6 +19,7 @@ from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, whole_echo
+from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _COARSE, _FINE = (2, 1), (6, 2)
@@ -66,6 +67,7 @@ class PhysicalOptics(BuiltInModel):
     """
 
     accepts_meshes = True
+    scattering = staticmethod(facet_scattering)
     relative_cost = 12.0
 
     def __init__(

@@ -21,7 +21,7 @@ from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
-from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options
+from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.backends.backend import select, use
@@ -69,6 +69,7 @@ class Rays(BuiltInModel):
     """
 
     accepts_meshes = True
+    scattering = staticmethod(rays_scattering)
     relative_cost = 100.0
 
     def __init__(

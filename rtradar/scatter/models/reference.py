@@ -10,6 +10,7 @@ from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
 from rtradar.scatter.facets.body import FacetBody
+from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
@@ -38,6 +39,7 @@ class Reference(BuiltInModel):
     """
 
     accepts_meshes = True
+    scattering = staticmethod(facet_scattering)
     relative_cost = 200.0
 
     def __init__(

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body import Body
+from rtradar.body import Body, Ellipsoids
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
 from rtradar.scatter.common.polarization import Surface
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
 from rtradar.scatter.specular_point.solver import solve_specular_points
-from rtradar.scatter.specular_point.visibility import SpecularVisibility
+from rtradar.scatter.specular_point.visibility import SpecularVisibility, unobstructed
+from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -41,6 +44,25 @@ class Specular(BuiltInModel):
     supports_rooms = True
     image_echo = None
     relative_cost = 1.5
+
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+        variant: str = "auto",
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target."""
+        at = target_geometry(target, tx, rx)
+        length, amplitude, points = solve_specular_points(
+            at, polarization=polarization, points=True
+        )
+        tracer = BodyTracer(use(select(variant)), target.semi_axes)
+        tracer.pose(target.centres, target.frames)
+        visible = unobstructed(tracer, at.tx, at.rx, points)
+        return sum_of_echoes(length, amplitude * visible, at, frequency)
 
     def __init__(
         self,

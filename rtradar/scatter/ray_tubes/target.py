@@ -13,7 +13,7 @@ from rtradar.errors import InputError
 from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Grid, Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid, PosedGrid
-from rtradar.scatter.target_mesh import target_mesh
+from rtradar.scatter.target import target_mesh
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import BodySurfaces, MeshSurfaces, Surfaces
 

@@ -1,4 +1,4 @@
-"""The one check of meshes whose scattering length is asked for, whatever the model.
+"""Targets of `scattering_length`: the geometry of ellipsoids, sums of echoes, and checked meshes.
 
 A mesh of one's own is a `trimesh.Trimesh` in metres, given as the target of `scattering_length`; in
 a room it is furniture (`rtradar.scene.objects`).
@@ -9,20 +9,46 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from rtradar.body import Ellipsoids
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scene.mesh_files import Triangles, checked_triangles
 
 _ON_SURFACE = 1e-9
-"""Of the size of a mesh: an antenna no farther from its surface stands on it."""
+"""Fraction of a mesh's size: an antenna no farther from the surface is on it."""
+
+
+def target_geometry(
+    target: Ellipsoids, tx: NDArray[np.float64], rx: NDArray[np.float64]
+) -> Geometry:
+    """Ellipsoids with the antennas of each pair (n, 3) in turn, as one chirp and one receiver each."""
+    centres, frames = (
+        np.broadcast_to(array, (len(tx), *array.shape)) for array in (target.centres, target.frames)
+    )
+    return Geometry(tx, rx[:, None], centres, frames, target.semi_axes)
+
+
+def sum_of_echoes(
+    length: NDArray[np.float64],
+    amplitude: NDArray[np.generic],
+    at: Geometry,
+    frequency: NDArray[np.float64],
+) -> NDArray[np.complex128]:
+    """Field of each pair, relative to the path over the origin, of echoes (pair, 1, part) with 1 / (R1 R2)."""
+    range_tx, range_rx = np.linalg.norm(at.tx, axis=1), np.linalg.norm(at.rx[:, 0], axis=1)
+    excess = length[:, 0] - (range_tx + range_rx)[:, None]
+    phase = np.exp(-2j * np.pi * frequency[:, None] / SPEED_OF_LIGHT_MPS * excess)
+    return np.asarray((amplitude[:, 0] * phase).sum(axis=1) * range_tx * range_rx)
 
 
 def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]) -> Triangles:
-    """The triangles of a target that is no `Ellipsoids`.
+    """Triangles of a target that is no `Ellipsoids`.
 
     Parameters
     ----------
     target : trimesh.Trimesh
-        [m].
+        Mesh [m].
     tx, rx : (n, 3) float64
         Antennas, in its coordinates [m].
 
@@ -39,7 +65,8 @@ def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]
 
     if not isinstance(target, trimesh.Trimesh):
         raise InputError(
-            f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or trimesh.Trimesh"
+            f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or "
+            "trimesh.Trimesh"
         )
     vertices = np.asarray(target.vertices, dtype=np.float64)
     mesh = checked_triangles(
@@ -55,6 +82,7 @@ def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]
             if mesh.distance_m(antennas[index]) <= nearest:
                 where = "inside the mesh or on it" if mesh.closed else "on the mesh"
                 raise InputError(
-                    f"scattering_length: {name}[{index}] is {where}; antennas must stand outside the target"
+                    f"scattering_length: {name}[{index}] is {where}; antennas must stand outside "
+                    "the target"
                 )
     return mesh
