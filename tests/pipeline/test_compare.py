@@ -83,7 +83,8 @@ def test_all_have_the_noise_of_the_first(compared: rt.Comparison) -> None:
         for name in MODELS
     ]
     assert power == [compared.summary["noise_power_m2"]] * 3
-    # Where no echo is the maps are the same but for side lobes of the echoes, some 60 dB below them.
+    # Where no echo is the maps are the same but for side lobes of the echoes, some 60 dB below
+    # them.
     maps = []
     for name in MODELS:
         with h5py.File(compared.out / name / "maps.h5") as file:

@@ -1,4 +1,4 @@
-"""`rtradar view` of a folder that is damaged, or a stranger's: one line of our own, before anything is drawn."""
+"""`rtradar view` of a folder that is damaged or malicious: one line, before anything is drawn."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ def folder(tmp_path: Path) -> Path:
 
 def test_the_folder_is_good(folder: Path) -> None:
     linked = load_run_view(folder)
-    # Each point of the cloud has the power of the cell that it is nearest to, looked for here one by one.
+    # Each point of the cloud has the power of the cell that it is nearest to, looked for here one
+    # by one.
     for (time, distance, velocity), power_db in zip(
         CLOUD["points"], linked.rdt_power_db, strict=True
     ):

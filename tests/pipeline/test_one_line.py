@@ -1,4 +1,4 @@
-"""A radar whose antennas lie on one line: no file, picture or page tells of a coordinate that it cannot measure."""
+"""A radar with antennas on one line reports no coordinate that it cannot measure, anywhere."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ LINES = {
 def made(
     request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
 ) -> tuple[str, Path, dict[str, Figure]]:
-    """The line, the folder of a run, and the figures that were drawn for it, by the name of their file."""
+    """The line, the folder of a run, and the figures drawn for it by the names of their files."""
     figures: dict[str, Figure] = {}
 
     def save(figure: Figure, file: Path, **_: object) -> None:
@@ -58,7 +58,8 @@ def test_the_coordinate_across_the_line_is_nan(made: tuple[str, Path, dict[str, 
     across, along = (2, 1) if line == "y" else (1, 2)
     assert np.isnan(points[:, across]).all()
     assert np.isfinite(points[:, [0, along]]).all()
-    # From the radar at (-4, 1, 1), the distance from the line and the place along it make the range of a person 3 to 5 m away.
+    # From the radar at (-4, 1, 1), the distance from the line and the place along it make the range
+    # of a person 3 to 5 m away.
     ranges = np.hypot(points[:, 0] + 4, points[:, along] - 1)
     assert 3 < ranges.min() < ranges.max() < 6
     np.testing.assert_array_equal(read_cloud(out / "cloud_xyz.npz").values[:, :3], points)

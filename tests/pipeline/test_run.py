@@ -1,4 +1,4 @@
-"""The whole chain from Python: noise where it is asked for, and the same answer however the work is cut."""
+"""The whole chain from Python: noise where asked for, and the same answer for any block size."""
 
 from __future__ import annotations
 
@@ -49,7 +49,8 @@ def test_noise_has_the_power_that_is_asked_for(tmp_path: Path) -> None:
     assert noisy.summary["echo_power_m2"] == quiet.summary["echo_power_m2"]
     assert noisy.summary["noise_power_m2"] == pytest.approx(noisy.summary["echo_power_m2"] / 10)
     noise = samples - echo
-    # |n|^2 of a complex Gaussian has the standard deviation of its mean: five of them, and float32's rounding.
+    # |n|^2 of a complex Gaussian has the standard deviation of its mean: five of them, and
+    # float32's rounding.
     found = float(np.mean(np.abs(noise) ** 2))
     assert found == pytest.approx(
         noisy.summary["noise_power_m2"], rel=5 / math.sqrt(noise.size) + 1e-5
@@ -80,7 +81,8 @@ def test_clouds_alone_are_those_of_a_run(tmp_path: Path, options: dict[str, Any]
 
 
 def test_a_longer_capture_begins_with_the_shorter_one(tmp_path: Path) -> None:
-    # The interval's place depends on its length (its mean stands at the origin), so the body stands still here.
+    # The interval's place depends on its length (its mean is at the origin), so the body does not
+    # move here.
     still = rt.Motion(
         name="still",
         joints=MOTION.joints,

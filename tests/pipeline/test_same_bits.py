@@ -1,4 +1,4 @@
-"""The same seed gives the same bits, with any number of threads, and in the run that compiles as in the next."""
+"""The same seed gives the same bits, with any number of threads, compiled now or before."""
 
 from __future__ import annotations
 
@@ -17,7 +17,10 @@ import pytest
 import rtradar
 from rtradar.system.threads import thread_environment
 
-RADAR = "tx_y = 2\ntx_z = 2\nrx_y = 4\nrx_z = 4\nchirp_duration_s = 125e-6\nsamples_per_chirp = 128\nframe_duration_s = 0.05\n"
+RADAR = (
+    "tx_y = 2\ntx_z = 2\nrx_y = 4\nrx_z = 4\nchirp_duration_s = 125e-6\n"
+    "samples_per_chirp = 128\nframe_duration_s = 0.05\n"
+)
 
 
 def bits(folder: Path) -> dict[str, bytes]:
@@ -76,10 +79,13 @@ def test_one_thread_and_three_give_the_same_bits(tmp_path: Path, options: list[A
 ADD_TONES = """
 import hashlib, numpy as np, rtradar as rt
 from rtradar.signal import synthesize
-radar, draw = rt.Radar(tx_y=1, tx_z=0, rx_y=4, rx_z=0, samples_per_chirp=128), np.random.default_rng(0)
+radar = rt.Radar(tx_y=1, tx_z=0, rx_y=4, rx_z=0, samples_per_chirp=128)
+draw = np.random.default_rng(0)
 length, amplitude = draw.uniform(6, 9, (4, 4, 20)), draw.normal(size=(1, 4, 4, 20)) + 0j
 one, tx = np.ones(20, dtype=int), np.zeros(4, dtype=int)
-echoes = rt.Echoes(length=length, amplitude=amplitude, frequency=np.array([14e9]), tx=tx, part=one, bounces=one)
+echoes = rt.Echoes(
+    length=length, amplitude=amplitude, frequency=np.array([14e9]), tx=tx, part=one, bounces=one
+)
 samples = synthesize(echoes, radar, np.arange(4.0), dtype=np.complex64)
 print(hashlib.sha256(samples.tobytes()).hexdigest())
 """
@@ -87,7 +93,7 @@ print(hashlib.sha256(samples.tobytes()).hexdigest())
 
 @pytest.mark.slow
 def test_what_is_just_compiled_gives_the_bits_of_what_was_compiled_before(tmp_path: Path) -> None:
-    """A compiled function that calls another one may be linked to that one's own code, or to its copy: not the same roundings."""
+    """A compiled function may link another's code or a copy of it, which may round otherwise."""
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path)}
     command = [sys.executable, "-W", "ignore", "-c", ADD_TONES]
     first, second = (
@@ -99,7 +105,7 @@ def test_what_is_just_compiled_gives_the_bits_of_what_was_compiled_before(tmp_pa
 
 
 def compiled_functions() -> dict[tuple[Path, str], tuple[set[str], bool]]:
-    """By file and name: the names that each compiled function calls, and whether it is always taken in by its callers."""
+    """By file and name: what each compiled function calls, and whether it is always inlined."""
     found = {}
     for path in sorted(Path(rtradar.__file__).parent.rglob("*.py")):
         for node in ast.parse(path.read_text(encoding="utf-8")).body:

@@ -1,4 +1,4 @@
-"""What a run keeps of body and echoes: held against spheres, whose specular points and ranges are closed forms."""
+"""Snapshots of body and echoes in a run, against closed forms of spheres."""
 
 from __future__ import annotations
 
@@ -73,8 +73,8 @@ def test_ranges_and_rates_are_those_of_the_spheres(spheres: Body) -> None:
             - RADIUS_M
         )
 
-    # The mean of two chirps 2 ms apart is off by half the acceleration times the square of 1 ms: 1e-4 m at 100 m/s^2. Their
-    # middle is half a chirp after the window's, 0.25 ms.
+    # The mean of two chirps 2 ms apart is off by half the acceleration times the square of 1 ms:
+    # 1e-4 m at 100 m/s^2. Their middle is half a chirp after the window's, 0.25 ms.
     middle = found.times + RADAR.chirp_duration_s / 2
     np.testing.assert_allclose(found.range_m, distance(middle), atol=1e-4)
     rate = (distance(middle + 1e-3) - distance(middle - 1e-3)) / 2e-3
@@ -150,7 +150,8 @@ def test_a_receiver_that_loses_sight_does_not_make_an_echo_jump(spheres: Body) -
     window = np.array([100])
     middle = float(RADAR.window_times(window)[0]) + RADAR.chirp_duration_s / 2
     there = [[8.0], [8.1]]
-    # Two receivers; the second sees the echo before the moment only, and its length then means nothing.
+    # The second of two receivers sees the echo only before the snapshot, after which its length
+    # means nothing.
     model = Told(
         lambda t: there if t < middle else [[8.0], [100.0]],
         lambda t: [[1.0], [float(t < middle)]],

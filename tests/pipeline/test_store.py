@@ -49,6 +49,7 @@ def test_a_long_file_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> No
     forget_peak_memory()
     before = peak_memory_mb()
     write(range(5, 205))
-    # 46 MB are written; HDF5 would keep 8 MB of each map. Its own book-keeping takes a few hundred kB.
+    # 46 MB are written; HDF5 would keep 8 MB of each map. Its own book-keeping takes a few hundred
+    # kB.
     assert peak_memory_mb() - before < 4
     store.close()

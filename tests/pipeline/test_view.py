@@ -43,7 +43,8 @@ def test_a_map_is_that_of_the_run_to_half_a_level(made: Path) -> None:
         )
         power, velocity = maps["range_doppler"][:][linked.snapshots.window], maps["velocity"][:]
         distance = maps["range"][:]
-    # Mean of 8 channels, with R^4 for the loss over distance; the first bin's centre is at 0 m, its end at half a bin.
+    # Mean of 8 channels, with R^4 for the loss over distance; the first bin's centre is at 0 m, its
+    # end at half a bin.
     loss_db = 40 * np.log10(np.maximum(distance, distance[1] / 2))[:, None]
     level = np.maximum(10 * np.log10(power / 8) + loss_db, linked.range_doppler.low_db)
     assert np.abs(shown - level).max() <= linked.range_doppler.step_db / 2 * 1.001
@@ -75,7 +76,8 @@ def test_points_of_the_cloud_have_the_power_of_their_cell(made: Path) -> None:
         time, distance, velocity = (maps[name][:] for name in ("time", "range", "velocity"))
         for point in (0, 17, len(linked.rdt_points) - 1):
             t, r, v = linked.rdt_points[point]
-            # Vertices of a surface may lie midway between two cells, where rounding says which is the nearest.
+            # Vertices of a surface may lie midway between two cells, where rounding says which is
+            # the nearest.
             nearest = [
                 np.flatnonzero(abs(axis - at) <= abs(axis - at).min() + 1e-9)
                 for axis, at in ((time, t), (distance, r), (velocity, v))

@@ -1,4 +1,4 @@
-"""JSON that is written whole, down a pipe too, and read from anybody; folders that are gone at the end."""
+"""JSON is written whole, also to a pipe, and read from anywhere; temporary folders disappear."""
 
 from __future__ import annotations
 

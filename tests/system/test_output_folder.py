@@ -105,7 +105,7 @@ def test_after_an_error_all_is_as_before(tmp_path: Path, error: type[BaseExcepti
     assert contents(tmp_path) == before
 
 
-# -- what is somebody else's ---------------------------------------------------------------------------------------------
+# -- what is somebody else's -----------------------------------------------------------------------
 
 
 def link_to_folder(path: Path) -> None:
@@ -299,7 +299,7 @@ def test_a_twin_is_refused_where_capitals_do_not_tell(
     assert contents(tmp_path) == {"Maps": "mine"}
 
 
-# -- races ---------------------------------------------------------------------------------------------------------------
+# -- races -----------------------------------------------------------------------------------------
 
 
 @POSIX
@@ -361,9 +361,12 @@ def disturbed(out: Path, disturb: Callable[[], object]) -> None:
         fill(folder, "first")
 
 
-# -- disks and permissions -----------------------------------------------------------------------------------------------
+# -- disks and permissions -------------------------------------------------------------------------
 
-FULL = "Can't decrement id ref count (file write failed: time = now, errno = 28, error message = 'No space left on device')"
+FULL = (
+    "Can't decrement id ref count (file write failed: time = now, errno = 28, "
+    "error message = 'No space left on device')"
+)
 
 
 @pytest.mark.parametrize(
@@ -442,7 +445,7 @@ def test_a_command_whose_files_are_not_foreseen_is_a_mistake_of_ours(
     assert contents(tmp_path) == {}
 
 
-# -- other processes -----------------------------------------------------------------------------------------------------
+# -- other processes -------------------------------------------------------------------------------
 
 SLOW = """
 import json, pathlib, sys, time

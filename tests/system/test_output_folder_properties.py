@@ -1,4 +1,4 @@
-"""Whatever lies in an output folder, and wherever a command is killed, only rtradar's own files change."""
+"""Whatever is in an output folder, and wherever a command is killed, only our files change."""
 
 from __future__ import annotations
 

@@ -134,7 +134,8 @@ except ValueError as error:
 def test_without_a_file_more_rows_stay_in_memory() -> None:
     code = """
 kept = [file_backed([np.full((200_000,), number)]) for number in range(40)]
-print([rows.mean() == number for number, rows in enumerate(kept)].count(True), len(row_files._mapped))
+right = [rows.mean() == number for number, rows in enumerate(kept)].count(True)
+print(right, len(row_files._mapped))
 """
     done = limited("RLIMIT_NOFILE", 20, code)
     assert done.stderr == ""
