@@ -1,4 +1,4 @@
-"""From motion capture of a person to what a 4D TDM-MIMO FMCW radar would receive, and on to point clouds.
+"""From motion capture of a person to what a 4D MIMO FMCW radar receives, and on to point clouds.
 
 Everything named here loads on first use, so that ``import rtradar`` is quick.
 """
@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-# OpenMP, which runs compiled loops, keeps threads that have nothing to do spinning; they would take the cores from threads that
-# have. Read when OpenMP is loaded, with the first compiled loop that runs in parallel.
+# Idle threads of OpenMP, which runs compiled loops, would spin and take cores from threads that have
+# work. The variable is read when OpenMP is loaded, with the first loop that runs in parallel.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {
