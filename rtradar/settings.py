@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import inspect
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
@@ -49,32 +51,33 @@ class RunSettings:
     Parameters
     ----------
     fidelity : str
-        Name of the echo model, one of `rtradar.scatter.MODELS`.
+        Name of the echo model. `rtradar.scatter.MODELS` has all.
     start_s : float
         Start of the simulated interval of the recording [s].
     duration_s : float, optional
-        Length of the interval [s]; it extends to the end of the recording if left out.
+        Length of the interval [s]. It extends to the end of the recording if left out.
     heading_deg : float
         Angle by which the person is turned from the standard placement, anticlockwise seen from
         above [degree].
     snr_db : float or "physical"
         Power of the person's visible echoes over complex noise power per sample [dB]; ``inf`` for
-        no noise. With ``physical`` the noise follows from the radar's transmit power, gains and
+        no noise, ``physical`` for the noise that follows from the radar's transmit power, gains and
         noise figure.
     pfa : float
         False-alarm rate that the detector is designed for in each cell.
     seed : int
-        Seed of the noise, of diffuse returns and of the sampling of clouds.
+        Seed of noise, diffuse returns, the sampling of clouds and, on the command line, of
+        synthetic motion.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend, for models that trace rays. ``auto`` and ``cpu`` take llvm, or scalar
-        where that does not work; ``cuda`` traces the rays on a GPU.
+        Mitsuba's backend, for models that trace rays; ``auto`` and ``cpu`` take llvm, or scalar
+        where that does not work, and ``cuda`` traces the rays on a GPU.
     spreading : bool
         Whether amplitudes hold the loss with distance 1 / (R1 R2).
     model_options : mapping, optional
-        Options of the model, such as ``{"shadow_rays": 256}`` of ``fresnel``; the class of a model
+        Options of the model, such as ``{"shadow_rays": 256}`` of ``fresnel``. The class of a model
         documents them.
     clutter_removal : {"none", "mean", "exponential", "mti"}
-        Filter that removes static clutter before Doppler; see `rtradar.process.clutter`.
+        Filter that removes static clutter before Doppler. See `rtradar.process.clutter`.
     body_material : {"perfect-conductor", "skin"}
         Material of the person's surface.
     order : int
@@ -84,9 +87,10 @@ class RunSettings:
     save_if : bool
         Whether the IF samples are kept, in ``if.zarr``.
     detector : str
-        Name of the detector that marks the cells of a map, one of `rtradar.process.DETECTORS`.
+        Name of the detector that marks the cells of a map. `rtradar.process.DETECTORS` has all.
     range_window, doppler_window : str or (str, float)
-        Window functions in fast and in slow time; see `rtradar.process.WindowFunctions`.
+        Window function, such as ``blackman``, or its name and parameter. See
+        `rtradar.process.WindowFunctions`.
     noise_power_m2 : float, optional
         Noise power per sample [m^2], in place of ``snr_db``: for runs with the same noise.
 
@@ -159,3 +163,13 @@ def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
         raise InputError(
             f"noise_power_m2 = {noise_power_m2}; it must be a number of square metres, at least 0"
         )
+
+
+def setting_texts() -> dict[str, tuple[str, str]]:
+    """Return the type and the first sentence of each parameter that `RunSettings` documents."""
+    section = inspect.cleandoc(RunSettings.__doc__ or "").partition("----------\n")[2]
+    found: dict[str, tuple[str, str]] = {}
+    for names, kind, text in re.findall(r"^(\w[\w, ]*) : (.+)\n((?:    .+\n)+)", section, re.M):
+        sentence = re.split(r"\.(?: |$)", " ".join(text.split()))[0].replace("`", "")
+        found |= dict.fromkeys(names.split(", "), (kind, sentence))
+    return found

@@ -1,9 +1,9 @@
-"""The command line: ``rtradar run``, ``export``, ``validate`` and all that ``rtradar --help`` lists.
+"""The command line: ``rtradar run``, ``validate`` and all that ``rtradar --help`` lists.
 
-Each module here adds commands to the parser; what they do stands in the packages that they call, imported on use.
+Each module here adds commands to the parser; the packages that do the work are imported on use.
 
-Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that says what was wrong, where, what is allowed
-and how to mend it.
+Exit status 0: done. 1: failed. 2: bad input, with one line on stderr that tells what is wrong,
+where, what is allowed and how to mend it.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ _WHOLE = "nothing was left half-written"
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command line; the exit status is returned.
+    """Run the command line and return the exit status.
 
     Parameters
     ----------
     arguments : list of str, optional
-        Instead of those of the process. Left out, signals that ask the process to end are taken care of.
+        Arguments in place of those of the process. If left out, signals that ask the process to
+        end are handled too.
     """
     from rtradar.cli.ending import end_well, stay_if_ending
 
     options = argparse.Namespace(stopped=_WHOLE)
     if arguments is None:
         if isinstance(sys.stdout, io.TextIOWrapper):
-            sys.stdout.reconfigure(
-                errors="backslashreplace"
-            )  # as stderr: names of files may be any bytes
+            # The same as of stderr: names of files may be any bytes.
+            sys.stdout.reconfigure(errors="backslashreplace")
         end_well(lambda: options.stopped.format(**vars(options)))
     status = _flushed(_main(arguments, options))
     stay_if_ending()
@@ -46,7 +46,7 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def _flushed(status: int) -> int:
-    """The exit status once all that was printed is written: 1, and one line, where that cannot be."""
+    """Flush the standard output; return the exit status, 1 if that fails."""
     from rtradar.cli.values import fail
 
     try:
@@ -57,10 +57,8 @@ def _flushed(status: int) -> int:
         with suppress(OSError, ValueError):
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         if not isinstance(error, BrokenPipeError):
-            fail(
-                1,
-                f"cannot write to the standard output: {getattr(error, 'strerror', None) or error}",
-            )
+            why = getattr(error, "strerror", None) or error
+            fail(1, f"cannot write to the standard output: {why}")
         return status or 1
     return status
 
@@ -71,7 +69,7 @@ def _main(arguments: list[str] | None, options: argparse.Namespace) -> int:
     from rtradar.system.files import DISK_ERRORS
 
     warnings.showwarning = _show_warning
-    # Where it has no folder of its own it makes one for the moment, and would tell in two lines each time.
+    # Without a folder of its own it makes a temporary one, and would log two lines each time.
     logging.getLogger("matplotlib").setLevel(logging.ERROR)
     try:
         _parser().parse_args(arguments, options)
@@ -102,7 +100,7 @@ def _done(options: argparse.Namespace) -> int:
     try:
         status: int = options.command(options)
     except BaseException:
-        stay_if_ending()  # it may have gone wrong for want of what is being taken away
+        stay_if_ending()  # it may have failed because its files are being removed
         raise
     return status
 
@@ -121,15 +119,16 @@ def _show_warning(
 def _parser() -> argparse.ArgumentParser:
     from importlib.metadata import version
 
-    from rtradar.cli import captures, checks, classifiers, datasets, exports, viewing
+    from rtradar.cli import captures, checks, learning, results
     from rtradar.cli.values import OneLineParser
 
     parser = OneLineParser(
         prog="rtradar",
-        description="From motion capture to what a 4D MIMO FMCW radar would receive, and to point clouds.",
+        description="From motion capture to what a 4D MIMO FMCW radar would receive, "
+        "and to point clouds.",
     )
     parser.add_argument("--version", action="version", version=f"rtradar {version('rtradar')}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND", parser_class=OneLineParser)
-    for module in (captures, viewing, datasets, classifiers, exports, checks):
+    for module in (captures, results, learning, checks):
         module.add(commands)
     return parser

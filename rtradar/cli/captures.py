@@ -3,17 +3,45 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import re
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from rtradar.cli.values import decibels, number, path, seconds, setting, whole, window
+from rtradar.cli.values import add_files, decibels, number, path, seconds, setting, whole, window
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS
+from rtradar.settings import RunSettings, setting_texts
 from rtradar.system.files import check_place, write_json
 
 if TYPE_CHECKING:
-    from rtradar.cli.values import Subcommands
+    from rtradar.cli.values import OneLineParser, Subcommands
 
 _SYNTHETIC = "synthetic:"
+_SYNTHETIC_S = 3.0
+
+_FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
+    "fidelity": ("--fidelity", {"metavar": "NAME"}),
+    "clutter_removal": ("--clutter-removal", {}),
+    "body_material": ("--body-material", {}),
+    "detector": ("--detector", {"metavar": "NAME"}),
+    "order": ("--order", {"type": whole, "metavar": "N"}),
+    "keep_all": ("--keep-all", {}),
+    "save_if": ("--save-if", {}),
+    "start_s": ("--start", {"type": seconds, "metavar": "S"}),
+    "duration_s": ("--duration", {"type": seconds, "metavar": "S"}),
+    "heading_deg": ("--heading", {"type": number, "metavar": "DEG"}),
+    "snr_db": ("--snr-db", {"type": decibels, "metavar": "X|inf|physical"}),
+    "pfa": ("--pfa", {"type": number, "metavar": "X"}),
+    "range_window": ("--range-window", {"type": window, "metavar": "NAME[:X]"}),
+    "doppler_window": ("--doppler-window", {"type": window, "metavar": "NAME[:X]"}),
+    "seed": ("--seed", {"type": whole, "metavar": "N"}),
+    "variant": ("--variant", {}),
+}
+"""Option of each setting; `RunSettings` has the texts, choices and defaults."""
+
+_ONLY_RUN = tuple(_FLAGS)[:7]
+_DEFAULTS = {field.name: field.default for field in dataclasses.fields(RunSettings)}
 
 
 def add(commands: Subcommands) -> None:
@@ -21,12 +49,8 @@ def add(commands: Subcommands) -> None:
     run = commands.add_parser(
         "run", help="one recording in; maps, clouds, pictures and a summary out"
     )
-    run.add_argument(
-        "--fidelity",
-        default="specular",
-        help="analytic-paper, analytic, specular, fresnel, physical-optics, rays, reference, auto, or of a package "
-        "(default: specular)",
-    )
+    _add_capture(run)
+    _add_settings(run, _ONLY_RUN)
     run.add_argument(
         "--tolerance-db",
         type=number,
@@ -45,140 +69,85 @@ def add(commands: Subcommands) -> None:
         action="append",
         default=[],
         metavar="NAME=VALUE",
-        help="setting of the fidelity level, such as shadow_rays=256 of fresnel; may be given again",
+        help="option of the model, such as shadow_rays=256 of fresnel; may be given again",
     )
-    run.add_argument(
-        "--clutter-removal",
-        choices=("none", "mean", "exponential", "mti"),
-        default="none",
-        help="what takes static clutter out before Doppler (default: none)",
-    )
-    run.add_argument(
-        "--body-material",
-        choices=("perfect-conductor", "skin"),
-        default="perfect-conductor",
-        help="(default: perfect-conductor)",
-    )
-    run.add_argument(
-        "--detector",
-        default="os-cfar",
-        metavar="NAME",
-        help="os-cfar, ca-cfar, or of a package (default: os-cfar)",
-    )
-    run.add_argument(
-        "--order",
-        type=whole,
-        default=1,
-        metavar="N",
-        help="most walls on the way of an echo, 0 to 3 (default: 1)",
-    )
-    run.add_argument(
-        "--keep-all",
-        action="store_true",
-        help="model walls, furniture and paths though they stay below the noise",
-    )
-    run.add_argument("--save-if", action="store_true", help="keep the IF samples in DIR/if.zarr")
-    _add_capture(run)
     run.set_defaults(command=_run)
 
     compare = commands.add_parser(
         "compare", help="one recording by several models, with the same noise, and what differs"
     )
+    _add_capture(compare)
     compare.add_argument(
         "--fidelities",
         default="analytic-paper,analytic,specular",
         metavar="A,B,...",
-        help="two or more, the last is the reference (default: analytic-paper,analytic,specular)",
+        help="two or more, the last is the reference (default: %(default)s)",
     )
-    _add_capture(compare)
     compare.set_defaults(command=_compare)
 
 
-def _add_capture(run: argparse.ArgumentParser) -> None:
-    """What every command that simulates a capture asks for."""
-    run.add_argument(
+def _add_capture(command: OneLineParser) -> None:
+    """Add what every command that simulates a capture takes."""
+    command.add_argument(
         "motion",
         metavar="MOTION",
         help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack",
     )
-    run.add_argument("--skeleton", type=path, metavar="ASF", help="the .asf of an .amc recording")
-    run.add_argument(
+    command.add_argument(
+        "--skeleton", type=path, metavar="ASF", help="the .asf of an .amc recording"
+    )
+    command.add_argument(
         "--radar",
         default="paper-12ghz",
         metavar="NAME|TOML",
-        help=f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: paper-12ghz)",
+        help=f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: %(default)s)",
     )
-    run.add_argument(
-        "--scene",
-        default="free-space",
-        metavar="NAME|TOML",
-        help="a scene by name, or a TOML file (default: free-space)",
-    )
-    run.add_argument(
-        "--start",
-        type=seconds,
-        default=0.0,
-        metavar="S",
-        help="where the interval begins [s] (default: 0)",
-    )
-    run.add_argument(
-        "--duration",
-        type=seconds,
-        metavar="S",
-        help="how long it is [s] (default: to the end; synthetic: 3)",
-    )
-    run.add_argument(
-        "--heading",
-        type=number,
-        default=0.0,
-        metavar="DEG",
-        help="turn the person, anticlockwise from above (default: 0)",
-    )
-    run.add_argument(
-        "--snr-db",
-        type=decibels,
-        default=20.0,
-        metavar="X|inf|physical",
-        help="echo power over noise power per sample, or by the radar's watts (default: 20)",
-    )
-    run.add_argument(
-        "--pfa", type=number, default=1e-6, help="false-alarm rate asked of CFAR (default: 1e-6)"
-    )
-    for axis, time in ("range", "fast time"), ("doppler", "slow time"):
-        run.add_argument(
-            f"--{axis}-window",
-            type=window,
-            default="hann",
-            metavar="NAME[:X]",
-            help=f"window function in {time}, such as blackman or chebwin:80 (default: hann)",
-        )
-    run.add_argument(
-        "--seed",
-        type=whole,
-        default=0,
-        metavar="N",
-        help="of synthetic motion, noise and sampling (default: 0)",
-    )
-    run.add_argument(
-        "--variant",
-        choices=("auto", "cpu", "llvm", "scalar", "cuda"),
-        default="auto",
-        help="Mitsuba's backend for tracing rays; auto and cpu: llvm, or scalar where that does not work (default: auto)",
-    )
-    run.add_argument(
+    scene = command.add_argument("--scene", default="free-space", metavar="NAME|TOML")
+    command.help_later(scene, lambda: f"{_scenes()}, or a TOML file (default: %(default)s)")
+    _add_settings(command, [name for name in _FLAGS if name not in _ONLY_RUN])
+    command.add_argument(
         "--no-spreading",
-        action="store_true",
+        dest="spreading",
+        action="store_false",
         help="leave out the loss with distance, as the paper does",
     )
-    run.add_argument(
-        "--out", type=path, required=True, metavar="DIR", help="folder for the results"
-    )
-    run.add_argument(
-        "--overwrite",
-        action="store_true",
-        help="replace files of others that have the names of new ones",
-    )
-    run.add_argument("--json", type=path, metavar="FILE", help="write the summary there too")
+    add_files(command, out="folder for the results", json="write the summary there too")
+
+
+def _add_settings(command: OneLineParser, names: Iterable[str]) -> None:
+    """Add the options of some settings."""
+    texts = setting_texts()
+    for name in names:
+        flag, how = _FLAGS[name]
+        kind, text = texts.get(name, ("", ""))  # Python may have left docstrings out
+        options = {"default": _DEFAULTS[name], **how}
+        if _DEFAULTS[name] is False:
+            options["action"] = "store_true"
+        elif name == "duration_s":
+            text += f" (default: to the end; synthetic: {_SYNTHETIC_S:g})"
+        else:
+            text += " (default: %(default)s)"
+        if kind.startswith("{"):
+            options["choices"] = re.findall(r'"([^"]+)"', kind)
+        action = command.add_argument(flag, dest=name, help=text, **options)
+        # The models and the detectors are slow to import.
+        if name == "fidelity":
+            command.help_later(action, lambda: _registered("rtradar.scatter", "MODELS"))
+        elif name == "detector":
+            command.help_later(action, lambda: _registered("rtradar.process", "DETECTORS"))
+
+
+def _registered(module: str, registry: str) -> str:
+    from importlib import import_module
+
+    names = ", ".join(getattr(import_module(module), registry).built_in)
+    return f"{names}, or of a package (default: %(default)s)"
+
+
+def _scenes() -> str:
+    from rtradar.scene.scene import scenes_folder
+
+    return ", ".join(sorted(file.stem for file in scenes_folder().glob("*.toml")))
 
 
 def _run(options: argparse.Namespace) -> int:
@@ -189,23 +158,13 @@ def _run(options: argparse.Namespace) -> int:
     for name in ("tolerance_db", "tolerance_complex"):
         if getattr(options, name) is not None:
             model_options[name] = getattr(options, name)
-    result = run(
-        **capture,
-        fidelity=options.fidelity,
-        save_if=options.save_if,
-        model_options=model_options,
-        clutter_removal=options.clutter_removal,
-        body_material=options.body_material,
-        order=options.order,
-        keep_all=options.keep_all,
-        detector=options.detector,
-    )
+    summary = run(**capture, model_options=model_options).summary
     if options.json is not None:
-        write_json(options.json, result.summary)
-    said = result.summary
+        write_json(options.json, summary)
     print(
-        f"{said['rdt_points']} points from {said['detections']} detections in {said['windows']} windows; "
-        f"{said['wall_s']:.1f} s for {said['capture_s']:.2f} s of radar, and {said['warmup_s']:.1f} s to warm up; "
+        f"{summary['rdt_points']} points from {summary['detections']} detections "
+        f"in {summary['windows']} windows; {summary['wall_s']:.1f} s "
+        f"for {summary['capture_s']:.2f} s of radar, and {summary['warmup_s']:.1f} s to warm up; "
         f"see {options.out}"
     )
     return 0
@@ -224,7 +183,7 @@ def _compare(options: argparse.Namespace) -> int:
 
 
 def _capture(options: argparse.Namespace) -> dict[str, Any]:
-    """What `run` and `compare` take alike."""
+    """Return the arguments that `run` and `compare` share."""
     check_place(options.json)
     from rtradar.motion import load_motion, synthetic_motion
     from rtradar.radar import Radar
@@ -236,26 +195,15 @@ def _capture(options: argparse.Namespace) -> dict[str, Any]:
             raise InputError(
                 f"{options.motion}: a synthetic actor has its own skeleton; leave --skeleton out"
             )
-        duration = 3.0 if options.duration is None else options.duration
+        duration_s = _SYNTHETIC_S if options.duration_s is None else options.duration_s
         activity = options.motion.removeprefix(_SYNTHETIC)
-        motion = synthetic_motion(activity, seed=options.seed, duration_s=options.start + duration)
+        end_s = options.start_s + duration_s
+        motion = synthetic_motion(activity, seed=options.seed, duration_s=end_s)
     else:
         motion = load_motion(options.motion, skeleton=options.skeleton)
-
-    return {
+    given = vars(options)
+    return {name: given[name] for name in ("out", "overwrite", *_DEFAULTS) if name in given} | {
         "motion": motion,
         "radar": radar,
         "scene": scene,
-        "out": options.out,
-        "start_s": options.start,
-        "duration_s": options.duration,
-        "heading_deg": options.heading,
-        "snr_db": options.snr_db,
-        "pfa": options.pfa,
-        "range_window": options.range_window,
-        "doppler_window": options.doppler_window,
-        "seed": options.seed,
-        "variant": options.variant,
-        "spreading": not options.no_spreading,
-        "overwrite": options.overwrite,
     }

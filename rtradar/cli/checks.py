@@ -1,4 +1,4 @@
-"""``rtradar doctor``, ``validate`` and ``bench``: whether it works here, is right, and how fast it is."""
+"""``rtradar doctor``, ``validate`` and ``bench``: does it work here, is it right, how fast is it."""
 
 from __future__ import annotations
 
@@ -55,19 +55,20 @@ def add(commands: Subcommands) -> None:
     bench.add_argument(
         "--fidelity",
         metavar="A,B,...",
-        help="models (default: analytic-paper,analytic,specular,fresnel,physical-optics; with --quick without the last two)",
+        help="models (default: analytic-paper,analytic,specular,fresnel,physical-optics; "
+        "with --quick without the last two)",
     )
     bench.add_argument(
         "--repeats",
         type=whole,
         metavar="N",
-        help="of each measurement (default: 3; with --quick 1)",
+        help="repeats of each measurement (default: 3; with --quick 1)",
     )
     bench.add_argument(
         "--duration",
         type=seconds,
         metavar="S",
-        help="of the capture [s] (default: 3; with --quick 0.5)",
+        help="length of the capture [s] (default: 3; with --quick 0.5)",
     )
     bench.add_argument(
         "--only",

@@ -1,36 +1,73 @@
-"""Values on the command line."""
+"""Parser of the command line, and the values that options take."""
 
 from __future__ import annotations
 
 import argparse
 import math
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn
 
 if TYPE_CHECKING:
-    Subcommands = argparse._SubParsersAction[
-        argparse.ArgumentParser
-    ]  # argparse gives it no public name
+    # argparse gives it no public name.
+    Subcommands = argparse._SubParsersAction["OneLineParser"]
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Says what is wrong in one line, as everything else here does."""
+    """Argument parser that reports an error in one line, and imports for a help text on demand."""
+
+    def __init__(self, **options: Any) -> None:
+        self._later: list[tuple[argparse.Action, Callable[[], str]]] = []
+        super().__init__(**options)
 
     def error(self, message: str) -> NoReturn:
         """End with status 2."""
         self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
 
+    def help_later(self, action: argparse.Action, text: Callable[[], str]) -> None:
+        """Set the help of an option to this text once the help is asked for."""
+        self._later.append((action, text))
+
+    def format_help(self) -> str:
+        """Return the help."""
+        for action, text in self._later:
+            action.help = text()
+        return super().format_help()
+
+
+def add_files(command: argparse.ArgumentParser, *, out: str = "", json: str) -> None:
+    """Add ``--json``, and ``--out`` with ``--overwrite`` where ``out`` says what goes there."""
+    if out:
+        command.add_argument("--out", type=path, required=True, metavar="DIR", help=out)
+        command.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    command.add_argument("--json", type=path, metavar="FILE", help=json)
+
+
+OVERWRITE_HELP = "replace files of others that have the names of new ones"
+
 
 def fail(status: int, why: object) -> int:
-    """Say in one line on stderr what went wrong; the exit status is returned."""
+    """Print in one line on stderr what went wrong, and return the exit status."""
     print("rtradar: " + " ".join(str(why).split()), file=sys.stderr)
     return status
 
 
+# -- values; argparse says "invalid <name of the function> value" ----------------------------------
+
+
+def _named(name: str) -> Callable[[Callable[[str], Any]], Callable[[str], Any]]:
+    def rename(read: Callable[[str], Any]) -> Callable[[str], Any]:
+        read.__name__ = name
+        return read
+
+    return rename
+
+
+@_named("finite number")
 def number(text: str) -> float:
-    """Finite."""
+    """Read a finite number."""
     value = float(text)
     if not math.isfinite(value):
         raise ValueError
@@ -38,7 +75,7 @@ def number(text: str) -> float:
 
 
 def setting(text: str) -> tuple[str, bool | int | float | str]:
-    """A name and its value: a number, true, false, or a word."""
+    """Read a name and its value: a number, true, false, or a word."""
     name, equals, value = text.partition("=")
     if not (name.isidentifier() and equals and value):
         raise argparse.ArgumentTypeError(f"{text!r} must be NAME=VALUE, such as shadow_rays=256")
@@ -51,21 +88,20 @@ def setting(text: str) -> tuple[str, bool | int | float | str]:
 
 
 def window(text: str) -> str | tuple[str, float]:
-    """A window function: a name, or a name and its parameter."""
+    """Read a window function: a name, or a name and its parameter."""
     name, colon, value = text.partition(":")
     return (name, number(value)) if colon else name
 
 
+@_named("number of seconds, not negative")
 def seconds(text: str) -> float:
-    """At least 0 [s]."""
-    value = number(text)
-    if value < 0:
-        raise ValueError
-    return value
+    """Read a time of at least 0 [s]."""
+    return _at_least(0, number(text))
 
 
+@_named("number of decibels, inf or physical")
 def decibels(text: str) -> float | str:
-    """May be inf [dB], or physical."""
+    """Read a number of decibels, inf, or physical."""
     if text == "physical":
         return text
     value = float(text)
@@ -74,40 +110,32 @@ def decibels(text: str) -> float | str:
     return value
 
 
+@_named("whole number, not negative")
 def whole(text: str) -> int:
-    """At least 0."""
-    value = int(text)
-    if value < 0:
-        raise ValueError
-    return value
+    """Read a whole number of at least 0."""
+    return _at_least(0, int(text))
 
 
+@_named("whole number, at least 1")
+def count(text: str) -> int:
+    """Read a whole number of at least 1."""
+    return _at_least(1, int(text))
+
+
+@_named("list of whole numbers, such as 1,2,3")
 def numbers(text: str) -> list[int]:
-    """At least 0 each, parted by commas."""
+    """Read whole numbers separated by commas."""
     return [whole(part) for part in text.split(",")]
 
 
-def count(text: str) -> int:
-    """At least 1."""
-    value = int(text)
-    if value < 1:
-        raise ValueError
-    return value
-
-
 def path(text: str) -> Path:
-    """Not empty: the path of nothing would be that of the current folder."""
+    """Read a path; an empty one is refused, for it would be the current folder."""
     if not text:
         raise argparse.ArgumentTypeError("it is empty; give the name of a file or folder")
     return Path(text)
 
 
-for _kind, _name in (
-    (number, "finite number"),
-    (seconds, "number of seconds, not negative"),
-    (decibels, "number of decibels, inf or physical"),
-    (whole, "whole number, not negative"),
-    (numbers, "list of whole numbers, such as 1,2,3"),
-    (count, "whole number, at least 1"),
-):
-    _kind.__name__ = _name  # argparse says "invalid <name> value"
+def _at_least(least: int, value: Any) -> Any:
+    if value < least:
+        raise ValueError
+    return value

@@ -11,13 +11,7 @@ from numpy.typing import NDArray
 
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.map_store import MapStore
-from rtradar.pipeline.processing import (
-    RANGE_TIME_S,
-    CloudMaker,
-    Clouds,
-    Processing,
-    frame_angles,
-)
+from rtradar.pipeline.processing import RANGE_TIME_S, CloudMaker, Clouds, Processing, frame_angles
 from rtradar.process import (
     SlidingRangeTime,
     SlidingSpectrogram,

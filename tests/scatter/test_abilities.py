@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import argparse
-
 import pytest
 
 from rtradar.cli import captures
+from rtradar.cli.values import OneLineParser
 from rtradar.scatter import MODELS, takes_backend
 from rtradar.scatter.echo_models import affordable_models, models_that
 
@@ -23,10 +22,10 @@ def test_models_are_listed_cheapest_first() -> None:
 
 
 def test_the_help_of_run_names_every_model(capsys: pytest.CaptureFixture[str]) -> None:
-    parser = argparse.ArgumentParser()
-    captures.add(parser.add_subparsers())
+    parser = OneLineParser()
+    captures.add(parser.add_subparsers(parser_class=OneLineParser))
     with pytest.raises(SystemExit):
         parser.parse_args(["run", "--help"])
     words = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
-    listed = words.partition("--fidelity FIDELITY ")[2].partition(", or of a package")[0]
+    listed = words.partition("--fidelity NAME ")[2].partition(", or of a package")[0]
     assert listed.split(", ") == list(MODELS.built_in)

@@ -1,4 +1,4 @@
-"""``rtradar view``: what a run left, to look at."""
+"""``rtradar view`` and ``rtradar export``: the results of a run, to look at and for other tools."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import path, seconds
+from rtradar.cli.values import add_files, path, seconds
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
@@ -16,11 +16,11 @@ if TYPE_CHECKING:
 
 
 def add(commands: Subcommands) -> None:
-    """Add the command."""
+    """Add both commands."""
     view = commands.add_parser(
         "view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser"
     )
-    view.add_argument("folder", type=path, metavar="DIR", help="what 'rtradar run --out DIR' left")
+    view.add_argument("folder", type=path, metavar="DIR", help="folder of 'rtradar run --out DIR'")
     view.add_argument(
         "--out",
         type=path,
@@ -34,21 +34,39 @@ def add(commands: Subcommands) -> None:
         "--colour",
         choices=("part", "power", "velocity"),
         default="part",
-        help="what colours mean at first (default: part)",
+        help="quantity that colours show at first (default: part)",
     )
     view.add_argument(
         "--still",
         type=path,
         metavar="FILE.png",
-        help="draw one moment; without --out there is no page then",
+        help="draw one snapshot; without --out there is no page then",
     )
     view.add_argument(
-        "--time", type=seconds, metavar="S", help="of the still [s] (default: the middle)"
+        "--time", type=seconds, metavar="S", help="time of the still [s] (default: the middle)"
     )
-    view.add_argument(
-        "--json", type=path, metavar="FILE", help="write what was shown and written there"
-    )
+    add_files(view, json="write what was shown and written there")
     view.set_defaults(command=_view)
+
+    export = commands.add_parser(
+        "export", help="IF samples for MATLAB, xarray or as int16, clouds as PLY or PCD"
+    )
+    export.add_argument(
+        "source",
+        type=path,
+        metavar="SOURCE",
+        help="folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd",
+    )
+    export.add_argument(
+        "--out",
+        type=path,
+        required=True,
+        metavar="FILE",
+        help="its suffix gives the format: .mat, .nc or .bin of IF samples; "
+        ".ply, .pcd or .npz of a cloud",
+    )
+    add_files(export, json="write there as JSON what was written")
+    export.set_defaults(command=_export)
 
 
 def _view(options: argparse.Namespace) -> int:
@@ -58,14 +76,14 @@ def _view(options: argparse.Namespace) -> int:
     from rtradar.pipeline.view import view
 
     page = options.out or (None if options.still else _own_page(options.folder))
-    told = view(
+    shown = view(
         options.folder, page=page, still=options.still, time_s=options.time, colour=options.colour
     )
     if options.json is not None:
-        write_json(options.json, told)
+        write_json(options.json, shown)
     for kind in ("page", "still"):
-        if kind in told:
-            print(f"see {told[kind]['path']} ({told[kind]['bytes'] / 1e6:.1f} MB)")
+        if kind in shown:
+            print(f"see {shown[kind]['path']} ({shown[kind]['bytes'] / 1e6:.1f} MB)")
     if page is not None and options.out is None and not options.no_browser:
         import webbrowser
 
@@ -75,7 +93,7 @@ def _view(options: argparse.Namespace) -> int:
 
 
 def _own_page(folder: Path) -> Path:
-    """Where the page goes unless told otherwise; InputError where that would replace what rtradar did not write."""
+    """Return the default place of the page; InputError if a file of others is there."""
     from rtradar.report.pages.html import is_page
 
     page = folder / "view.html"
@@ -84,3 +102,19 @@ def _own_page(folder: Path) -> Path:
             f"'{page}' is there, and no page of rtradar view; name another file (--out)"
         )
     return page
+
+
+def _export(options: argparse.Namespace) -> int:
+    check_place(options.json)
+    from rtradar.exchange import export
+
+    written = export(options.source, options.out)
+    if options.json is not None:
+        write_json(options.json, written)
+    axes, shape = written["axes"], written["shape"]
+    if len(axes) == len(shape):
+        size = ", ".join(f"{axis} {length}" for axis, length in zip(axes, shape, strict=True))
+    else:
+        size = f"{shape[0]} points: {', '.join(axes)}"
+    print(f"{size}; {written['type']}; see {options.out}")
+    return 0

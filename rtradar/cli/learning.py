@@ -1,11 +1,20 @@
-"""``rtradar train`` and ``rtradar evaluate``: what tells activities apart, and how well."""
+"""``rtradar dataset``, ``train`` and ``evaluate``: labelled clouds, and classifiers of them."""
 
 from __future__ import annotations
 
 import argparse
 from typing import TYPE_CHECKING
 
-from rtradar.cli.values import number, numbers, path, whole
+from rtradar.cli.values import (
+    OVERWRITE_HELP,
+    OneLineParser,
+    add_files,
+    count,
+    number,
+    numbers,
+    path,
+    whole,
+)
 from rtradar.errors import InputError
 from rtradar.system.files import check_place, write_json
 
@@ -14,7 +23,13 @@ if TYPE_CHECKING:
 
 
 def add(commands: Subcommands) -> None:
-    """Add both commands."""
+    """Add the three commands."""
+    _add_dataset(
+        commands.add_parser(
+            "dataset",
+            help="labelled point clouds of many recordings, radars, scenes and fidelities",
+        )
+    )
     _add_train(
         commands.add_parser(
             "train",
@@ -26,13 +41,48 @@ def add(commands: Subcommands) -> None:
     )
 
 
+def _add_dataset(dataset: argparse.ArgumentParser) -> None:
+    build = dataset.add_subparsers(
+        required=True, metavar="COMMAND", parser_class=OneLineParser
+    ).add_parser(
+        "build",
+        help="make the samples of a collection that are missing or damaged; may be run again",
+    )
+    build.add_argument(
+        "spec", type=path, metavar="SPEC.toml", help="what the collection shall hold"
+    )
+    build.add_argument(
+        "--out", type=path, required=True, metavar="DIR", help="folder of the collection"
+    )
+    build.add_argument(
+        "--plan",
+        action="store_true",
+        help="make a sample of each kind, and say how long the others will take",
+    )
+    place = build.add_mutually_exclusive_group()
+    place.add_argument(
+        "--workers",
+        type=count,
+        metavar="N",
+        help="processes that share the cores (default: one a core)",
+    )
+    place.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask scheduler to use, such as tcp://host:8786"
+    )
+    add_files(build, json="write what was made there as JSON")
+    build.set_defaults(
+        command=_dataset_build,
+        stopped="the same command goes on with the samples that '{out}' has not yet",
+    )
+
+
 def _add_train(train: argparse.ArgumentParser) -> None:
     train.add_argument(
         "data",
         type=path,
         nargs="+",
         metavar="DIR",
-        help="folders of clouds, as rtradar dataset build leaves them",
+        help="folders of clouds, made by rtradar dataset build",
     )
     train.add_argument(
         "--out",
@@ -46,14 +96,15 @@ def _add_train(train: argparse.ArgumentParser) -> None:
         "--split",
         default="folds",
         metavar="HOW",
-        help="folds (the paper's, over clouds), recording, subject, recorded (learn from synthetic motion), or across:COLUMN, "
-        "which learns from one value of a column, such as fidelity, and asks about all (default: folds)",
+        help="folds (the paper's, over clouds), recording, subject, recorded (learn from "
+        "synthetic motion), or across:COLUMN, which learns from one value of a column, such as "
+        "fidelity, and asks about all (default: folds)",
     )
     train.add_argument(
         "--folds",
         type=whole,
         metavar="N",
-        help="(default: 10; across: 5; fewer where a class has fewer groups)",
+        help="number of folds (default: 10; across: 5; fewer where a class has fewer groups)",
     )
     train.add_argument(
         "--fold",
@@ -61,27 +112,34 @@ def _add_train(train: argparse.ArgumentParser) -> None:
         metavar="N,M,...",
         help="only these trainings, from 1 (default: all)",
     )
-    train.add_argument("--points", type=whole, metavar="N", help="of each cloud (default: 1000)")
-    train.add_argument("--epochs", type=whole, metavar="N", help="(default: lean 30, paper 200)")
+    train.add_argument(
+        "--points", type=whole, metavar="N", help="points of each cloud (default: 1000)"
+    )
+    train.add_argument(
+        "--epochs", type=whole, metavar="N", help="number of epochs (default: lean 30, paper 200)"
+    )
     train.add_argument(
         "--rate", type=number, metavar="X", help="learning rate (default: lean 2e-3, paper 1e-4)"
     )
     train.add_argument(
         "--all-epochs",
         action="store_true",
-        help="of paper: go on when the halved rate is below 1e-6",
+        help="with paper: go on when the halved rate is below 1e-6",
     )
     train.add_argument(
         "--augmentation",
-        help="none, physical, or rotation, which is the paper's (default: lean physical, paper none)",
+        help="none, physical, or rotation, which is the paper's "
+        "(default: lean physical, paper none)",
     )
     train.add_argument(
         "--scaling",
-        help="of the axes of a cloud: physical, each by its own number, or unit-sphere, all by one (default: physical)",
+        help="scale of the axes of a cloud: physical, each by its own number, or unit-sphere, "
+        "all by one (default: physical)",
     )
     train.add_argument(
         "--precision",
-        help="of the search for maxima: bfloat16 or float32 (default: what is faster here)",
+        help="number format of the search for maxima: bfloat16 or float32 "
+        "(default: the faster one here)",
     )
     train.add_argument(
         "--device",
@@ -90,7 +148,11 @@ def _add_train(train: argparse.ArgumentParser) -> None:
         help="where to compute (default: auto)",
     )
     train.add_argument(
-        "--seed", type=whole, default=0, metavar="N", help="of splits and trainings (default: 0)"
+        "--seed",
+        type=whole,
+        default=0,
+        metavar="N",
+        help="seed of splits and trainings (default: 0)",
     )
     train.set_defaults(
         command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is"
@@ -108,14 +170,14 @@ def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
     evaluate.add_argument(
         "--baselines",
         action="store_true",
-        help="also simple classifiers, on the clouds and the split of the first",
+        help="also evaluate simple classifiers, on the clouds and the split of the first",
     )
     evaluate.add_argument(
         "--data",
         type=path,
         nargs="+",
         metavar="DIR",
-        help="of --baselines: the clouds (default: where they were)",
+        help="clouds for --baselines (default: where they were)",
     )
     evaluate.add_argument(
         "--out",
@@ -123,13 +185,27 @@ def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
         metavar="DIR",
         help="folder for tables and pictures (default: the first OUT)",
     )
-    evaluate.add_argument(
-        "--overwrite",
-        action="store_true",
-        help="replace files of others that have the names of new ones",
-    )
-    evaluate.add_argument("--json", type=path, metavar="FILE", help="write the numbers there too")
+    evaluate.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    add_files(evaluate, json="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
+
+
+def _dataset_build(options: argparse.Namespace) -> int:
+    check_place(options.json)
+    from rtradar.campaign import build_dataset, in_words
+
+    report = build_dataset(
+        options.spec,
+        options.out,
+        plan_only=options.plan,
+        workers=options.workers,
+        scheduler=options.scheduler,
+    )
+    if options.json is not None:
+        write_json(options.json, report)
+    print(in_words(report))
+    print(f"see {options.out}")
+    return 0
 
 
 def _train(options: argparse.Namespace) -> int:
@@ -140,7 +216,8 @@ def _train(options: argparse.Namespace) -> int:
 
     if options.recipe not in RECIPES:
         raise InputError(
-            f"--recipe {options.recipe}: there is none of that name; give one of {', '.join(RECIPES)}"
+            f"--recipe {options.recipe}: there is none of that name; "
+            f"give one of {', '.join(RECIPES)}"
         )
     device = pick_device(options.device)
     recipe = RECIPES[options.recipe].changed(
