@@ -1,4 +1,4 @@
-"""``rtradar doctor``, ``validate`` and ``bench``: does it work here, is it right, how fast is it."""
+"""``rtradar doctor``, ``validate`` and ``bench``: does it work, is it right, how fast is it."""
 
 from __future__ import annotations
 
