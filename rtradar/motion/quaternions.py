@@ -9,25 +9,25 @@ from numpy.typing import NDArray
 
 from rtradar.system.row_files import file_backed, in_blocks
 
+Array = NDArray[np.float64]
+
 WORLD_FROM_MOCAP = (2, 0, 1)
 """Component of a y-up mocap vector that becomes world x, y, z: world (x, y, z) = mocap (z, x, y).
 
 It is an even permutation, hence a rotation."""
 
 
-def to_world(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def to_world(vectors: Array) -> Array:
     """Convert vectors (..., 3) from mocap to world axes."""
     return np.ascontiguousarray(vectors[..., WORLD_FROM_MOCAP])
 
 
-def quaternions_to_world(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+def quaternions_to_world(quaternions: Array) -> Array:
     """Convert rotations (..., 4) from mocap to world axes; only their vector parts are permuted."""
     return np.ascontiguousarray(quaternions[..., (*WORLD_FROM_MOCAP, 3)])
 
 
-def quaternion_rotate(
-    quaternions: NDArray[np.float64], vectors: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def quaternion_rotate(quaternions: Array, vectors: Array) -> Array:
     """Rotate vectors (..., 3) by unit quaternions (..., 4); leading axes broadcast."""
     x, y, z, w = (quaternions[..., k] for k in range(4))
     a, b, c = (vectors[..., k] for k in range(3))
@@ -40,9 +40,7 @@ def quaternion_rotate(
     )
 
 
-def quaternion_multiply(
-    left: NDArray[np.float64], right: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def quaternion_multiply(left: Array, right: Array) -> Array:
     """Multiply quaternions (..., 4): the rotation by ``right``, followed by that by ``left``."""
     vector = (
         left[..., 3:] * right[..., :3]
@@ -55,9 +53,7 @@ def quaternion_multiply(
     return np.concatenate([vector, scalar], axis=-1)
 
 
-def smallest_rotation(
-    before: NDArray[np.float64], after: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def smallest_rotation(before: Array, after: Array) -> Array:
     """Quaternions (..., 4) of the smallest rotations that take unit vectors (..., 3) to others.
 
     Between opposite vectors half a turn about any line across them will do.
@@ -71,14 +67,14 @@ def smallest_rotation(
     return np.where(norms > 1e-6, rotation / np.maximum(norms, 1e-6), half)
 
 
-def sign_continuous(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
+def sign_continuous(quaternions: Array) -> Array:
     """Choose the signs of quaternions (frame, ..., 4) so that each is nearest to the one before."""
     if all(same_side.all() for _, same_side in _sides(quaternions)):
         return quaternions  # without a copy, which a recording that was only moved need not have
     return file_backed(_with_signs(quaternions))
 
 
-def _with_signs(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64]]:
+def _with_signs(quaternions: Array) -> Iterator[Array]:
     sign = np.ones(quaternions.shape[1:-1])
     for frames, same_side in _sides(quaternions):
         signs = sign * np.cumprod(np.where(same_side, 1.0, -1.0), axis=0)
@@ -87,8 +83,8 @@ def _with_signs(quaternions: NDArray[np.float64]) -> Iterator[NDArray[np.float64
 
 
 def _sides(
-    quaternions: NDArray[np.float64],
-) -> Iterator[tuple[NDArray[np.float64], NDArray[np.bool_]]]:
+    quaternions: Array,
+) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
     """Yield blocks of frames, and whether each is in the half-space of the frame before it."""
     before = quaternions[:1]
     for (frames,) in in_blocks(quaternions):
