@@ -21,12 +21,12 @@ from rtradar.signal.static_clutter import RoomIf
 class Indoors(NamedTuple):
     """The person in the room: the echo model, and the IF of the room itself.
 
-    ``account`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
+    ``summary`` is what was kept and dropped, for JSON; ``limits`` are those of the walls.
     """
 
     model: RoomModel
     room: RoomIf
-    account: dict[str, Any]
+    summary: dict[str, Any]
     limits: tuple[Limit, ...]
 
 
@@ -52,8 +52,8 @@ def indoors(
     clutter = Clutter(radar, scene, variant=variant, seed=settings.seed, order=order).prune(noise)
     room = RoomIf(radar, clutter.cycle(), ClutterShadow(clutter, body, variant=variant))
     ratio = person_power_m2 / room.power_m2 if room.power_m2 > 0 else None
-    account = {
-        "paths": [path.row() for path in paths],
+    summary = {
+        "paths": [asdict(path) for path in paths],
         "clutter": {
             "power_m2": room.power_m2,
             "signal_to_clutter_db": None if ratio is None else float(10 * np.log10(ratio)),
@@ -61,7 +61,7 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
-    return Indoors(model, room, account, _limits(model))
+    return Indoors(model, room, summary, _limits(model))
 
 
 def _limits(model: RoomModel) -> tuple[Limit, ...]:

@@ -76,7 +76,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
     if (modelled := account_of(capture.model)) is not None:
         summary["modelled"] = modelled
     if capture.inside:
-        summary["room"] = capture.inside.account
+        summary["room"] = capture.inside.summary
     return summary
 
 

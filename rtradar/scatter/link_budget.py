@@ -62,34 +62,13 @@ def link_budget(
     spreading: bool = True,
     scene: Scene | None = None,
 ) -> LinkBudget:
-    """Evaluate the echoes of one chirp every 10 ms.
+    """Evaluate the echoes of one chirp every 10 ms, and warn of limits of validity.
 
-    Parameters
-    ----------
-    model : EchoModel
-        Echo model of this body and radar.
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Person in the scene.
-    n_chirps : int
-        Number of chirps in the capture.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2); it counts only for the reference of an invisible body.
-    scene : Scene, optional
-        Walls and furniture in which the person must not be; nothing if left out.
-
-    Raises
-    ------
-    InputError
-        If a part comes within 0.3 m of an antenna, nothing of the person is ever within the
-        radar's range, or the pelvis, or a part with more than 5 % of the echo power, is inside a
-        wall.
-
-    Warns
-    -----
-    ValidityWarning
-        If more than 5 % of the echo power is concerned by a limit, or nobody is visible.
+    ``spreading`` counts only for the reference of an invisible body. The person must not be in
+    walls and furniture of the scene: an `InputError` is raised if the pelvis, or a part with more
+    than 5 % of the echo power, is inside a wall, and also if a part comes within 0.3 m of an
+    antenna, or nothing of the person is ever within the radar's range. A `ValidityWarning` is
+    issued if more than 5 % of the echo power is concerned by a limit, or nobody is visible.
     """
     chirps = np.arange(0, n_chirps, keyframe_step(radar))
     powers, fractions = FileBackedRows(), FileBackedRows()

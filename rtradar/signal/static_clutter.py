@@ -87,11 +87,14 @@ class RoomIf:
         self._whole: _Samples = np.zeros(
             (self._radar.n_tx, self._radar.n_rx, self._radar.samples_per_chirp), np.complex128
         )
-        for group in self._groups:
-            self._whole += self._synthesized(group.echoes)
+        self._singles: dict[int, NDArray[np.complex64]] = {}
+        for number, group in enumerate(self._groups):
+            samples = self._synthesized(group.echoes)
+            self._whole += samples
+            if len(group.echoes.part) == 1:
+                self._singles[number] = samples
         self._shadow = shadow if self._groups else None
         self._lost: KeyframeCache[int, _Samples] = KeyframeCache(0, 2)
-        self._singles: dict[int, NDArray[np.complex64]] = {}
 
     @property
     def power_m2(self) -> float:
@@ -153,13 +156,13 @@ class RoomIf:
         starts = self._shadow.starts
         lost = lost.copy()
         own = np.searchsorted(starts, echoes, side="right") - 1
-        for group in self._groups:
+        for number, group in enumerate(self._groups):
             chosen = np.flatnonzero(group.member[own])
             if len(chosen) == 0:
                 continue
             fraction, whole = change[..., chosen], group.echoes
-            if len(whole.part) == 1:
-                lost += fraction * self._single(group)
+            if number in self._singles:
+                lost += fraction * self._singles[number]
                 continue
             which = group.first[own[chosen]] + echoes[chosen] - starts[own[chosen]]
             some = replace(
@@ -171,13 +174,6 @@ class RoomIf:
             )
             lost += self._synthesized(some)
         return lost
-
-    def _single(self, group: _Group) -> NDArray[np.complex64]:
-        """IF of a single echo."""
-        number = int(np.argmax(group.member))
-        if number not in self._singles:
-            self._singles[number] = self._synthesized(group.echoes)
-        return self._singles[number]
 
     def _synthesized(self, echoes: Echoes) -> NDArray[np.complex64]:
         times = self._radar.chirp_times(self._radar.n_tx)

@@ -19,7 +19,7 @@ S^2 from the height of the surface instead of a fit. So the power per area is
 
 R of the smooth slab at the angle of each leg, its polarisation as it arrives. Over half of space it
 adds up to S^2 |R|^2 of what arrives, and specular and diffuse power together to what a smooth wall
-reflects. All of it counts as co-polar. A point stands for its cell of a jittered grid, two range
+reflects. All of it counts as co-polar. A point represents its cell of a jittered grid, two range
 bins wide: near cells give a grainier return than a real wall, with the right mean power.
 """
 

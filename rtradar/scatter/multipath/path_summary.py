@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -40,10 +40,6 @@ class PathSummary:
     kept: list[str]
     dropped: list[str]
     why: str
-
-    def row(self) -> dict[str, Any]:
-        """Return the entry of ``summary.json``."""
-        return asdict(self)
 
 
 def summarize(

@@ -40,14 +40,9 @@ _FAINT = 1e-3
 class Term:
     """A part of what a slab does to a wave.
 
-    Parameters
-    ----------
-    passes : int
-        Passes through the slab: odd for transmission, even for reflection.
-    rest : bool
-        Whether the term holds all later terms too.
-    index_squared : float
-        Squared index of refraction for the delay that is taken out; 0 for none.
+    ``passes`` through the slab are odd for transmission, even for reflection; ``rest`` says whether
+    the term holds all later terms too. ``index_squared`` is the squared index of refraction for the
+    delay that is taken out; 0 for none.
     """
 
     passes: int

@@ -74,14 +74,14 @@ def covered(offset: Array, radius: Array, ball: float) -> Array:
     )
 
 
-@pytest.mark.parametrize("anchor", [0, 8, 60])
+@pytest.mark.parametrize("keyframe", [0, 8, 60])
 def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
-    clutter: Clutter, anchor: int
+    clutter: Clutter, keyframe: int
 ) -> None:
     ball = Ball()
     shadow = ClutterShadow(clutter, ball, variant="scalar")
-    share = _dense(shadow, anchor, clutter)
-    centre = ball.at(np.array([(anchor * shadow.step + 0.5) * RADAR.chirp_duration_s])).centres[
+    fraction = _dense(shadow, keyframe, clutter)
+    centre = ball.at(np.array([(keyframe * shadow.step + 0.5) * RADAR.chirp_duration_s])).centres[
         0, 0
     ]
     rx = RADAR.rx[RADAR.rx_of_tx]
@@ -104,9 +104,9 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
         expected.append(np.maximum(*legs))
         # Of 24 points spread evenly a straight edge through a disc finds its fraction to some two.
         # them.
-        np.testing.assert_allclose(share[..., first], expected[-1], atol=0.1)
+        np.testing.assert_allclose(fraction[..., first], expected[-1], atol=0.1)
     largest = np.max(expected)
-    assert (largest > 0.5) == (anchor < 60)
+    assert (largest > 0.5) == (keyframe < 60)
 
 
 def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> None:
@@ -122,22 +122,22 @@ def test_points_behind_the_ball_are_hidden_and_others_not(clutter: Clutter) -> N
             continue
         nearest = gap(antennas[:, None], own.points[0, 0, :, 0], centre)
         inside = (lost.echo >= first) & (lost.echo < last)
-        share = np.zeros((RADAR.n_tx, RADAR.n_rx, own.n_echoes))
-        share[..., lost.echo[inside] - first] = lost.fraction[..., inside]
+        fraction = np.zeros((RADAR.n_tx, RADAR.n_rx, own.n_echoes))
+        fraction[..., lost.echo[inside] - first] = lost.fraction[..., inside]
         # Along a line of antennas the fraction changes linearly between its ends: certain where all
         # antennas agree.
-        assert (share[..., (nearest < ball.radius * 0.999).all(axis=0)] == 1).all()
-        assert (share[..., (nearest > ball.radius * 1.001).all(axis=0)] == 0).all()
-        assert share.min() >= 0
-        assert share.max() <= 1
+        assert (fraction[..., (nearest < ball.radius * 0.999).all(axis=0)] == 1).all()
+        assert (fraction[..., (nearest > ball.radius * 1.001).all(axis=0)] == 0).all()
+        assert fraction.min() >= 0
+        assert fraction.max() <= 1
     assert len(lost.echo) > 20
 
 
-def _dense(shadow: ClutterShadow, anchor: int, clutter: Clutter) -> Array:
-    share = np.zeros((RADAR.n_tx, RADAR.n_rx, clutter.n_echoes))
-    lost = shadow.at(anchor)
-    share[..., lost.echo] = lost.fraction
-    return share
+def _dense(shadow: ClutterShadow, keyframe: int, clutter: Clutter) -> Array:
+    fraction = np.zeros((RADAR.n_tx, RADAR.n_rx, clutter.n_echoes))
+    lost = shadow.at(keyframe)
+    fraction[..., lost.echo] = lost.fraction
+    return fraction
 
 
 def test_a_body_outside_hides_nothing(clutter: Clutter) -> None:

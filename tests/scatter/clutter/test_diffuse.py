@@ -46,9 +46,9 @@ def rough(radar: Radar, *walls: Wall, seed: int = 0) -> list[RoomEchoes]:
 def test_power_per_area_is_that_of_the_closed_form(turn_deg: float, roughness_m: float) -> None:
     (echoes,) = rough(RADAR, wall(turn_deg, roughness_m))
     cosine = np.cos(np.radians(turn_deg))
-    share = 1 - np.exp(-((2 * WAVENUMBER * roughness_m * cosine) ** 2))
+    fraction = 1 - np.exp(-((2 * WAVENUMBER * roughness_m * cosine) ** 2))
     mirrored, _ = slab(material("concrete").eta(14e9), 0.2, 14e9, cosine, "te")
-    expected = 4 * share * np.abs(mirrored) ** 2 * cosine**2
+    expected = 4 * fraction * np.abs(mirrored) ** 2 * cosine**2
     # From 8 m the square metre is seen within 3.6 degrees, more where it is turned: 1 / R^4 and
     # cosines vary over it.
     assert echoes.power_m2() * 8**4 == pytest.approx(expected, rel=0.06)

@@ -60,7 +60,7 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
         opposite = len(names) == 2 and SIDES[names[0]][0] == SIDES[names[1]][0]
         key = echoes.name if opposite else frozenset(names)
         found[key] = found.get(key, 0.0) + gain(echoes)
-    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders share
+    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders fraction
     # one path.
     assert len(found) == 6 + 6 + 12
     for name, total in found.items():
@@ -84,7 +84,7 @@ def test_a_dielectric_gives_the_conjugate_of_its_slab_coefficient(polarization: 
     te, _ = slab(surface.material.eta(frequency), 0.0125, frequency, 1.0, "te")
     expected = -2 * np.sqrt(np.pi) / 10.4 * np.conj(te)
     error = np.abs(far.at_nodes(frequency)[:, 0, 0, 0] - expected)
-    # The share that the fewer frequency nodes may cost.
+    # The fraction that the fewer frequency nodes may cost.
     assert error.max() < 2e-3 * np.abs(expected).max()
 
 

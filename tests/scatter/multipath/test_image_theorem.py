@@ -356,7 +356,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     _, _, point = solve_specular_points(
         Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:]), points=True
     )
-    # Both stand equally far from the wall but for the body's surface: the share of the way by
+    # Both stand equally far from the wall but for the body's surface: the fraction of the way by
     # similar triangles.
     tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
     meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)
@@ -365,7 +365,7 @@ def test_a_wall_reflects_only_where_it_is(backend: Backend) -> None:
     )
     seen = np.abs(echoes.amplitude[0, :, 0, 1]) > 0
     assert 0 < seen.sum() < len(seen)
-    # On its way in it fades: between two anchors it is neither all nor nothing.
+    # On its way in it fades: between two keyframes it is neither all nor nothing.
     first = int(chirps[np.flatnonzero(seen)[0]])
     fade = np.abs(
         model.echoes(np.arange(first - keyframe_step(radar, KEYFRAMES_S), first + 1)).amplitude[
@@ -441,9 +441,9 @@ def test_what_stays_below_the_noise_is_left_out_and_told(backend: Backend) -> No
     floor, left = (power[of_path == f"{name} > body"].sum() for name in ("floor", "left"))
     assert 0 < floor < left
     # A noise that the floor's echo is below by 11 dB, and the left wall's is not.
-    accounts = model.prune(100, floor * gain * 10**1.1)
+    summaries = model.prune(100, floor * gain * 10**1.1)
     kept = model.echoes(np.arange(20))
-    names = {account.path: account for account in accounts}
+    names = {summary.path: summary for summary in summaries}
     assert names["floor > body"].dropped == ["part 0"]
     assert "10 dB below" in names["floor > body"].why
     assert names["floor > body"].over_noise_db == pytest.approx(-11.0, abs=0.01)
@@ -469,13 +469,12 @@ def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> 
     model = build_model(
         "specular", single(), one(), scene=Scene(walls=(aside, wall("left"))), variant=backend.kind
     )  # type: ignore[arg-type]
-    accounts = {account.path: account for account in model.prune(50, 0.0)}
-    assert accounts["floor > body"].dropped == ["part 0"]
-    assert accounts["floor > body"].power_m2 == 0
-    assert "never seen" in accounts["floor > body"].why
-    assert accounts["left > body"].kept == ["part 0"]
-    assert accounts["left > body"].over_noise_db is None
-    assert accounts["left > body"].row()["kept"] == ["part 0"]
+    summaries = {summary.path: summary for summary in model.prune(50, 0.0)}
+    assert summaries["floor > body"].dropped == ["part 0"]
+    assert summaries["floor > body"].power_m2 == 0
+    assert "never seen" in summaries["floor > body"].why
+    assert summaries["left > body"].kept == ["part 0"]
+    assert summaries["left > body"].over_noise_db is None
 
 
 @pytest.mark.parametrize(

@@ -188,7 +188,7 @@ def test_the_person_behind_brick_is_farther_for_every_antenna_and_while_moving(
         variant=backend.kind,
         order=0,
     )  # type: ignore[arg-type]
-    # Between two anchors, from both ends of the lines.
+    # Between two keyframes, from both ends of the lines.
     chirps = 12 * 67 + np.arange(12)
     echoes, free = model.echoes(chirps), model.person.echoes(chirps)
     strongest = int((np.abs(echoes.amplitude[0]) ** 2).mean(axis=(0, 1)).argmax())

@@ -52,8 +52,8 @@ def test_the_specular_point_is_the_shortest_way_over_the_face(back: bool) -> Non
     corner = WALL.corners[0] - (WALL.thickness_m if back else 0) * WALL.normal
     u, v = np.array(WALL.edge_u_m), np.array(WALL.edge_v_m)
 
-    def way(share: np.ndarray) -> float:
-        place = corner + share[0] * u + share[1] * v
+    def way(fraction: np.ndarray) -> float:
+        place = corner + fraction[0] * u + fraction[1] * v
         return float(np.linalg.norm(tx - place) + np.linalg.norm(rx - place))
 
     found = minimize(
