@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-import json
 import os
 import platform
 import sys
@@ -13,9 +11,7 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
-import numpy as np
-
-from rtradar.bench.floors import Rates, Work, best_s, floors, measure_rates
+from rtradar.bench.floors import Rates, Work, floors, measure_rates
 from rtradar.bench.kernels import measure_kernels
 from rtradar.bench.plan import CHEAPEST, Case, Plan, model_cases, plan_of
 from rtradar.bench.report import draw, tables
@@ -28,13 +24,10 @@ from rtradar.bench.runs import (
     Runner,
     Spread,
     by_stage,
-    can_pin,
     measure_baseline,
     paired_ratio,
 )
-from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.signal import synthesize
 from rtradar.system.files import atomic_file, check_place, temporary_folder, write_json
 
 __all__ = ["Plan", "bench", "plan_of"]
@@ -42,12 +35,6 @@ __all__ = ["Plan", "bench", "plan_of"]
 Row = dict[str, Any]
 
 _VERSIONS = ("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba")
-
-ECHOES = (10, 21, 31, 42, 84, 168, 336)
-"""Echoes of one chirp and receiver; a body has 21."""
-
-_CYCLES = 33  # 25 ms of the paper's radar, which a run synthesises at once
-_ECHOES_S = 0.1  # of repeats
 
 
 def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = None) -> int:
@@ -104,7 +91,7 @@ def measure(plan: Plan) -> dict[str, Any]:
     """
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
     growth: dict[str, Any] = {"fidelity": plan.growing_fidelity}
-    growth |= {name: [] for name in ("chirps", "duration", "channels", "echoes")}
+    growth |= {"chirps": [], "duration": []}
     found: dict[str, Any] = {
         "settings": asdict(plan) | {"motion": MOTION},
         "machine": {
@@ -124,8 +111,6 @@ def measure(plan: Plan) -> dict[str, Any]:
             _measure_models(plan, runner, found)
         if "growth" in plan.parts:
             growth["duration"] = with_duration(plan, runner)
-            growth["channels"] = with_channels(plan, runner, folder)
-            growth["echoes"] = with_echoes(Radar.load(plan.radars[0]))
     return found
 
 
@@ -138,17 +123,13 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     baselines = {
         name: measure_baseline(name, plan.repeats, quick=plan.quick) for name in plan.radars
     }
-    runs = runner.measure(model_cases(plan, one_core=can_pin()), plan.repeats, "models")
-    cheapest = {
-        case.radar: own
-        for case, own in runs.items()
-        if case.fidelity == CHEAPEST and not case.one_core
-    }
+    runs = runner.measure(model_cases(plan), plan.repeats, "models")
+    cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST}
     for case, own in runs.items():
         row = _model_row(case, own, rates[case.radar])
-        first = case.radar == plan.radars[0] and not case.one_core
+        first = case.radar == plan.radars[0]
         row["first_use"] = _first_use(runner.first[case.fidelity], own) if first else None
-        reference = None if case.one_core else cheapest.get(case.radar)
+        reference = cheapest.get(case.radar)
         row[f"over_{CHEAPEST}"] = reference and paired_ratio(
             [run.to_cloud_s for run in own], [run.to_cloud_s for run in reference]
         )
@@ -179,7 +160,6 @@ def _model_row(case: Case, runs: list[Run], rates: Rates) -> Row:
     return {
         "radar": radar.name,
         "fidelity": case.fidelity,
-        "cores": "one" if case.one_core else "all",
         "capture_s": summary["capture_s"],
         "work": asdict(work),
         "process_s": asdict(Spread.of([run.process_s for run in runs])),
@@ -229,10 +209,9 @@ def _paper_over(baseline: Baseline, radar: Radar, row: Row) -> dict[str, float]:
 
 def _chirp_rows(models: list[Row]) -> list[Row]:
     """Radars with more chirps than the first: each model's cost over its own with the first."""
-    rows = [row for row in models if row["cores"] == "all"]
-    base = {row["fidelity"]: row for row in rows if row["radar"] == models[0]["radar"]}
+    base = {row["fidelity"]: row for row in models if row["radar"] == models[0]["radar"]}
     found = []
-    for row in rows:
+    for row in models:
         of = base[row["fidelity"]]
         if row["radar"] != of["radar"]:
             found.append(
@@ -260,67 +239,3 @@ def with_duration(plan: Plan, runner: Runner) -> list[Row]:
         {"duration_s": case.duration_s, "capture_s": own[0].summary["capture_s"], **_costs(own)}
         for case, own in runs.items()
     ]
-
-
-def with_channels(plan: Plan, runner: Runner, folder: Path) -> list[Row]:
-    """Runs by arrays of more and more receivers, a row each: ``channels``, seconds and memory."""
-    found = {}
-    for number, radar in enumerate(arrays(Radar.load(plan.radars[0]))):
-        file = folder / f"array{number}.toml"
-        file.write_text(as_toml(radar), encoding="utf-8")
-        found[Case(str(file), plan.growing_fidelity, plan.duration_s)] = radar.n_channels
-    runs = runner.measure(list(found), plan.repeats, "channels")
-    return [{"channels": found[case], **_costs(own)} for case, own in runs.items()]
-
-
-def arrays(radar: Radar) -> list[Radar]:
-    """The radar with a quarter and half of its receivers, itself, and every Tx with every Rx."""
-    some = [
-        dataclasses.replace(radar, rx_y=radar.rx_y // part, rx_z=radar.rx_z // part)
-        for part in (4, 2)
-        if radar.rx_y % part == radar.rx_z % part == 0
-    ]
-    whole = dataclasses.replace(radar, channels="all")
-    return [*some, radar, *([whole] if whole.n_channels > radar.n_channels else [])]
-
-
-def as_toml(radar: Radar) -> str:
-    """The fields of a radar as a TOML file that `Radar.load` reads."""
-    fields = asdict(radar)
-    nested = {
-        name: fields.pop(name) for name, own in asdict(radar).items() if isinstance(own, dict)
-    }
-    return _lines(fields) + "".join(f"[{name}]\n{_lines(own)}" for name, own in nested.items())
-
-
-def _lines(fields: dict[str, Any]) -> str:
-    # A JSON string, number or list of numbers is one of TOML.
-    known = {name: value for name, value in fields.items() if value is not None}
-    return "".join(f"{name} = {json.dumps(value)}\n" for name, value in known.items())
-
-
-def with_echoes(radar: Radar) -> list[Row]:
-    """IF of a block of chirps from more and more echoes: ``echoes``, ``samples``, ``signal_s``."""
-    return [_if_row(radar, _echoes(radar, count)) for count in ECHOES]
-
-
-def _if_row(radar: Radar, echoes: Echoes) -> Row:
-    times = radar.chirp_times(len(echoes.tx))
-    seconds = best_s(lambda: synthesize(echoes, radar, times, dtype=np.complex64), _ECHOES_S)
-    samples = len(times) * radar.n_rx * radar.samples_per_chirp
-    return {"echoes": len(echoes.part), "samples": samples, "signal_s": seconds}
-
-
-def _echoes(radar: Radar, count: int) -> Echoes:
-    """Echoes that do not move, anywhere in the band."""
-    rng = np.random.default_rng(0)
-    chirps = _CYCLES * radar.n_tx
-    shape = (chirps, radar.n_rx, count)
-    return Echoes(
-        length=np.broadcast_to(rng.uniform(0.01, 0.99, shape[1:]) * 2 * radar.max_range_m, shape),
-        amplitude=np.broadcast_to(rng.standard_normal(shape[1:]) + 0j, (1, *shape)),
-        frequency=np.array([radar.centre_frequency_hz]),
-        tx=radar.tx_of_chirp(np.arange(chirps)),
-        part=np.arange(count),
-        bounces=np.ones(count, dtype=np.int64),
-    )

@@ -20,9 +20,6 @@ RADARS, FIDELITIES = tuple(PRESETS.built_in), tuple(affordable_models(12.0))
 CHEAPEST = "analytic"
 """Model with which all others are compared."""
 
-SAME_AS_PAPER = "analytic-paper"
-"""Model whose IF is that of the paper's method."""
-
 
 @dataclass(frozen=True)
 class Plan:
@@ -31,8 +28,7 @@ class Plan:
     Parameters
     ----------
     radars : tuple of str
-        Presets or TOML files, the first for what is measured with one only: first use, one core,
-        growth.
+        Presets or TOML files, the first for what is measured with one only: first use, growth.
     fidelities : tuple of str
         Names of models.
     repeats : int
@@ -97,22 +93,16 @@ class Case:
     radar, fidelity : str
         Options of the command line.
     duration_s : float
-    one_core : bool
-        Whether the process may use one core only.
     """
 
     radar: str
     fidelity: str
     duration_s: float
-    one_core: bool = False
 
 
-def model_cases(plan: Plan, *, one_core: bool) -> list[Case]:
-    """Every model with every radar; with ``one_core`` also the paper's model on one core."""
-    cases = [Case(one, own, plan.duration_s) for one in plan.radars for own in plan.fidelities]
-    if one_core and SAME_AS_PAPER in plan.fidelities:
-        cases.append(replace(cases[0], fidelity=SAME_AS_PAPER, one_core=True))
-    return cases
+def model_cases(plan: Plan) -> list[Case]:
+    """Every model with every radar."""
+    return [Case(one, own, plan.duration_s) for one in plan.radars for own in plan.fidelities]
 
 
 def plan_of(

@@ -34,8 +34,7 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
         else:
             yield _paper(found["paper"]["radars"])
         for radar in dict.fromkeys(row["radar"] for row in models):
-            own = [row for row in models if row["radar"] == radar and row["cores"] == "all"]
-            yield _stages(radar, own)
+            yield _stages(radar, [row for row in models if row["radar"] == radar])
     yield from _growth(found["growth"])
     if found["kernels"]:
         yield table(
@@ -69,7 +68,7 @@ def _models(models: Sequence[Row]) -> str:
     lines = [
         [
             row["radar"],
-            f"`{row['fidelity']}`" + (", one core" if row["cores"] == "one" else ""),
+            f"`{row['fidelity']}`",
             f"{row['to_cloud_s']['best']:.2f} s",
             _median(row["to_cloud_s"]),
             _median(row["whole_s"]),
@@ -146,18 +145,6 @@ def _growth(growth: dict[str, Any]) -> Iterator[str]:
         ]
         head = [f"recording, {model}", "to the cloud", "whole run"]
         yield table([*head, "to the cloud a second, over the first", "peak memory"], lines)
-    if growth["channels"]:
-        lines = [
-            [str(row["channels"]), _median(row["to_cloud_s"]), _memory(row)]
-            for row in growth["channels"]
-        ]
-        yield table([f"channels, {model}", "to the cloud", "peak memory"], lines)
-    if growth["echoes"]:
-        lines = [
-            [str(row["echoes"]), f"{1e9 * row['signal_s'] / row['samples']:.2f} ns"]
-            for row in growth["echoes"]
-        ]
-        yield table(["echoes of a chirp and receiver", "IF alone, a sample"], lines)
 
 
 def _median(spread: Row) -> str:
@@ -194,33 +181,15 @@ def draw(found: dict[str, Any], file: BinaryIO) -> None:
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    models = [row for row in found["models"] if row["cores"] == "all"]
-    growth = found["growth"]
+    models, growth = found["models"], found["growth"]
     radars = list(dict.fromkeys(row["radar"] for row in models))
-    grown = [name for name in ("duration", "channels", "echoes") if growth[name]]
-    rows = max(1, len(radars) + bool(grown))
+    rows = max(1, len(radars) + bool(growth["duration"]))
     figure = plt.figure(figsize=(11, 3.4 * rows), layout="constrained")
-    places = figure.add_gridspec(rows, max(1, len(grown)))
-    for number, radar in enumerate(radars):
-        own = [row for row in models if row["radar"] == radar]
-        _bars(figure.add_subplot(places[number, :]), own, radar)
-    for column, name in enumerate(grown):
-        axes, rows = figure.add_subplot(places[-1, column]), growth[name]
-        if name == "echoes":
-            label = "echoes of a chirp and receiver"
-            _lines(axes, rows, "echoes", label, {"signal_s": "IF of a block"})
-            continue
-        key, label = {
-            "duration": ("duration_s", "recording [s]"),
-            "channels": ("channels", "channels"),
-        }[name]
-        series = {"to_cloud_s": "to the cloud", "whole_s": "whole run"}
-        _lines(axes, rows, key, label, series)
-        axes.set_title(f"`{growth['fidelity']}`", fontsize=9)
-        memory = [row["peak_memory_mb"] for row in rows]
-        beside = axes.twinx()
-        beside.plot([row[key] for row in rows], memory, "s--", color="0.5", markersize=4)
-        beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))
+    places = list(figure.subplots(rows, 1, squeeze=False)[:, 0])
+    for axes, radar in zip(places, radars, strict=False):
+        _bars(axes, [row for row in models if row["radar"] == radar], radar)
+    if growth["duration"]:
+        _growing(places[-1], growth["duration"], growth["fidelity"])
     figure.savefig(file, format="png", dpi=110)
     plt.close(figure)
 
@@ -259,11 +228,15 @@ def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
     axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 
-def _lines(axes: Any, rows: Sequence[Row], key: str, label: str, series: dict[str, str]) -> None:
-    x = [row[key] for row in rows]
-    for name, said in series.items():
-        y = [row[name] if isinstance(row[name], float) else row[name]["median"] for row in rows]
-        axes.plot(x, y, "o-", label=said)
-    axes.set(xlabel=label, ylabel="time [s]", xlim=(0, None), ylim=(0, None))
+def _growing(axes: Any, rows: Sequence[Row], fidelity: str) -> None:
+    """Time and peak memory over the length of the recording."""
+    x = [row["duration_s"] for row in rows]
+    for name, label in (("to_cloud_s", "to the cloud"), ("whole_s", "whole run")):
+        axes.plot(x, [row[name]["median"] for row in rows], "o-", label=label)
+    axes.set(xlabel="recording [s]", ylabel="time [s]", xlim=(0, None), ylim=(0, None))
+    axes.set_title(f"`{fidelity}`", fontsize=9)
     axes.legend(fontsize=7, loc="upper left")
     axes.grid(alpha=0.2)
+    memory, beside = [row["peak_memory_mb"] for row in rows], axes.twinx()
+    beside.plot(x, memory, "s--", color="0.5", markersize=4)
+    beside.set(ylabel="peak memory [MB], dashed", ylim=(0, 1.3 * max(memory)))

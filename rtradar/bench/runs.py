@@ -11,8 +11,7 @@ import site
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
@@ -126,11 +125,6 @@ class Run:
         return float(self.summary["peak_memory_mb"])
 
 
-def can_pin() -> bool:
-    """Whether this system can keep a process on one core."""
-    return hasattr(os, "sched_setaffinity")
-
-
 class Runner:
     """Runs cases in processes of their own, with caches in a folder."""
 
@@ -147,11 +141,7 @@ class Runner:
         RunError
             Where a run fails.
         """
-        fresh = {
-            case.fidelity: case
-            for case in reversed(cases)
-            if case.fidelity not in self.first and not case.one_core
-        }
+        fresh = {case.fidelity: case for case in reversed(cases) if case.fidelity not in self.first}
         runs: dict[Case, list[Run]] = {case: [] for case in cases}
         count = len(fresh) + repeats * len(cases)
         with tqdm(total=count, desc=what, unit="run", disable=None) as bar:
@@ -171,10 +161,9 @@ class Runner:
             words = f"-m rtradar run {MOTION} --duration {case.duration_s}".split()
             words += ["--radar", case.radar, "--fidelity", case.fidelity, "--variant", "cpu"]
             words += ["--out", str(out / "run"), "--json", str(written)]
-            with _on_one_core(case.one_core):
-                began = time.perf_counter()
-                done = _run([sys.executable, *words], self._environment(case.fidelity))
-                process_s = time.perf_counter() - began
+            began = time.perf_counter()
+            done = _run([sys.executable, *words], self._environment(case.fidelity))
+            process_s = time.perf_counter() - began
             if done.returncode != 0:
                 lines = done.stderr.strip().splitlines() or [f"ended with status {done.returncode}"]
                 raise RunError(f"bench: {case.fidelity}, radar {case.radar}: {lines[-1]}")
@@ -197,20 +186,6 @@ def _run(
     command: list[str], environment: dict[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-
-
-@contextmanager
-def _on_one_core(wanted: bool) -> Iterator[None]:
-    """Keep this process, and those that it starts meanwhile, on one core."""
-    if not wanted:
-        yield
-        return
-    allowed = os.sched_getaffinity(0)
-    os.sched_setaffinity(0, {min(allowed)})
-    try:
-        yield
-    finally:
-        os.sched_setaffinity(0, allowed)
 
 
 @dataclass(frozen=True)
