@@ -169,18 +169,6 @@ def _fold(near, far, even, odd):
         odd[_COLUMNS + c] = far_re - near_re
 
 
-@inlined(fastmath={"contract"})
-def _read_folded(near, near_weight, far, far_weight, even, odd):
-    """`_fold` of weighted samples."""
-    for c in range(len(near)):
-        near_re, near_im = near[c].real * near_weight, near[c].imag * near_weight
-        far_re, far_im = far[c].real * far_weight, far[c].imag * far_weight
-        even[c] = near_re + far_re
-        even[_COLUMNS + c] = near_im + far_im
-        odd[c] = near_im - far_im
-        odd[_COLUMNS + c] = far_re - near_re
-
-
 @inlined()
 def _put(row, out):
     for i in range(_ROW):
@@ -240,30 +228,16 @@ def _add_unfolded_squares(cosine, sine, low, high):
 
 
 @inlined()
-def _fold_line(spectra, channel, columns, weights, cycle_at, store, line, last):
-    """Fold the terms of one line (first place, step, factor, place of its half) into even and odd.
-
-    The first pass reads weighted samples; the ``last`` pass reads the grid.
-    """
+def _fold_line(store, line):
+    """Fold the terms of one line (first place, step, factor, place of its half) in pairs."""
     first, step, factor, at_half = line
-    begin, end = columns
     own, middle = _row(store.grid, first), _row(store.grid, at_half)
-    if not last:
-        at = cycle_at[first]
-        _read(spectra[at, channel, begin:end], weights[at], own)
-        if factor % 2 == 0:
-            at = cycle_at[at_half]
-            _read(spectra[at, channel, begin:end], weights[at], middle)
     _unfold(own, middle, _row(store.alone, 0), _row(store.alone, 1))
     for k in range((factor - 1) // 2):
-        even, odd = _row(store.even, k), _row(store.odd, k)
         low, high = first + (k + 1) * step, first + (factor - k - 1) * step
-        if last:
-            _fold(_row(store.grid, low), _row(store.grid, high), even, odd)
-        else:
-            low, high = cycle_at[low], cycle_at[high]
-            near, far = spectra[low, channel, begin:end], spectra[high, channel, begin:end]
-            _read_folded(near, weights[low], far, weights[high], even, odd)
+        _fold(
+            _row(store.grid, low), _row(store.grid, high), _row(store.even, k), _row(store.odd, k)
+        )
 
 
 @inlined()
@@ -319,10 +293,13 @@ def _add_power(spectra, channel_begin, channel_end, weights, dft, power):
         on_cache_lines(_TOGETHER * _ROW, weights),
     )
     for begin in range(0, n_range, _COLUMNS):
-        columns = begin, min(begin + _COLUMNS, n_range)
+        end = min(begin + _COLUMNS, n_range)
         # Lanes beyond the last range bins are 0 as well.
         store.grid[:], store.sums[:], store.even[:], store.odd[:] = 0, 0, 0, 0
         for channel in range(channel_begin, channel_end):
+            for place in range(cycles):
+                cycle = dft.cycle_at[place]
+                _read(spectra[cycle, channel, begin:end], weights[cycle], _row(store.grid, place))
             for last in (False, True):
                 # First along the second factor, whose places are neighbours, then the first.
                 factor, step = (n_1, n_2) if last else (n_2, 1)
@@ -335,9 +312,9 @@ def _add_power(spectra, channel_begin, channel_end, weights, dft, power):
                     # A term at half of an even factor has no partner; else the row of zeros is it.
                     at_half = first + factor // 2 * step if factor % 2 == 0 else cycles
                     line = first, step, factor, at_half
-                    _fold_line(spectra, channel, columns, weights, dft.cycle_at, store, line, last)
+                    _fold_line(store, line)
                     _transform_line(cosines, sines, store, line, last)
         for place in range(cycles):
-            own, out = _powers(store.sums, place), power[dft.bin_at[place], columns[0] : columns[1]]
+            own, out = _powers(store.sums, place), power[dft.bin_at[place], begin:end]
             for c in range(len(out)):
                 out[c] += own[c]
