@@ -1,4 +1,4 @@
-"""Echoes through antennas that do not look everywhere alike: any model, weighted by the directions of its legs."""
+"""Echoes through antennas with patterns: any model, weighted by the directions of its legs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chir
 
 
 def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
-    """Where each part has its normal halfway between Tx and Rx as its centre sees them, (chirp, rx, part, 3) [m].
+    """Points (chirp, rx, part, 3) whose normals bisect Tx and Rx, as seen from the centres [m].
 
-    The specular point but for terms of the part's size over its distance, and what is seen of a part lies about it.
+    The specular point but for terms of the part's size over its distance, and what is seen of a
+    part lies about it.
     """
     tx, rx = (
         _unit(antenna - at.centres[:, None])
@@ -31,9 +32,10 @@ def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
 
 
 def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
-    """Amplitude that both antennas leave of a part's echo, relative to the peaks of their patterns, (chirp, rx, part).
+    """Amplitude (chirp, rx, part) that both antennas leave, relative to their patterns' peaks.
 
-    The square root of the power pattern of the Tx in the direction of the part, times that of the Rx.
+    The square root of the power pattern of the Tx in the direction of the part, times that of the
+    Rx.
     """
     points = specular_points(at)
     gain = np.ones(points.shape[:-1])
@@ -47,7 +49,7 @@ def leg_gain(radar: Radar, at: ChirpPoses) -> NDArray[np.float64]:
 
 
 def through_antennas(model: EchoModel, radar: Radar, body: Body) -> EchoModel:
-    """The model as the radar's antennas let it through; itself where they look everywhere alike."""
+    """Wrap the model by the patterns of the antennas, unless these are isotropic."""
     shaped = is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna)
     return _ThroughAntennas(model, radar, body) if shaped else model
 
@@ -76,7 +78,7 @@ class _ThroughAntennas:
 
 
 def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors; none, for no direction: of a part straight between Tx and Rx, which has no echo."""
+    """Unit vectors; 0 for no direction, of a part straight between Tx and Rx, without echo."""
     return np.asarray(
         vectors
         / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(np.float64).tiny)

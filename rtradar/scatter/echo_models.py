@@ -94,7 +94,8 @@ def build_model(
         for option in model_options:
             if option not in known:
                 raise InputError(
-                    f"fidelity '{fidelity}' has no option '{option}'; it has: {', '.join(known) or 'none'}"
+                    f"fidelity '{fidelity}' has no option '{option}'; it has: "
+                    f"{', '.join(known) or 'none'}"
                 )
         # What traces nothing takes no backend.
         backend = {"variant": variant} if takes_backend(fidelity) else {}

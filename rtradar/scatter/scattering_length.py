@@ -41,7 +41,8 @@ def scattering_length(
         place one counts. Meshes, of perfect conductors, are for ``physical-optics``, ``reference``
         (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
     tx, rx : (n, 3) array_like
-        Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single (3,).
+        Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single
+        (3,).
     frequency : float or (n,) array_like
         Frequency of the wave, for all pairs or for each [Hz].
     fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}

@@ -22,7 +22,7 @@ _ON_SURFACE = 1e-9
 def target_geometry(
     target: Ellipsoids, tx: NDArray[np.float64], rx: NDArray[np.float64]
 ) -> Geometry:
-    """Ellipsoids with the antennas of each pair (n, 3) in turn, as one chirp and one receiver each."""
+    """Ellipsoids with antennas (n, 3), pair by pair, as one chirp with one receiver each."""
     centres, frames = (
         np.broadcast_to(array, (len(tx), *array.shape)) for array in (target.centres, target.frames)
     )
@@ -35,7 +35,7 @@ def sum_of_echoes(
     at: Geometry,
     frequency: NDArray[np.float64],
 ) -> NDArray[np.complex128]:
-    """Field of each pair, relative to the path over the origin, of echoes (pair, 1, part) with 1 / (R1 R2)."""
+    """Field of each pair of echoes (pair, 1, part), relative to the path over the origin."""
     range_tx, range_rx = np.linalg.norm(at.tx, axis=1), np.linalg.norm(at.rx[:, 0], axis=1)
     excess = length[:, 0] - (range_tx + range_rx)[:, None]
     phase = np.exp(-2j * np.pi * frequency[:, None] / SPEED_OF_LIGHT_MPS * excess)
@@ -59,14 +59,15 @@ def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]
     Raises
     ------
     InputError
-        Where the target is no mesh or cannot be used, or an antenna is inside of it or on its surface.
+        Where the target is no mesh or cannot be used, or an antenna is inside of it or on its
+        surface.
     """
     import trimesh  # slow to import
 
     if not isinstance(target, trimesh.Trimesh):
         raise InputError(
-            f"scattering_length: the target is a {type(target).__name__}; allowed: rt.Ellipsoids or "
-            "trimesh.Trimesh"
+            f"scattering_length: the target is a {type(target).__name__}; "
+            "allowed: rt.Ellipsoids or trimesh.Trimesh"
         )
     vertices = np.asarray(target.vertices, dtype=np.float64)
     mesh = checked_triangles(

@@ -75,7 +75,7 @@ class Waves(NamedTuple):
 
 
 class _Chosen(NamedTuple):
-    """Facets (n,) that may be lit, ``corners (3, n)``, normal and plane ``facing (4, n)``, areas, bend."""
+    """Facets (n,) that may be lit: ``corners (3, n)``, normals and planes ``facing (4, n)``."""
 
     facet: NDArray[np.uint32]
     corners: NDArray[np.uint32]

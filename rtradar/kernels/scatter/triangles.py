@@ -27,7 +27,7 @@ _EXACT_SERIES = 1.0
 """The same for a single triangle, whose mean is to be exact to 1e-9."""
 
 _LEAST = 1e-4
-"""Least spread of phases in the formula for large ones. Taken for less it leaves 1e-9 of a triangle."""
+"""Least spread of phases in the formula for large ones; less is taken for it, to 1e-9."""
 
 
 @inlined()
@@ -142,7 +142,7 @@ def largest_spread(u, v, room):
 
 
 def midpoints(cuts):
-    """Barycentric middles (cuts^2, 3) of the small triangles that one is cut into, for references."""
+    """Barycentric middles (cuts^2, 3) of small triangles that one is cut into, for references."""
     i, j = (index.ravel() for index in np.indices((cuts, cuts)))
     both = np.concatenate([np.stack([i + t, j + t], axis=1) for t in (1 / 3, 2 / 3)])
     places = np.column_stack([both, cuts - both.sum(axis=1)]) / cuts

@@ -16,7 +16,19 @@ from rtradar.radar import Radar
 class BuiltInModel:
     """What the models of rtradar say of themselves; lists of models are derived from it.
 
-    Models of other packages need none of this: what they do not say is False, or not known.
+    Models of other packages need none of this: what they do not say is False, or not known. All
+    built-in models take the parameters below, and those that trace ``variant``.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar in the scene.
+    body : Body
+        Body in motion.
+    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
+        Mitsuba's backend.
+    spreading : bool
+        Whether amplitudes hold 1 / (R1 R2).
     """
 
     traces: ClassVar[bool] = True
@@ -118,10 +130,10 @@ def chirp_poses(radar: Radar, body: Body, chirps: NDArray[np.int64]) -> ChirpPos
 def one_echo_a_part(
     tx: NDArray[np.int64],
     length: NDArray[np.float64],
-    amplitude: NDArray[np.float64],
-    frequency_hz: float,
+    amplitude: NDArray[np.inexact],
+    frequency_hz: float | NDArray[np.float64],
 ) -> Echoes:
-    """Make echoes of single reflections, one a part, that do not change over the sweep.
+    """Make echoes of single reflections, one a part.
 
     Parameters
     ----------
@@ -129,21 +141,22 @@ def one_echo_a_part(
         Transmitter of each chirp.
     length : (chirp, rx, part) float64
         Length of the path from Tx to Rx [m].
-    amplitude : (chirp, rx, part) float64 or complex128
-        Scattering length, defined as in `Echoes` [m].
-    frequency_hz : float
+    amplitude : ([node,] chirp, rx, part) float64 or complex128
+        Scattering length, defined as in `Echoes` [m]; without nodes it is that of the whole sweep.
+    frequency_hz : float or (node,) float64
         Frequency of the amplitudes [Hz].
 
     Returns
     -------
     Echoes
-        Echoes of one node and one bounce.
+        Echoes of one bounce.
     """
     parts = length.shape[2]
+    values = amplitude.astype(np.complex128, copy=False)
     return Echoes(
         length=length,
-        amplitude=amplitude.astype(np.complex128)[None],
-        frequency=np.array([frequency_hz]),
+        amplitude=values if values.ndim == 4 else values[None],
+        frequency=np.atleast_1d(np.asarray(frequency_hz, dtype=np.float64)),
         tx=tx,
         part=np.arange(parts),
         bounces=np.ones(parts, dtype=np.int64),

@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 
 class Seen(NamedTuple):
-    """What antennas see of facets: ``fraction (row, facet)``, and ``row (antenna, n)``, which is whose."""
+    """What antennas see: ``fraction (row, facet)``, and ``row (antenna, n)``, which is whose."""
 
     fraction: NDArray[np.float32]
     row: NDArray[np.int64]

@@ -36,14 +36,14 @@ Field = NDArray[np.complex128]
 
 
 class Sample(NamedTuple):
-    """One pose: ``ratio (node, pair, part)``, and ``strength (pair, part)`` of what it multiplies [m]."""
+    """One pose: ``ratio (node, pair, part)``, to be multiplied by ``strength (pair, part)`` [m]."""
 
     ratio: Field
     strength: NDArray[np.float64]
 
 
 class _Interval(NamedTuple):
-    """``ratio (place, node, pair, part)`` at 9 places of one interval, where ``known (place, part)``."""
+    """One interval: ``ratio (place, node, pair, part)`` where it is ``known (place, part)``."""
 
     ratio: Field
     known: NDArray[np.bool_]
@@ -123,7 +123,7 @@ class Envelope:
         return self._keyframes.get(index, lambda: self._sample(float(index), self._parts, None))
 
     def course(self, index: int) -> Course:
-        """Cubics from place to place of an interval, their slopes those of parabolas through three."""
+        """Cubics from place to place of an interval, with the slopes of parabolas through three."""
         self.prepare_courses([index])
         here, after = self._interval(index), self._interval(index + 1)
         before = self._interval(index - 1) if index > 0 else here
@@ -181,7 +181,7 @@ class Envelope:
 def _bend(
     before: Field, here: Field, after: Field, strength: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Second difference of the echo of each part (part,), largest over frequencies and pairs [m]."""
+    """Second difference of each part's echo (part,), largest over frequencies and pairs [m]."""
     return np.asarray((np.abs(before - 2 * here + after) * strength).max(axis=(0, 1)))
 
 

@@ -79,7 +79,7 @@ def ellipsoid_facets(semi_axes: NDArray[np.float64], subdivisions: int) -> Facet
 def mesh_facets(
     vertices: NDArray[np.float64], faces: NDArray[np.integer], *, both_sides: bool
 ) -> Facets:
-    """Facets of a mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``, but those without area."""
+    """Facets of a mesh, ``vertices (vertex, 3)`` [m], ``faces (facet, 3)``, without empty ones."""
     whole = np.asarray(vertices, dtype=np.float64)[None]
     chosen = np.asarray(faces, dtype=np.int32)
     normals, areas = _normals(whole, chosen)

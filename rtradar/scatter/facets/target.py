@@ -263,7 +263,7 @@ def _divide(
 def _divide_bent(
     corners: Array, antennas: Array, wavenumber: float
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Divide facets until waves are plane over each; corners (n, 3, 3), and the triangle of each (n,)."""
+    """Divide facets until waves are plane over each; corners (n, 3, 3), and the triangles (n,)."""
 
     def coarse(corners: Array, _: NDArray[np.int64], __: int) -> tuple[NDArray[np.bool_], Array]:
         middle = corners.mean(axis=1)
@@ -285,7 +285,7 @@ def _divide_edges(
     closed: bool,
     wavenumber: float,
 ) -> tuple[Array, NDArray[np.float32]]:
-    """Divide facets on edges of shadows; corners (n, 3, 3), and fractions that are seen (antenna, n)."""
+    """Divide facets on edges of shadows; corners (n, 3, 3), and fractions seen (antenna, n)."""
 
     def coarse(
         corners: Array, face: NDArray[np.int64], level: int

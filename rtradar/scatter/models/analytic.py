@@ -80,12 +80,6 @@ class Analytic(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar, where it is in the scene.
-    body : Body
-        Body, which hides none of its own parts.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     material : {"perfect-conductor", "skin"}
         Material of the body's surface.
 
@@ -134,10 +128,7 @@ class Analytic(BuiltInModel):
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
     def conductor_echo(
-        self,
-        chirps: NDArray[np.int64],
-        at: ChirpPoses,
-        start: NDArray[np.float64] | None = None,
+        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes of a conductor; see `RoomReady`."""
         return far_field_echo(at, spreading=self.spreading)
@@ -150,10 +141,7 @@ class AnalyticPaper(Analytic):
     scattering = None  # type: ignore[assignment]
 
     def conductor_echo(
-        self,
-        chirps: NDArray[np.int64],
-        at: ChirpPoses,
-        start: NDArray[np.float64] | None = None,
+        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes as the paper has them."""
         return plane_wave_echo(self._radar, at, spreading=self.spreading)

@@ -46,8 +46,8 @@ _INSTANTS_S = 25e-3
 _INSTANTS_AT_ONCE = 32
 
 _MARGIN = 0.7
-"""Fraction of a complex tolerance that the error budget may use: it does not know the far ends of the
-array, nor the time between instants."""
+"""Fraction of a complex tolerance that the error budget may use: it knows neither the far ends of
+the array, nor the time between instants."""
 
 _LEAST_COMPLEX = 1e-3
 
@@ -78,14 +78,6 @@ class Auto(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend; nothing is loaded as long as nothing has to be traced.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     tolerance_db : float
         Largest error of the power of a frame [dB].
     tolerance_complex : float, optional
@@ -211,7 +203,7 @@ class Auto(BuiltInModel):
         self._counts += (chosen == np.arange(len(CANDIDATES))[:, None, None]).sum(axis=1)
 
     def _weights(self, chirps: NDArray[np.int64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """Weights (candidate, chirp, part), which sum to at most 1, and parts that others cut (part,)."""
+        """Weights (candidate, chirp, part) of sum at most 1, and parts that others cut (part,)."""
         parts = np.arange(len(self._body.part_names))
         interval = chirps // self._step
         fraction = (chirps - interval * self._step) / self._step
@@ -327,7 +319,7 @@ class Auto(BuiltInModel):
 
 
 def _at_nodes(echoes: _Group, frequency: NDArray[np.float64]) -> NDArray[np.inexact]:
-    """Amplitudes (node, chirp, rx, echo) at other frequencies, by a polynomial through their nodes."""
+    """Amplitudes (node, chirp, rx, echo) at other frequencies, by the polynomial through nodes."""
     if len(echoes.frequency) == 1:
         return np.broadcast_to(echoes.amplitude, (len(frequency), *echoes.length.shape))
     if np.array_equal(echoes.frequency, frequency):

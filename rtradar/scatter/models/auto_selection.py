@@ -217,7 +217,7 @@ def select_candidates(
 def _raise(
     chosen: NDArray[np.int64], error: NDArray[np.float64], allowed: NDArray[np.float64]
 ) -> None:
-    """Raise choices until the errors (time, candidate, part) add up to at most ``allowed (time,)``."""
+    """Raise choices until errors (time, candidate, part) add up to at most ``allowed (time,)``."""
     parts = error.shape[2]
     while True:
         current = np.take_along_axis(error, chosen[:, None], axis=1)

@@ -14,7 +14,7 @@ from rtradar.echoes import Echoes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import sweep_nodes
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import (
     SHADOW_RAYS,
@@ -109,10 +109,6 @@ class Fresnel(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar that sees the body.
-    body : Body
-        Body whose parts return echoes.
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
         Mitsuba's backend.
     spreading : bool
@@ -156,13 +152,5 @@ class Fresnel(BuiltInModel):
         length, amplitude, _ = solve_specular_points(
             at, start=start, polarization=self._radar.polarization, spreading=self._spreading
         )
-        parts = length.shape[2]
-        return Echoes(
-            length=length,
-            # The amplitude of an echo is the conjugate of the scattering length.
-            amplitude=amplitude * fractions.conj(),
-            frequency=self._frequency,
-            tx=at.tx_index,
-            part=np.arange(parts),
-            bounces=np.ones(parts, dtype=np.int64),
-        )
+        # The amplitude of an echo is the conjugate of the scattering length.
+        return one_echo_a_part(at.tx_index, length, amplitude * fractions.conj(), self._frequency)

@@ -16,7 +16,7 @@ from rtradar.kernels.scatter.envelope import fill_envelope
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayNodes, array_nodes, spread_nodes
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample, whole_echo
 from rtradar.scatter.facets.target import facet_scattering
@@ -33,14 +33,6 @@ class PhysicalOptics(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     facets : int, optional
         Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
         grown person.
@@ -106,7 +98,7 @@ class PhysicalOptics(BuiltInModel):
         self._envelope = Envelope(self._sample, len(body.part_names), tolerance, end)
 
     def _sample(self, place: float, parts: NDArray[np.int64], whole: float | None) -> Sample:
-        """Envelope at the fine nodes: spread from the coarse ones unless it differs over the array."""
+        """Envelope at the fine nodes, from the coarse ones unless it differs over the array."""
         time = min((place * self._step + 0.5) * self._radar.chirp_interval_s, self._body.duration_s)
         pose = self._body.at([time])
         coarse = self._at_nodes(pose, self._coarse, parts)
@@ -155,7 +147,6 @@ class PhysicalOptics(BuiltInModel):
         length, strength, _ = solve_specular_points(
             at, polarization=self._radar.polarization, spreading=self._spreading
         )
-        parts = length.shape[2]
         amplitude = np.empty((len(self._surface.frequency), *length.shape), dtype=np.complex128)
         intervals, envelope, weights = chirps // self._step, self._envelope, self._fine.weights
         # Power is measured at keyframes, where nothing is asked of what comes after.
@@ -176,11 +167,4 @@ class PhysicalOptics(BuiltInModel):
                     ratio = envelope.keyframe(interval).ratio[:, None]
                     over_array = weights[at.tx_index[inside]] @ ratio
                     amplitude[:, inside] = over_array * strength[inside]
-        return Echoes(
-            length=length,
-            amplitude=amplitude,
-            frequency=self._surface.frequency,
-            tx=at.tx_index,
-            part=np.arange(parts),
-            bounces=np.ones(parts, dtype=np.int64),
-        )
+        return one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)

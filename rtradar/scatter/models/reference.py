@@ -8,14 +8,14 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
-from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.facets.body import FacetBody
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
-"""Frequencies: what is left of a part whose specular point is hidden comes from beside it, and turns
-over the sweep. Against the integral at each frequency three leave 1 to 3 % at 12 GHz."""
+"""Frequencies over the sweep. What is left of a part whose specular point is hidden comes from
+beside it, and turns over the sweep: three frequencies leave 1 to 3 % at 12 GHz."""
 
 
 class Reference(BuiltInModel):
@@ -25,14 +25,6 @@ class Reference(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     facets : int, optional
         Least number per part; None: by the wavelength, 5120 at 12 GHz and 20 480 at 77 GHz for a
         grown person.
@@ -87,11 +79,4 @@ class Reference(BuiltInModel):
                 index.reshape(named.shape),
                 parts,
             )
-        return Echoes(
-            length=length,
-            amplitude=amplitude,
-            frequency=self._surface.frequency,
-            tx=at.tx_index,
-            part=parts,
-            bounces=np.ones(len(parts), dtype=np.int64),
-        )
+        return one_echo_a_part(at.tx_index, length, amplitude, self._surface.frequency)

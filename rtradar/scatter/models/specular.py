@@ -24,14 +24,6 @@ class Specular(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     material : {"perfect-conductor", "skin"}
         Material of the body's surface.
 
@@ -88,10 +80,7 @@ class Specular(BuiltInModel):
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
     def conductor_echo(
-        self,
-        chirps: NDArray[np.int64],
-        at: ChirpPoses,
-        start: NDArray[np.float64] | None = None,
+        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes of a conductor; see `RoomReady`."""
         weight, known = self.visibility.at(chirps)
