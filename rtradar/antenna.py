@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import check_number, shown
+from rtradar.system.checks import brief, check_number
 from rtradar.system.toml_tables import check_keys
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
@@ -58,11 +58,11 @@ class Antenna:
     def __post_init__(self) -> None:
         if self.pattern not in _PATTERNS:
             raise InputError(
-                f"antenna: pattern = {shown(self.pattern)}; allowed: {', '.join(_PATTERNS)}"
+                f"antenna: pattern = {brief(self.pattern)}; allowed: {', '.join(_PATTERNS)}"
             )
         if (self.exponent is not None) != (self.pattern == "cosine"):
             raise InputError(
-                f"antenna: pattern = '{self.pattern}' with exponent = {shown(self.exponent)}; only "
+                f"antenna: pattern = '{self.pattern}' with exponent = {brief(self.exponent)}; only "
                 "'cosine' has one, and needs it"
             )
         for key, (least, most) in _LIMITS.items():
@@ -75,7 +75,7 @@ class Antenna:
             if not isinstance(values, list | tuple) or (len(values) and self.pattern != "table"):
                 raise InputError(
                     f"antenna: {cut} is a list of numbers, of pattern = 'table'; here it is "
-                    f"{shown(values)}"
+                    f"{brief(values)}"
                 )
             limits = (-180, 180) if cut.endswith("deg") else (-300, 0)
             checked = tuple(check_number("antenna", cut, value, *limits) for value in values)

@@ -21,8 +21,8 @@ from rtradar.campaign.samples import Made, SamplePlan, counts, make_sample, plan
 from rtradar.campaign.spec import read_spec
 from rtradar.clouds.dataset_store import is_whole, sample_path, sweep, write_index, write_sample
 from rtradar.errors import CampaignError, InputError
-from rtradar.system.files import unfinished
-from rtradar.system.output_folder import alone_in
+from rtradar.system.files import cleanup_on_exit
+from rtradar.system.output_folder import exclusive_lock
 
 if TYPE_CHECKING:
     from distributed import Client
@@ -111,7 +111,7 @@ def build_dataset(
         raise InputError(
             f"cannot make folder '{out}': {error.strerror}; give another one (--out)"
         ) from None
-    with alone_in(folder):
+    with exclusive_lock(folder):
         sweep(folder)
         store = Store.look(plans, folder)
         write_index(folder, [plan.identity for plan in plans])
@@ -152,7 +152,7 @@ def _make_missing(
     # Partial files of local workers are removed, even if this process is terminated. The workers of
     # another scheduler may still be writing.
     local = scheduler is None
-    leftovers = unfinished(lambda: sweep(store.folder)) if local else nullcontext()
+    leftovers = cleanup_on_exit(lambda: sweep(store.folder)) if local else nullcontext()
     try:
         with leftovers, dask_client(workers, scheduler) as client:
             count = len(client.scheduler_info(n_workers=-1)["workers"])

@@ -23,7 +23,7 @@ from rtradar.scatter import MODELS
 from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.system.checks import check_number, check_text, check_vector, inside, shown
+from rtradar.system.checks import brief, check_number, check_text, check_vector, inside
 from rtradar.system.seeds import check_seed
 from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
@@ -250,15 +250,15 @@ def _run_settings(table: Table) -> RunSettings:
     for key, allowed in _NAMED.items():
         value = given.get(key)
         if key in given and not (isinstance(value, str) and value in allowed):
-            raise InputError(f"{key} = {shown(value)}; allowed: {', '.join(allowed)}")
+            raise InputError(f"{key} = {brief(value)}; allowed: {', '.join(allowed)}")
     for key in _SWITCHES:
         if not isinstance(given.get(key, True), bool):
-            raise InputError(f"{key} = {shown(given[key])}; allowed: true, false")
+            raise InputError(f"{key} = {brief(given[key])}; allowed: true, false")
     for key in _WINDOWS:
         value = given.get(key, "hann")
         if not isinstance(value[0] if isinstance(value, list) and value else value, str):
             raise InputError(
-                f"{key} = {shown(value)}; it must be a name, or a list of a name and a number"
+                f"{key} = {brief(value)}; it must be a name, or a list of a name and a number"
             )
     if "pfa" in given:
         given["pfa"] = check_number("data set", "pfa", given["pfa"], *RUN_LIMITS["pfa"])
@@ -276,19 +276,19 @@ def _folder(table: Table, beside: Path) -> Path:
     if variable := _VARIABLE.match(named):
         if not os.environ.get(variable[1]):
             raise InputError(
-                f"folder = {shown(named)}: the environment has no such variable; "
+                f"folder = {brief(named)}: the environment has no such variable; "
                 "set it to the folder of recordings"
             )
         allowed, below = beside / os.environ[variable[1]], named[variable.end() :].lstrip("/")
     there = inside(allowed, below)
     if there is None:
         raise InputError(
-            f"folder = {shown(named)} leaves the folder of the file; "
+            f"folder = {brief(named)} leaves the folder of the file; "
             "put recordings below it, or name a variable of the "
             'environment that holds their folder: "${RECORDINGS}"'
         )
     if not there.is_dir():
-        raise InputError(f"folder = {shown(named)}: there is no such folder")
+        raise InputError(f"folder = {brief(named)}: there is no such folder")
     return there
 
 
@@ -299,7 +299,7 @@ def _combinations(each: Mapping[str, list[Any]], folder: Path) -> tuple[Combinat
     for model in models:
         if model not in MODELS:
             raise InputError(
-                f"[each] fidelity = {shown(model)} is unknown; allowed: {', '.join(MODELS)}"
+                f"[each] fidelity = {brief(model)} is unknown; allowed: {', '.join(MODELS)}"
             )
 
     def number(key: str, value: object) -> float | None:
@@ -322,13 +322,13 @@ def _combinations(each: Mapping[str, list[Any]], folder: Path) -> tuple[Combinat
 def _several(each: Table, key: str, usual: list[Any]) -> list[Any]:
     values = each.get(key, usual)
     if not isinstance(values, list) or not values:
-        raise InputError(f"[each] {key} = {shown(values)}; it must be a list, not empty")
+        raise InputError(f"[each] {key} = {brief(values)}; it must be a list, not empty")
     different = {
         tuple(map(_comparable, value)) if isinstance(value, list) else _comparable(value)
         for value in values
     }
     if len(different) < len(values):
-        raise InputError(f"[each] {key} = {shown(values)}; a value is given twice")
+        raise InputError(f"[each] {key} = {brief(values)}; a value is given twice")
     return values
 
 
@@ -341,7 +341,7 @@ def _loaded(key: str, value: object, folder: Path, load: Any) -> Any:
     source = check_text("[each]", key, value)
     if source.endswith(".toml") and inside(folder, source) is None:
         raise InputError(
-            f"[each] {key} = {shown(source)} leaves the folder of the file; "
+            f"[each] {key} = {brief(source)} leaves the folder of the file; "
             "put it beside it or below"
         )
     try:
@@ -357,7 +357,7 @@ def _actors(table: Table) -> tuple[Actor, ...]:
         label = check_text(where.strip(), "label", one["label"])
         if label not in ACTIVITIES:
             raise InputError(
-                f"{where}label = {shown(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
+                f"{where}label = {brief(label)} is unknown; allowed: {', '.join(ACTIVITIES)}"
             )
         if ("count" in one) == ("seeds" in one):
             raise InputError(f"{where}: give count or seeds, one of them")
@@ -378,7 +378,7 @@ def _numbers(where: str, key: str, table: Table) -> tuple[int, ...]:
         return tuple(_whole(where, key, number) for number in value)
     if isinstance(value, list):
         raise InputError(
-            f"{where}{key} = {shown(value)}; "
+            f"{where}{key} = {brief(value)}; "
             "it must be a list of different whole numbers, not empty"
         )
     count = _whole(where, key, value)
@@ -395,11 +395,11 @@ def _recorded(where: str, table: Table, intervals: Table, folder: Path) -> Recor
     for key, name in (("file", texts["file"]), ("skeleton", skeleton)):
         if name is not None and inside(folder, name) is None:
             raise InputError(
-                f"{where}{key} = {shown(name)} leaves the folder of recordings; "
+                f"{where}{key} = {brief(name)} leaves the folder of recordings; "
                 "name files in it or below"
             )
         if name is not None and not (folder / name).is_file():
-            raise InputError(f"{where}{key} = {shown(name)}: there is no such file in '{folder}'")
+            raise InputError(f"{where}{key} = {brief(name)}: there is no such file in '{folder}'")
     own = {key: value for key, value in table.items() if key in INTERVAL_KEYS}
     return Recorded(
         name=(name := texts.pop("file")),
@@ -412,16 +412,16 @@ def _recorded(where: str, table: Table, intervals: Table, folder: Path) -> Recor
 
 def _range(key: str, value: object, least: float, most: float) -> tuple[float, float]:
     if not isinstance(value, list | tuple) or len(value) != 2:
-        raise InputError(f"[drawn] {key} = {shown(value)}; it must be a range: [least, most]")
+        raise InputError(f"[drawn] {key} = {brief(value)}; it must be a range: [least, most]")
     low, high = (check_number("[drawn]", key, end, least, most) for end in value)
     if low > high:
-        raise InputError(f"[drawn] {key} = {shown(value)}; the least must come first")
+        raise InputError(f"[drawn] {key} = {brief(value)}; the least must come first")
     return low, high
 
 
 def _whole(where: str, key: str, value: object, most: int = _MOST) -> int:
     if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= most:
         raise InputError(
-            f"{where}{key} = {shown(value)}; it must be a whole number from 0 to {most}"
+            f"{where}{key} = {brief(value)}; it must be a whole number from 0 to {most}"
         )
     return value

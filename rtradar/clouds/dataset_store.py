@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 from rtradar.system.files import atomic_file, open_regular, read_json, remove_parts
 
 FORMAT = 1
@@ -193,7 +193,7 @@ def read_index(folder: Path) -> tuple[str, ...]:
     for identity in identities:
         if not (isinstance(identity, str) and _IDENTITY.fullmatch(identity)):
             raise InputError(
-                f"'{path}' names {shown(identity)}, which is no sample; "
+                f"'{path}' names {brief(identity)}, which is no sample; "
                 "mend the collection with: rtradar dataset build"
             )
     return tuple(sorted(identities))

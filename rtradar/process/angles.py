@@ -39,7 +39,7 @@ from rtradar.process.steering import (
 )
 from rtradar.process.window_functions import HANN, WindowFunctions
 from rtradar.radar import Radar
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 MOST_PEAKS = 3
 """Peaks taken of one spectrum."""
@@ -150,7 +150,7 @@ def angle_spectra(
             end = min(first + _CELLS_A_THREAD, len(samples))
             beam_power(first, end, samples, still, place, line.channels, known, result)
 
-        in_threads(fill, range(0, len(samples), _CELLS_A_THREAD))
+        thread_map(fill, range(0, len(samples), _CELLS_A_THREAD))
         return result
 
     return AngleSpectra(sine_grid(radar), power(1), power(2), ranges, rates)

@@ -24,7 +24,7 @@ from rtradar.process.cfar_thresholds import (
     os_scale,
 )
 from rtradar.system.registry import Registry
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _ROWS_A_THREAD = 64
 
@@ -259,7 +259,7 @@ def _by_rows(
 ) -> NDArray[np.bool_]:
     """Mask of a map, some rows to a thread."""
     mask = np.empty(cells.shape, dtype=np.bool_)
-    in_threads(
+    thread_map(
         lambda first: kernel(first, min(first + _ROWS_A_THREAD, len(cells)), cells, *given, mask),
         range(0, len(cells), _ROWS_A_THREAD),
     )

@@ -42,7 +42,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
 
@@ -187,7 +187,7 @@ class _Mean(ClutterRemoval):
             mean = cells.mean(axis=0, dtype=np.complex128).astype(cells.dtype)
             np.subtract(cells, mean, out=out[:, first : first + _CELLS_AT_ONCE])
 
-        in_threads(subtract, range(0, flat.shape[1], _CELLS_AT_ONCE))
+        thread_map(subtract, range(0, flat.shape[1], _CELLS_AT_ONCE))
         return out.reshape(cycles.shape)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.radar import Radar
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _Frame = tuple[int, int, NDArray[np.complex64]]
 """Index, first cycle and cube of a frame."""
@@ -148,4 +148,4 @@ def _copy(chirps: NDArray[np.complexfloating], to: NDArray[np.complex64]) -> Non
     def some(first: int) -> None:
         to[first : first + _CHIRPS_AT_ONCE] = chirps[first : first + _CHIRPS_AT_ONCE]
 
-    in_threads(some, range(0, len(chirps), _CHIRPS_AT_ONCE))
+    thread_map(some, range(0, len(chirps), _CHIRPS_AT_ONCE))

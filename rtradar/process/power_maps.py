@@ -27,7 +27,7 @@ from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 from rtradar.process.spectra import complex_kind
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _CHANCE = 1e-3
 """Chance that noise alone passes for an echo, whose copies are removed, on the Doppler axis of a
@@ -119,7 +119,7 @@ def _doppler_power(
         return total
 
     # The order of the sum is fixed, so the map does not depend on the number of threads.
-    first, *others = in_threads(power_of, chosen[::together])
+    first, *others = thread_map(power_of, chosen[::together])
     for power in others:
         first += power
     return first

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.radar import Radar
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _Map = tuple[NDArray[np.floating], NDArray[np.float64]]
 """Power (slow_time, range) and the centres of its steps (slow_time,) [s]."""
@@ -57,7 +57,7 @@ def range_time(
         )
     together = radar.n_tx if radar.multiplexing == "ddm" else 1  # Tx in every row
     bounds, times = _steps(len(chirps), radar, first_chirp, step_s)
-    power = in_threads(
+    power = thread_map(
         lambda step: _mean_power(chirps[slice(*bounds[step])]) / together, range(len(bounds))
     )
     return np.array(power, dtype=chirps.real.dtype).reshape(len(power), chirps.shape[2]), times
@@ -158,7 +158,7 @@ class SlidingRangeTime:
             return _Step(float(times[number]), len(own), mean, _mean_power(own - mean))
 
         ready = []
-        for one in in_threads(step, range(len(bounds))):
+        for one in thread_map(step, range(len(bounds))):
             if len(self._frame) == self._steps:
                 oldest = self._frame.popleft()
                 self._sum -= oldest.cycles * oldest.mean

@@ -22,7 +22,7 @@ from rtradar.process.steering import range_walk
 from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _CHIRPS_PER_BATCH = 128
 """Chirps of one transform: 8 receivers x 256 samples x 8 bytes make 2 MB, the cache of a core."""
@@ -144,7 +144,7 @@ def range_spectrum(
         if not np.shares_memory(done, block):
             block[...] = done
 
-    in_threads(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
+    thread_map(transform, range(0, samples.shape[0], _CHIRPS_PER_BATCH))
     return spectra
 
 
@@ -242,7 +242,7 @@ def cell_spectra(
         first = tx * radar.n_rx + rx
         values[:, :, first : first + weighted.shape[1]] = doppler[turns, :, place]
 
-    in_threads(transform, range(radar.n_tx * batches))
+    thread_map(transform, range(radar.n_tx * batches))
     return values
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 
 if TYPE_CHECKING:
     from rtradar.radar.radar import Radar
@@ -132,7 +132,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     yield (
         r.carrier_step_hz is None
         or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz),
-        f"carrier_step_hz = {shown(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
+        f"carrier_step_hz = {brief(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
         "Hz wide (samples_per_chirp / chirp_duration_s), so carriers must be at least that far "
         "apart",
     )
@@ -145,7 +145,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
     yield (
         r.doppler_bands is None
         or (_is_count(r.doppler_bands) and r.n_tx < r.doppler_bands <= _MOST),
-        f"doppler_bands = {shown(r.doppler_bands)}; it must be a whole number above {r.n_tx}, the "
+        f"doppler_bands = {brief(r.doppler_bands)}; it must be a whole number above {r.n_tx}, the "
         "number of Tx",
     )
     yield (
@@ -172,7 +172,7 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
     The message of an `InputError` names the field and what is allowed.
     """
     if not (isinstance(values["name"], str) and values["name"].isprintable()):
-        raise InputError(f"radar: name = {shown(values['name'])}; it must be one line of text")
+        raise InputError(f"radar: name = {brief(values['name'])}; it must be one line of text")
     radar = f"radar '{values['name']}'"
     found: dict[str, Any] = {}
     for field, rule in FIELD_RULES.items():
@@ -183,7 +183,7 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
             except InputError as error:
                 raise InputError(f"{radar}: {field}: {error}") from None
         if not rule.allows(value):
-            raise InputError(f"{radar}: {field} = {shown(value)}; {rule.requirement}")
+            raise InputError(f"{radar}: {field} = {brief(value)}; {rule.requirement}")
         found[field] = rule.convert(value)
     return found
 

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import check_number, check_text, shown
+from rtradar.system.checks import brief, check_number, check_text
 
 VACUUM_PERMITTIVITY_FPM = 8.8541878188e-12
 """Permittivity of vacuum [F/m], CODATA 2022.
@@ -262,7 +262,7 @@ def material(name: str) -> Material:
     """
     if not isinstance(name, str) or name not in MATERIALS:
         raise InputError(
-            f"material {shown(name)} is unknown; allowed: {', '.join(sorted(MATERIALS))}"
+            f"material {brief(name)} is unknown; allowed: {', '.join(sorted(MATERIALS))}"
         )
     return MATERIALS[name]
 
@@ -300,7 +300,7 @@ def own_material(
     InputError
         Where a value has no physical meaning, or the source is not named.
     """
-    where = f"material {shown(name)}"
+    where = f"material {brief(name)}"
     check_text(where, "its name", name)
     if name in MATERIALS:
         raise InputError(
@@ -317,7 +317,7 @@ def own_material(
     ends = law.eta(np.array([low, high]))
     if not all(value.real >= 1.0 and isfinite(abs(value)) for value in ends):
         raise InputError(
-            f"{where}: a = {shown(a)}, b = {shown(b)} give a permittivity of {ends[0].real:.3g} to "
+            f"{where}: a = {brief(a)}, b = {brief(b)} give a permittivity of {ends[0].real:.3g} to "
             f"{ends[1].real:.3g}; it must be 1 or more"
         )
     return Material(name=name, source=str(source), bands=(law,))

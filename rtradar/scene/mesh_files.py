@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 from rtradar.system.files import open_regular, read_bytes
 
 MESH_ENDINGS = (".ply", ".obj", ".stl", ".glb")
@@ -164,7 +164,7 @@ def _check_ply_header(where: str, content: bytes) -> None:
         most = MOST_FACES if kind == b"face" else 3 * MOST_FACES
         if len(count) > 12 or int(count) > most:
             raise InputError(
-                f"{where} promises more elements {shown(kind.decode('ascii', 'replace'))} than the "
+                f"{where} promises more elements {brief(kind.decode('ascii', 'replace'))} than the "
                 f"{most} allowed"
             )
 
@@ -230,7 +230,7 @@ def _load(where: str, ending: str, content: bytes) -> tuple[NDArray[np.float64],
             "the mesh as binary PLY"
         ) from None
     except Exception as error:  # what trimesh raises at broken files is of any type
-        reason = shown(str(error))[1:-1] or type(error).__name__
+        reason = brief(str(error))[1:-1] or type(error).__name__
         raise InputError(f"{where} is broken or is no {ending[1:]} file: {reason}") from None
     if not parts:
         raise InputError(f"{where} has no triangles")

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
 from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
-from rtradar.system.checks import Vector, check_number, check_text, check_vector, shown
+from rtradar.system.checks import Vector, brief, check_number, check_text, check_vector
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 """Sides at the least x, largest x, least y, largest y, z = 0 and the top."""
@@ -89,13 +89,13 @@ class Wall:
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
                 raise InputError(
-                    f"{where}: {key} = {shown(getattr(self, key))}; an edge must be {_SHORTEST_M} "
+                    f"{where}: {key} = {brief(getattr(self, key))}; an edge must be {_SHORTEST_M} "
                     "m long or more"
                 )
         u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
         if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
             raise InputError(
-                f"{where}: edge_u_m = {shown(self.edge_u_m)} and edge_v_m = {shown(self.edge_v_m)} "
+                f"{where}: edge_u_m = {brief(self.edge_u_m)} and edge_v_m = {brief(self.edge_v_m)} "
                 "are not at right angles; a wall is a rectangle"
             )
         _check(self, where, SURFACE_LIMITS)
@@ -201,7 +201,7 @@ def room_walls(
     lengths = check_vector("room", "size_m", size_m, 3, most)
     if min(lengths) < least:
         raise InputError(
-            f"room: size_m = {shown(size_m)}; each must be from {least:g} to {most:g} m"
+            f"room: size_m = {brief(size_m)}; each must be from {least:g} to {most:g} m"
         )
     a, b, h = lengths
     faces: dict[str, tuple[Vector, Vector, Vector]] = {
@@ -265,11 +265,11 @@ class Furniture:
         object.__setattr__(self, "position_m", position)
         _check(self, where, FURNITURE_LIMITS)
         if not isinstance(self.sheet, bool):
-            raise InputError(f"{where}: sheet = {shown(self.sheet)}; it must be true or false")
+            raise InputError(f"{where}: sheet = {brief(self.sheet)}; it must be true or false")
         if self._built_in:
             if self.mesh not in mesh_names():
                 raise InputError(
-                    f"{where}: mesh = {shown(self.mesh)} is unknown; allowed: "
+                    f"{where}: mesh = {brief(self.mesh)} is unknown; allowed: "
                     f"{', '.join(mesh_names())}, or a file of {' '.join(MESH_ENDINGS)}"
                 )
             if self.metres_per_unit is not None or self.sheet:
@@ -340,7 +340,7 @@ def _check(thing: Any, where: str, limits: Limits) -> None:
     """Check the material of a wall or a piece of furniture, and its numbers."""
     if not isinstance(thing.material, Material):
         raise InputError(
-            f"{where}: material = {shown(thing.material)}; it must be a Material, as "
+            f"{where}: material = {brief(thing.material)}; it must be a Material, as "
             "material('concrete') gives"
         )
     for key, (least, most) in limits.items():

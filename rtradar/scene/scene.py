@@ -19,12 +19,12 @@ from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
 from rtradar.system.checks import (
     Vector,
+    brief,
     check_number,
     check_text,
     check_vector,
     inside,
     printable,
-    shown,
 )
 from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
@@ -90,7 +90,7 @@ class Scene:
     def __post_init__(self) -> None:
         for key in ("name", "description"):
             if not isinstance(getattr(self, key), str):
-                raise InputError(f"scene: {key} = {shown(getattr(self, key))}; it must be a string")
+                raise InputError(f"scene: {key} = {brief(getattr(self, key))}; it must be a string")
         where = f"scene '{self.name}'"
         for key, kind in (("walls", Wall), ("furniture", Furniture)):
             pieces = tuple(getattr(self, key))
@@ -216,7 +216,7 @@ def _named(name: str) -> Path:
     known = {file.stem: file for file in sorted(scenes_folder().glob("*.toml"))}
     if name not in known:
         raise InputError(
-            f"scene {shown(name)} is unknown; allowed: {', '.join(known)}, or the path of a TOML "
+            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or the path of a TOML "
             "file"
         )
     return known[name]
@@ -229,7 +229,7 @@ def _fields(table: Table, path: Path) -> dict[str, Any]:
     check_keys("", table, (), (*texts, *tables))
     for key in texts:
         if key in table and not (isinstance(table[key], str) and table[key].isprintable()):
-            raise InputError(f"{key} = {shown(table[key])}; it must be a string of one line")
+            raise InputError(f"{key} = {brief(table[key])}; it must be a string of one line")
     materials = {**MATERIALS, **_own_materials(table_at("materials", table))}
     room = _room(table["room"], materials) if "room" in table else ()
     fields: dict[str, Any] = {
@@ -262,7 +262,7 @@ def _own_materials(table: Table) -> dict[str, Material]:
 
 def _room(table: object, materials: Mapping[str, Material]) -> tuple[Wall, ...]:
     if not isinstance(table, dict):
-        raise InputError(f"room = {shown(table)}; it must be a table: [room]")
+        raise InputError(f"room = {brief(table)}; it must be a table: [room]")
     check_keys("[room] ", table, KEYS["[room]"][0], ("walls", *ROOM_SIDES))
     surfaces = {}
     for side in ROOM_SIDES:
@@ -301,10 +301,10 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
     if not Path(text).suffix:
         return text
     if Path(text).suffix.lower() not in MESH_ENDINGS:
-        raise InputError(f"{where}mesh = {shown(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
+        raise InputError(f"{where}mesh = {brief(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
     if inside(folder, text) is None:
         raise InputError(
-            f"{where}mesh = {shown(text)} leaves the folder of the scene file; put the mesh beside "
+            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put the mesh beside "
             "it or below"
         )
     return folder / text
@@ -314,7 +314,7 @@ def _material(where: str, value: object, materials: Mapping[str, Material]) -> M
     if not isinstance(value, str) or value not in materials:
         allowed = ", ".join(sorted(materials))
         raise InputError(
-            f"{where}material = {shown(value)} is unknown; allowed: {allowed}, or a table "
+            f"{where}material = {brief(value)} is unknown; allowed: {allowed}, or a table "
             "[materials.NAME] of your own"
         )
     return materials[value]

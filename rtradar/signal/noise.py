@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from rtradar.kernels.gaussian_noise import add_noise
 from rtradar.radar import Radar
 from rtradar.system.seeds import check_seed, stream
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _CYCLES_AT_ONCE = 16
 """Cycles of one task of a thread, because a return to Python waits for the other threads there."""
@@ -97,7 +97,7 @@ class Noise:
             numbers = range(begin, begin + -(-len(part) // rows))
             add_noise(np.array([_stream(self.seed, n) for n in numbers]), rows, sigma, part)
 
-        in_threads(fill, range(0, len(samples), _CYCLES_AT_ONCE * rows))
+        thread_map(fill, range(0, len(samples), _CYCLES_AT_ONCE * rows))
 
 
 def _stream(seed: int, cycle: int) -> NDArray[np.uint64]:

@@ -16,7 +16,7 @@ from rtradar.kernels.nufft import LEAST_SAMPLES, MOST_NODES, sum_by_nufft
 from rtradar.kernels.tone_sum import MIDDLE, Tones, add_tones, tone_tables
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
-from rtradar.system.threads import in_threads, thread_count
+from rtradar.system.threads import thread_count, thread_map
 
 MAX_BINS_IN_CHIRP = 0.1
 """Range bins by which a length, which belongs to the centre of its chirp, may change inside one."""
@@ -131,7 +131,7 @@ def synthesize(
     def fill(begin: int) -> None:
         add_tones(begin, min(begin + at_once, len(out)), tones, tables, out)
 
-    in_threads(fill, range(0, len(out), at_once))
+    thread_map(fill, range(0, len(out), at_once))
     return out
 
 

@@ -15,7 +15,7 @@ from rtradar.errors import InputError
 Vector = tuple[float, float, float]
 
 
-def shown(value: object) -> str:
+def brief(value: object) -> str:
     """A value as messages show it: one line, not too long."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return "a number of more than 20 digits"
@@ -50,7 +50,7 @@ def check_number(where: str, key: str, value: object, least: float, most: float)
     number = _number(value)
     if number is None or not least <= number <= most:
         raise InputError(
-            f"{where}: {key} = {shown(value)}; it must be a number from {least:g} to {most:g}"
+            f"{where}: {key} = {brief(value)}; it must be a number from {least:g} to {most:g}"
         )
     return number
 
@@ -70,7 +70,7 @@ def check_vector(
         if len(numbers) == size:
             return tuple(numbers)
     raise InputError(
-        f"{where}: {key} = {shown(value)}; it must be {size} numbers from {-most:g} to {most:g}"
+        f"{where}: {key} = {brief(value)}; it must be {size} numbers from {-most:g} to {most:g}"
     )
 
 
@@ -78,7 +78,7 @@ def check_text(where: str, key: str, value: object) -> str:
     """One line of text, not empty."""
     if isinstance(value, str) and value.strip() and value.isprintable():
         return value
-    raise InputError(f"{where}: {key} = {shown(value)}; it must be a string of one line, not empty")
+    raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
 
 
 def array_to_fill(

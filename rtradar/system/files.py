@@ -79,7 +79,7 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             )
     # Not by the process alone: on a shared disk another machine may write the same file.
     beside = target.with_name(f".{target.name}.{secrets.token_hex(_TOKEN_BYTES)}.part")
-    with unfinished(lambda: beside.unlink(missing_ok=True)):
+    with cleanup_on_exit(lambda: beside.unlink(missing_ok=True)):
         try:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
         except OSError as error:
@@ -380,13 +380,13 @@ def temporary_folder(prefix: str = "rtradar-", inside: Path | None = None) -> It
     """A folder that is gone at the end, also where the process is told to end before."""
     with (
         tempfile.TemporaryDirectory(prefix=prefix, dir=inside) as name,
-        unfinished(lambda: shutil.rmtree(name, ignore_errors=True)),
+        cleanup_on_exit(lambda: shutil.rmtree(name, ignore_errors=True)),
     ):
         yield Path(name)
 
 
 @contextmanager
-def unfinished(remove: Callable[[], object]) -> Iterator[None]:
+def cleanup_on_exit(remove: Callable[[], object]) -> Iterator[None]:
     """While this lasts there is something that ``remove`` takes away, should the process have to end meanwhile."""
     with _lock:
         _unfinished.append(remove)

@@ -27,7 +27,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from rtradar.errors import InputError
-from rtradar.system.files import DISK_ERRORS, unfinished, uninterruptible
+from rtradar.system.files import DISK_ERRORS, cleanup_on_exit, uninterruptible
 
 _WORK = re.compile(r"\.rtradar-[0-9a-f]{16}")
 _MARKER = ".made-by-rtradar"
@@ -123,7 +123,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                 with suppress(OSError):
                     folder.rmdir()  # an empty one only
 
-        with unfinished(give_up):
+        with cleanup_on_exit(give_up):
             try:
                 yield work.path
                 with uninterruptible():
@@ -153,7 +153,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
 
 
 @contextmanager
-def alone_in(folder: Path) -> Iterator[None]:
+def exclusive_lock(folder: Path) -> Iterator[None]:
     """While this lasts no other process of this machine does the same in the folder; after the end of a process it may.
 
     Parameters

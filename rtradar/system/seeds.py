@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from rtradar.errors import InputError
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 
 MOST_SEED = 2**63 - 1
 """Fits the whole numbers of every file that keeps it."""
@@ -39,7 +39,7 @@ def check_seed(where: str, seed: object) -> int:
         or not 0 <= seed <= MOST_SEED
     ):
         raise InputError(
-            f"{where}seed = {shown(seed)}; it must be a whole number from 0 to {MOST_SEED}"
+            f"{where}seed = {brief(seed)}; it must be a whole number from 0 to {MOST_SEED}"
         )
     return int(seed)
 

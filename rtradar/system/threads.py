@@ -22,7 +22,7 @@ def thread_limit() -> int | None:
 
 
 def thread_count() -> int:
-    """Threads that `in_threads` has: as many as this process may use."""
+    """Threads that `thread_map` has: as many as this process may use."""
     return thread_limit() or _cores()
 
 
@@ -44,7 +44,7 @@ def thread_environment(threads: int) -> dict[str, str]:
     return dict.fromkeys(own, str(threads))
 
 
-def in_threads(work: Callable[[int], _Result], items: range) -> list[_Result]:
+def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
     """Results in the order of the items; NumPy, the FFT and compiled loops release the interpreter lock, so threads do pay.
 
     The caller works too: to sleep and be woken takes as long as many an item. Of errors that of the first item is raised.

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from rtradar.errors import InputError
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 from rtradar.system.files import read_bytes
 
 Table = Mapping[str, Any]
@@ -46,9 +46,9 @@ def read_toml(path: Path, what: str, cure: str) -> Table:
         # Windows' editors begin a file with a byte order mark, which is no part of its text.
         return tomllib.loads(content.decode("utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
-        raise InputError(f"{where} is not TOML: {shown(str(error))[1:-1]}") from None
+        raise InputError(f"{where} is not TOML: {brief(str(error))[1:-1]}") from None
     except ValueError as error:  # an integer of too many digits
-        raise InputError(f"{where} cannot be used: {shown(str(error))[1:-1]}") from None
+        raise InputError(f"{where} cannot be used: {brief(str(error))[1:-1]}") from None
 
 
 def table_at(key: str, table: Table, parent: str = "") -> Table:
@@ -56,7 +56,7 @@ def table_at(key: str, table: Table, parent: str = "") -> Table:
     value = table.get(key, {})
     if not isinstance(value, dict):
         raise InputError(
-            f"{parent}{shown(key)[1:-1]} = {shown(value)}; it must be a table: [{parent}{shown(key)[1:-1]}]"
+            f"{parent}{brief(key)[1:-1]} = {brief(value)}; it must be a table: [{parent}{brief(key)[1:-1]}]"
         )
     return value
 
@@ -66,7 +66,7 @@ def tables_at(key: str, table: Table) -> list[tuple[str, Table]]:
     value = table.get(key, [])
     if not isinstance(value, list) or not all(isinstance(piece, dict) for piece in value):
         raise InputError(
-            f"{key} = {shown(value)}; it must be a list of tables: [[{key}]] once for each"
+            f"{key} = {brief(value)}; it must be a list of tables: [[{key}]] once for each"
         )
     if len(value) > _MOST_PIECES:
         raise InputError(f"[[{key}]] stands there {len(value)} times; {_MOST_PIECES} are allowed")
@@ -80,7 +80,7 @@ def check_keys(
     allowed = (*needed, *optional)
     for key in table:
         if key not in allowed:
-            raise InputError(f"{where}unknown key {shown(key)}; allowed: {', '.join(allowed)}")
+            raise InputError(f"{where}unknown key {brief(key)}; allowed: {', '.join(allowed)}")
     for key in needed:
         if key not in table:
             raise InputError(f"{where}{key} is missing; needed: {', '.join(needed)}")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
 from rtradar.kernels.scatter.near_rays import near_rays
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 from rtradar.trace.rays import any_met
 
 _LINES_A_THREAD = 1 << 14
@@ -118,7 +118,7 @@ class BodyTracer:
             )
             return rays, line + begin
 
-        found = in_threads(near, range(0, len(starts), _LINES_A_THREAD))
+        found = thread_map(near, range(0, len(starts), _LINES_A_THREAD))
         seen = np.ones(len(starts), dtype=bool)
         if found:
             rays, line = (np.concatenate(arrays, axis=-1) for arrays in zip(*found, strict=True))

@@ -25,7 +25,7 @@ from rtradar.campaign.samples import Made, SamplePlan
 from rtradar.clouds import Collection, Sample
 from rtradar.clouds.dataset_store import sample_path, sweep, write_index
 from rtradar.errors import CampaignError, InputError
-from rtradar.system.output_folder import alone_in
+from rtradar.system.output_folder import exclusive_lock
 
 RECIPES = [
     SamplePlan(f"label {number % 3}", {"number": number, "version": __version__}, None, None)  # type: ignore[arg-type]
@@ -201,7 +201,7 @@ def test_a_second_build_into_a_folder_is_refused_and_takes_nothing_from_the_firs
     out = tmp_path / "out"
     out.mkdir()
     unfinished = out / ".0123.npz.0123456789ab.part"
-    with alone_in(out):
+    with exclusive_lock(out):
         unfinished.write_bytes(b"half")
         with pytest.raises(InputError, match=r"another command writes into .*out.*; wait"):
             build_dataset(tmp_path / "set.toml", out)

@@ -17,10 +17,10 @@ import pytest
 from rtradar.system import threads
 from rtradar.system.threads import (
     THREADS_VARIABLE,
-    in_threads,
     thread_count,
     thread_environment,
     thread_limit,
+    thread_map,
 )
 
 COUNT = """
@@ -33,8 +33,8 @@ print(rtradar.system.threads._pool()._max_workers, numba.get_num_threads(), drji
 
 
 def test_results_come_in_the_order_of_the_items() -> None:
-    assert in_threads(lambda item: item * item, range(20)) == [item * item for item in range(20)]
-    assert in_threads(str, range(0)) == []
+    assert thread_map(lambda item: item * item, range(20)) == [item * item for item in range(20)]
+    assert thread_map(str, range(0)) == []
 
 
 def test_an_error_in_a_thread_is_raised() -> None:
@@ -42,7 +42,7 @@ def test_an_error_in_a_thread_is_raised() -> None:
         raise ValueError(f"item {item}")
 
     with pytest.raises(ValueError, match="item 0"):
-        in_threads(fail, range(2))
+        thread_map(fail, range(2))
 
 
 def test_after_an_error_no_other_item_is_begun() -> None:
@@ -53,7 +53,7 @@ def test_after_an_error_no_other_item_is_begun() -> None:
         raise ValueError(f"item {item}")
 
     with pytest.raises(ValueError, match=r"item 0"):
-        in_threads(fail, range(1000))
+        thread_map(fail, range(1000))
     assert sorted(begun) == list(range(len(begun)))
     assert len(begun) <= thread_count()
 
@@ -76,12 +76,12 @@ def test_after_an_interrupt_nobody_works_on(monkeypatch: pytest.MonkeyPatch) -> 
 
     monkeypatch.setattr(threads, "wait", interrupted)
     with pytest.raises(KeyboardInterrupt):
-        in_threads(work, range(2))
+        thread_map(work, range(2))
     assert len(begun) == 1
 
 
 def test_work_may_itself_be_shared_among_threads() -> None:
-    found = in_threads(lambda item: sum(in_threads(lambda other: item * other, range(8))), range(8))
+    found = thread_map(lambda item: sum(thread_map(lambda other: item * other, range(8))), range(8))
     assert found == [28 * item for item in range(8)]
 
 
@@ -99,7 +99,7 @@ def test_work_is_not_kept_for_threads_that_have_not_woken() -> None:
         threads._pool().submit(done.wait, 60) for _ in range(3)
     ]  # as on a machine that is busy with other things
     try:
-        in_threads(partial(work, array=array), range(8))
+        thread_map(partial(work, array=array), range(8))
         del array
         assert gone() is None
     finally:
@@ -111,11 +111,11 @@ def test_work_is_not_kept_for_threads_that_have_not_woken() -> None:
 def test_a_forked_process_has_threads_of_its_own() -> None:
     program = """
 import os
-from rtradar.system.threads import in_threads
-in_threads(str, range(4))
+from rtradar.system.threads import thread_map
+thread_map(str, range(4))
 child = os.fork()
 if child == 0:
-    os._exit(0 if in_threads(str, range(4)) == ["0", "1", "2", "3"] else 1)
+    os._exit(0 if thread_map(str, range(4)) == ["0", "1", "2", "3"] else 1)
 raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
 """
     assert (

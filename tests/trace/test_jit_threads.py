@@ -13,7 +13,7 @@ import pytest
 import rtradar as rt
 from rtradar.body import Body
 from rtradar.scatter import build_model
-from rtradar.system.threads import THREADS_VARIABLE, in_threads
+from rtradar.system.threads import THREADS_VARIABLE, thread_map
 from rtradar.trace.backends.backend import Backend, use
 from rtradar.trace.body_tracer import UnitSphere
 
@@ -54,7 +54,7 @@ def test_a_kernel_serves_all_threads(backend: Backend) -> None:
 def test_many_threads_trace_at_once(backend: Backend) -> None:
     sphere = UnitSphere(use(backend))
     count = 40 if backend.kind == "scalar" else 4000
-    found = in_threads(lambda item: int(sphere.meets(rays(count + item)).sum()), range(32))
+    found = thread_map(lambda item: int(sphere.meets(rays(count + item)).sum()), range(32))
     assert found == [(count + item + 1) // 2 for item in range(32)]
 
 

@@ -130,13 +130,13 @@ STARVED = """
 import sys, threading
 import rtradar as rt
 from rtradar.motion import synthetic_motion
-from rtradar.system.threads import in_threads, thread_count
+from rtradar.system.threads import thread_map, thread_count
 awake, duration_s, out = int(sys.argv[1]), float(sys.argv[2]), sys.argv[3]
 asleep = threading.Event()
 if not awake:
     taken = threading.Barrier(thread_count() + 1)
     hold = lambda item: (taken.wait(), asleep.wait())
-    threading.Thread(target=in_threads, args=(hold, range(thread_count())), daemon=True).start()
+    threading.Thread(target=thread_map, args=(hold, range(thread_count())), daemon=True).start()
     taken.wait()
 try:
     motion, radar = synthetic_motion("walk", duration_s=duration_s), rt.Radar.preset("paper-12ghz")

@@ -22,7 +22,7 @@ from rtradar.errors import InputError
 from rtradar.motion.formats.markers import NEEDED, joint_centres, rigid_motion
 from rtradar.motion.motion import Motion
 from rtradar.motion.quaternions import to_world
-from rtradar.system.checks import shown
+from rtradar.system.checks import brief
 from rtradar.system.files import open_regular
 
 _UNITS_M = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
@@ -205,7 +205,7 @@ def _read(handle: object) -> _Content:
 def _column(path: Path, labels: list[str], name: str) -> int:
     plain = [re.sub(r"^.*:", "", label.strip(" \0")).upper() for label in labels]
     if name not in plain:
-        some = shown(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
+        some = brief(", ".join(label.strip(" \0") for label in labels[:4]))[1:-1]
         raise InputError(
             f"{path}: marker {name} is missing ({len(labels)} there: {some}, ...); the 41 markers "
             "of CMU and HDM05 are understood, rename or add it"

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from rtradar.kernels.scatter.envelope import PLACES, find_slopes
 from rtradar.scatter.common.keyframes import KeyframeCache
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _KEPT_KEYFRAMES = 2048
 """Keyframes kept, so that the passes for power and for the signal trace once (some 50 MB)."""
@@ -91,7 +91,7 @@ class Envelope:
         """Find these keyframes, of `TOGETHER` intervals at most, with all cores."""
         wanted = sorted({min(index, self._end) for index in indices})
         missing = [index for index in wanted if index not in self._keyframes]
-        found = in_threads(
+        found = thread_map(
             lambda n: self._sample(float(missing[n]), self._parts, None), range(len(missing))
         )
         for index, sample in zip(missing, found, strict=True):
@@ -110,7 +110,7 @@ class Envelope:
             index + step for index in missing for step in (-1, 0, 1, 2) if index + step >= 0
         )
         ends = [self._ends(index) for index in missing]
-        found = in_threads(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
+        found = thread_map(lambda n: self._divided(missing[n], *ends[n]), range(len(missing)))
         for index, interval in zip(missing, found, strict=True):
             self._intervals.keep(index, interval)
 

@@ -17,7 +17,7 @@ from rtradar.body.meshes import MAXIMUM_SUBDIVISIONS, unit_sphere
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves, integrate
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 MAXIMUM_FACETS = 20 * 4**MAXIMUM_SUBDIVISIONS
 """Facets of one ellipsoid beyond which no icosphere is built."""
@@ -133,7 +133,7 @@ def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.com
     shape = tasks, len(waves.pairs), waves.wavenumber.shape[1]
     out = np.empty(shape, dtype=np.complex128)
     at_once = 1 if out.size * len(facets.faces) >= _PARALLEL_TERMS else max(1, tasks)
-    in_threads(
+    thread_map(
         lambda first: integrate(first, min(first + at_once, tasks), facets, views, waves, out),
         range(0, tasks, at_once),
     )

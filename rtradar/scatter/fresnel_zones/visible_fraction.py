@@ -30,7 +30,7 @@ from rtradar.kernels.scatter.fresnel_zones import (
     zone_points,
     zone_sums,
 )
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
 BISECTIONS = 11
@@ -205,7 +205,7 @@ def _points(maps: ZoneMaps, zone: NDArray[np.int64], places: Array) -> Array:
         own = slice(begin, begin + 4096)
         zone_points(maps, zone[own], x[own], y[own], out[own])
 
-    in_threads(fill, range(0, len(zone), 4096))
+    thread_map(fill, range(0, len(zone), 4096))
     return out
 
 
@@ -228,5 +228,5 @@ def _sums(
         open_fractions(*some, fractions[own])
         zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, out)
 
-    in_threads(add, range(0, len(points), _ZONES_A_THREAD))
+    thread_map(add, range(0, len(points), _ZONES_A_THREAD))
     return out

@@ -13,7 +13,7 @@ from rtradar.kernels.scatter.specular_point import Geometry, Options, solve
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses
-from rtradar.system.threads import in_threads
+from rtradar.system.threads import thread_map
 
 _CHIRPS_PER_THREAD = 64
 """Fewer cost more for waking threads than for the work, the more so while Mitsuba's are awake."""
@@ -71,7 +71,7 @@ def solve_specular_points(
         last = min(first + _CHIRPS_PER_THREAD, len(at.tx))
         solve(first, last, at, begin, options, length, amplitude, point)
 
-    in_threads(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
+    thread_map(some, range(0, len(at.tx), _CHIRPS_PER_THREAD))
     return length, amplitude, point
 
 
