@@ -300,6 +300,59 @@ def _blend_fractions() -> tuple[Call, Call]:
     return call, lambda: blend_fractions_reference(*given)
 
 
+@kernel_case("scatter.facet_rays.facet_rays", "rays to 300 vertices of 6 parts, counted", 0)
+def _facet_rays() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.facet_rays import facet_rays, facet_rays_reference
+
+    rng, parts, antennas = np.random.default_rng(0), np.array([4, 1, 2]), 2
+    u = rng.normal(size=(6, 3, 300))
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    axes, centres = rng.uniform(0.05, 0.25, (6, 3)), rng.uniform(-0.4, 0.4, (6, 3))
+    frames = np.linalg.qr(rng.normal(size=(6, 3, 3)))[0]
+    places = np.array([-4.0, 0, 0]) + rng.normal(0, 0.3, (antennas, 3))
+    given = places, parts, centres, frames, axes, u * axes[:, :, None]
+
+    def count() -> Any:
+        slots = facet_rays(*given, 0.0)[1][0]
+        return np.bincount(slots, minlength=antennas * 900).reshape(antennas, 3, 300)
+
+    return count, lambda: facet_rays_reference(*given)
+
+
+@kernel_case("scatter.facet_rays.first_occluders", "the part met first of 5000 rays", 0)
+def _first_occluders() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.facet_rays import first_occluders, first_occluders_reference
+
+    rng, found = np.random.default_rng(0), np.empty(3000, dtype=np.int16)
+    rays = rng.uniform(size=5000) < 0.5, rng.uniform(size=5000).astype(np.float32)
+    whose = np.stack([rng.integers(0, 3000, 5000), rng.integers(0, 21, 5000)])
+
+    def call() -> Any:
+        found[:] = -1
+        first_occluders(*rays, whose, found)
+        return found
+
+    return call, lambda: first_occluders_reference(*rays, whose, 3000)
+
+
+@kernel_case("scatter.footprints.radiate_tubes", "2000 footprints of ray tubes to one Rx", 1e-3)
+def _radiate_tubes() -> tuple[Call, Call]:
+    from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes, radiate_tubes_reference
+
+    rng, count = np.random.default_rng(0), 2000
+    places = rng.normal(0, 0.3, (count, 1, 3)) + rng.normal(0, 0.004, (count, 4, 3))
+    places[:, 3] = places[:, :3].mean(axis=1)
+    directions, fields = rng.normal(size=(2, count, 3))
+    path = 4 + rng.uniform(0, 0.01, (count, 4))
+    tubes = Tubes(places, path, directions, -directions, fields, np.zeros(count, dtype=np.int64))
+    rx, wavenumber = np.array([[-4.0, 0.5, 0.2]]), np.array([_WAVENUMBER])
+    out, length = np.empty((8, 1, 1, 1), dtype=np.complex128), np.full((1, 1), 8.0)
+    given = tubes, np.ones((1, count), dtype=np.bool_), rx, wavenumber, length
+    call = filled(radiate_tubes, *given, False, True, False, out=(out,), adds=True)
+    reference = (tubes, rx[0], _WAVENUMBER, 8.0)
+    return lambda: call()[0].sum(), lambda: radiate_tubes_reference(*reference)
+
+
 # -- specular points and facets --------------------------------------------------------------------
 
 

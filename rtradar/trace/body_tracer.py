@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
+from rtradar.kernels.scatter.facet_rays import facet_rays, first_occluders
 from rtradar.kernels.scatter.near_rays import near_rays
 from rtradar.system.threads import thread_map
 from rtradar.trace.rays import any_met
@@ -124,3 +125,40 @@ class BodyTracer:
             rays, line = (np.concatenate(arrays, axis=-1) for arrays in zip(*found, strict=True))
             seen[line[self._sphere.meets(rays)]] = False
         return seen
+
+    def occluders(
+        self,
+        centres: NDArray[np.float64],
+        frames: NDArray[np.float64],
+        antennas: NDArray[np.float64],
+        parts: NDArray[np.int64],
+        vertices: NDArray[np.float64],
+        margin: float,
+    ) -> NDArray[np.int16]:
+        """Part that occludes each vertex, as each antenna sees it.
+
+        Parameters
+        ----------
+        centres, frames : (part, 3), (part, 3, 3) float64
+            Pose of the body, world [m].
+        antennas : (antenna, 3) float64
+            Places of the antennas, world [m].
+        parts : (n,) int64
+            Parts whose vertices are asked about; all parts may occlude them.
+        vertices : (part, 3, vertex) float64
+            Vertices of every part of the body, on its ellipsoid, in its own axes [m].
+        margin : float
+            Vertices that face away by more than this sine are not asked about.
+
+        Returns
+        -------
+        (antenna, n, vertex) int16
+            Another part that is nearer to the antenna on the same line; else -1.
+        """
+        found = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
+        floats = (antennas, centres, frames, self._semi_axes)
+        places, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
+        asked = np.ascontiguousarray(parts, dtype=np.int64)
+        rays, whose = facet_rays(places, asked, *body, vertices, float(margin))
+        first_occluders(self._sphere.meets(rays[:7]), rays[7], whose, found.ravel())
+        return found

@@ -21,7 +21,7 @@ from rtradar.scatter.facets.surfaces import (
     subdivisions_for,
 )
 from rtradar.trace.backends.backend import select, use
-from rtradar.trace.facet_visibility import FacetTracer
+from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
 
@@ -38,7 +38,7 @@ class FacetShadows:
 
     Parameters
     ----------
-    tracer : FacetTracer
+    tracer : BodyTracer
         Tracer of the same body.
     facets : Facets
         Facets of ellipsoids with these semi-axes.
@@ -46,7 +46,7 @@ class FacetShadows:
         Semi-axes of the parts [m].
     """
 
-    def __init__(self, tracer: FacetTracer, facets: Facets, semi_axes: Array) -> None:
+    def __init__(self, tracer: BodyTracer, facets: Facets, semi_axes: Array) -> None:
         self._tracer, self._facets = tracer, facets
         self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
         # Coordinate by coordinate, as the tracer takes them.
@@ -130,7 +130,7 @@ class FacetBody:
         self.frequency = sweep_nodes(radar, nodes)
         backend = select(variant)
         self.variant = backend.kind
-        tracer = FacetTracer(use(backend), body.semi_axes)
+        tracer = BodyTracer(use(backend), body.semi_axes)
         self.seen = FacetShadows(tracer, self._facets, body.semi_axes).seen
 
     def amplitude(

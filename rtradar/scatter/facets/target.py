@@ -32,8 +32,8 @@ from rtradar.scatter.ray_tubes.tubes import in_four
 from rtradar.scatter.target import target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
+from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.bounces import MeshSurfaces
-from rtradar.trace.facet_visibility import FacetTracer
 
 if TYPE_CHECKING:
     import trimesh
@@ -121,7 +121,7 @@ def facet_scattering(
     surface = ellipsoid_facets(
         solid.semi_axes, subdivisions_for(_enough_facets(solid, float(wavenumber.max()), facets))
     )
-    shadows = FacetShadows(FacetTracer(use(backend), solid.semi_axes), surface, solid.semi_axes)
+    shadows = FacetShadows(BodyTracer(use(backend), solid.semi_axes), surface, solid.semi_axes)
     field = np.empty(len(tx), dtype=np.complex128)
     block = max(1, _VIEWS_AT_ONCE // (8 * len(solid.centres) * len(surface.faces)))
     for first in range(0, len(tx), block):

@@ -21,7 +21,7 @@ from rtradar.scatter.facets.surfaces import (
 )
 from rtradar.scatter.facets.target import facet_scattering
 from rtradar.trace.backends.backend import use
-from rtradar.trace.facet_visibility import FacetTracer
+from rtradar.trace.body_tracer import BodyTracer
 
 Array = NDArray[np.float64]
 seeds = st.integers(0, 2**32 - 1)
@@ -319,7 +319,7 @@ def test_a_shadow_moves_over_a_body_without_jumps(backend: object) -> None:
 def test_what_hides_a_vertex_is_what_the_line_of_sight_meets(backend: object) -> None:
     rng = np.random.default_rng(0)
     tracer_axes = rng.uniform(0.05, 0.25, (6, 3))
-    tracer = FacetTracer(use(backend), tracer_axes)  # type: ignore[arg-type]
+    tracer = BodyTracer(use(backend), tracer_axes)  # type: ignore[arg-type]
     vertices = ellipsoid_facets(tracer_axes, 2).vertices
     near, outlines, asked = 0, 0, 0
     for _ in range(3):

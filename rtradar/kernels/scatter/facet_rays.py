@@ -1,29 +1,27 @@
-"""Ask Mitsuba, for every vertex of every part that faces an antenna, which other part stands before it.
+"""Rays along lines of sight from antennas to the vertices of facets, past parts that they come near.
 
-Float32 decides visibility only. Each line of sight is brought to the axes in which the part that it may meet is the unit sphere,
-so there is nothing to pose, and each ray starts two radii before what it may meet. Lines that pass outside a volume a tenth
-larger than the part have no ray traced.
+Each line of sight is in the axes where the part that it may meet is the unit sphere, and each ray
+starts two radii before what it may meet. Lines that pass outside a volume a tenth larger than the
+part have no ray traced. Whether a ray meets the part itself is for Mitsuba to say.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from rtradar.kernels.jit import compiled, inlined
 from rtradar.kernels.scatter.facet_shadows import into_ball
-from rtradar.kernels.scatter.near_rays import NEAR
-from rtradar.trace.body_tracer import UnitSphere
+from rtradar.kernels.scatter.near_rays import NEAR, near_lines_reference
 
 
 @inlined(fastmath=True)
 def _nearest(x, y, z, start, turn, shift, nearest):
-    """Where the lines of sight to vertices come nearest to a part, as a fraction of the line; how many come near it.
+    """Fill in where lines of sight come nearest to a part, as fractions; return how many come near.
 
-    The part is the unit sphere in its own axes. ``nearest`` is -1 where the line passes outside the bounding volume.
+    The part is the unit sphere in its own axes. ``nearest`` is -1 where the line passes outside the
+    bounding volume.
     """
     s0, s1, s2 = start[0], start[1], start[2]
     square = s0 * s0 + s1 * s1 + s2 * s2
@@ -46,10 +44,10 @@ def _nearest(x, y, z, start, turn, shift, nearest):
 
 @inlined(fastmath={"contract"})
 def _facing(local, x, y, z, axes, margin, faces, begin):
-    """Whether a vertex ``faces`` an antenna, or not away by more than the margin.
+    """Fill in whether a vertex ``faces`` an antenna, or not away by more than the margin.
 
-    A vertex that faces away is seen through its own part: only what is met before the share ``begin`` of the way, where
-    that is met, counts as hiding it.
+    A vertex that faces away is seen through its own part: only what is met before that, at the
+    fraction ``begin`` of the way, occludes it.
     """
     s0, s1, s2 = 1 / axes[0] ** 2, 1 / axes[1] ** 2, 1 / axes[2] ** 2
     l0, l1, l2 = local[0], local[1], local[2]
@@ -81,7 +79,7 @@ def _grown(rays):
 
 @inlined()
 def _may_stand_before(antenna, part, other, centres, longest):
-    """Whether the bounding ball of a part may occlude that of another: it begins nearer, and their cones overlap."""
+    """Whether one bounding ball may occlude another: it begins nearer, and their cones overlap."""
     to_part, to_other, along = 0.0, 0.0, 0.0
     for i in range(3):
         a, b = centres[part, i] - antenna[i], centres[other, i] - antenna[i]
@@ -99,11 +97,12 @@ def _may_stand_before(antenna, part, other, centres, longest):
 
 
 @compiled()
-def _rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
-    """Return the rays that decide which part occludes which vertex.
+def facet_rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
+    """Return the rays that decide which part occludes which vertex, as `BodyTracer.occluders` asks.
 
-    Of each ray: start, direction and length in axes where the part that it may meet is the unit sphere (7,); place of the vertex
-    in (antenna, n, vertex), and the part (2,); and where on the line of sight it comes nearest to that part.
+    ``rays (8, ray)`` float32: start, direction and length in axes where the part that it may meet
+    is the unit sphere, and the fraction of the line of sight at which it comes nearest to it.
+    ``whose (2, ray)``: the place of the vertex in (antenna, n, vertex), and that part.
     """
     every, n_vertices = len(centres), vertices.shape[2]
     turn, shift, start, local = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
@@ -114,16 +113,13 @@ def _rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
     chosen, places = np.empty(n_vertices, dtype=np.int64), np.empty((3, n_vertices))
     faces, begins, begin = np.empty(n_vertices), np.empty(n_vertices), np.empty(n_vertices)
     nearest = np.empty(n_vertices)
-    rays, whose, count = (
-        np.empty((8, 4096), dtype=np.float32),
-        np.empty((2, 4096), dtype=np.int64),
-        0,
-    )
+    rays, whose = np.empty((8, 4096), dtype=np.float32), np.empty((2, 4096), dtype=np.int64)
+    count = 0
     for a in range(len(antennas)):
         for n in range(len(parts)):
             part = parts[n]
             facing = np.uint64(0)
-            looked_at = False
+            checked = False
             all_x, all_y, all_z = vertices[part, 0], vertices[part, 1], vertices[part, 2]
             x, y, z = places[0], places[1], places[2]
             slot = (a * len(parts) + n) * n_vertices
@@ -132,9 +128,9 @@ def _rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
                     continue
                 if not _may_stand_before(antennas[a], part, other, centres, longest):
                     continue
-                if not looked_at:
+                if not checked:
                     # The vertices that face the antenna, once for all parts that may occlude them.
-                    looked_at = True
+                    checked = True
                     for i in range(3):
                         local[i] = 0.0
                         for j in range(3):
@@ -176,8 +172,8 @@ def _rays(antennas, parts, centres, frames, semi_axes, vertices, margin):
 
 
 @compiled()
-def _settle(met, fraction, whose, occluder):
-    """Name of each vertex the part that is met first, by where its rays come nearest to the parts that they meet."""
+def first_occluders(met, fraction, whose, occluder):
+    """Fill in for each vertex the part that is met first: where its ray comes nearest decides."""
     first = np.full(len(occluder), np.inf, dtype=np.float32)
     for ray in range(len(met)):
         vertex = whose[0, ray]
@@ -185,59 +181,26 @@ def _settle(met, fraction, whose, occluder):
             first[vertex], occluder[vertex] = fraction[ray], whose[1, ray]
 
 
-class FacetTracer:
-    """A body that tells which part hides which vertex.
+def facet_rays_reference(antennas, parts, centres, frames, semi_axes, vertices):
+    """Number of rays (antenna, n, vertex) of `facet_rays` to vertices on ellipsoids, margin 0."""
+    out = np.empty((len(antennas), len(parts), vertices.shape[2]), dtype=np.int64)
+    for a, antenna in enumerate(antennas):
+        for n, part in enumerate(parts):
+            local = vertices[part].T
+            world = centres[part] + local @ frames[part].T
+            normals = local / semi_axes[part] ** 2 @ frames[part].T
+            lines = np.broadcast_to(antenna, world.shape), world, np.full(len(world), part)
+            near = near_lines_reference(*lines, centres, frames, semi_axes)
+            facing = np.einsum("vi,vi->v", normals, antenna - world) >= 0
+            out[a, n] = near.sum(axis=1) * facing
+    return out
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    semi_axes : (part, 3) float64
-        [m].
-    """
 
-    def __init__(self, mi: Any, semi_axes: NDArray[np.float64]) -> None:
-        self._semi_axes = np.ascontiguousarray(semi_axes, dtype=np.float64)
-        self._sphere = UnitSphere(mi)
-
-    def occluders(
-        self,
-        centres: NDArray[np.float64],
-        frames: NDArray[np.float64],
-        antennas: NDArray[np.float64],
-        parts: NDArray[np.int64],
-        vertices: NDArray[np.float64],
-        margin: float,
-    ) -> NDArray[np.int16]:
-        """Part that stands before each vertex, as each antenna sees it.
-
-        Parameters
-        ----------
-        centres, frames : (part, 3), (part, 3, 3) float64
-            Pose of the body, world [m].
-        antennas : (antenna, 3) float64
-            World [m].
-        parts : (n,) int64
-            Which parts are asked about; all parts may hide them.
-        vertices : (part, 3, vertex) float64
-            Of every part of the body, on its ellipsoid, in its own axes [m].
-        margin : float
-            Vertices that face away by more than this sine are not asked about.
-
-        Returns
-        -------
-        (antenna, n, vertex) int16
-            Another part that hides it, nearer to the antenna than its own part on the same line; else -1.
-        """
-        hidden = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
-        rays, whose = _rays(
-            np.ascontiguousarray(antennas, dtype=np.float64),
-            np.ascontiguousarray(parts, dtype=np.int64),
-            np.ascontiguousarray(centres, dtype=np.float64),
-            np.ascontiguousarray(frames, dtype=np.float64),
-            self._semi_axes,
-            vertices,
-            float(margin),
-        )
-        _settle(self._sphere.meets(rays[:7]), rays[7], whose, hidden.ravel())
-        return hidden
+def first_occluders_reference(met, fraction, whose, vertices):
+    """Part (vertex,) that is met first, -1 for none."""
+    occluder = np.full(vertices, -1, dtype=np.int16)
+    hits = np.flatnonzero(met)
+    farthest_first = hits[np.argsort(-fraction[hits], kind="stable")]
+    for ray in farthest_first:
+        occluder[whose[0, ray]] = whose[1, ray]
+    return occluder
