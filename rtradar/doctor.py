@@ -17,7 +17,7 @@ from rtradar.kernels.jit import CacheWarning, try_cache
 from rtradar.system.files import write_json
 from rtradar.trace.backends.backend import VARIANTS, BackendWarning, Kind, select
 from rtradar.trace.backends.llvm import candidates
-from rtradar.trace.backends.verdict import judge
+from rtradar.trace.backends.probe import probe_backend
 
 PACKAGES = (
     *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh"),
@@ -70,12 +70,12 @@ def examine() -> DoctorReport:
     loaded again.
     """
     libraries = candidates()
-    verdicts = [judge(VARIANTS["llvm"], library, fresh=True) for library in libraries]
-    found = list(zip(libraries, verdicts, strict=True))
-    good = next((library for library, verdict in found if verdict.good), None)
+    results = [probe_backend(VARIANTS["llvm"], library, fresh=True) for library in libraries]
+    found = list(zip(libraries, results, strict=True))
+    good = next((library for library, result in found if result.good), None)
     backends: dict[Kind, str] = {"llvm": "good" if good else "no libLLVM that works"}
-    backends["scalar"] = judge(VARIANTS["scalar"], good, fresh=True).finding
-    backends["cuda"] = judge(VARIANTS["cuda"], good, fresh=True).finding
+    backends["scalar"] = probe_backend(VARIANTS["scalar"], good, fresh=True).finding
+    backends["cuda"] = probe_backend(VARIANTS["cuda"], good, fresh=True).finding
     chosen, advice = _chosen(backends)
     packages = {name: _version(name) for name in PACKAGES}
     if missing := [name for name, version in packages.items() if version is None]:
@@ -98,11 +98,11 @@ def examine() -> DoctorReport:
             {
                 "path": library.path,
                 "origin": library.origin,
-                "version": verdict.version,
-                "finding": verdict.finding,
+                "version": result.version,
+                "finding": result.finding,
                 "chosen": library is good and chosen == VARIANTS["llvm"],
             }
-            for library, verdict in found
+            for library, result in found
         ],
         backends=backends,
         compiled_code=compiled_code,

@@ -11,7 +11,7 @@ from rtradar import doctor
 from rtradar.errors import InputError
 from rtradar.trace.backends import backend as backends
 from rtradar.trace.backends.llvm import Library
-from rtradar.trace.backends.verdict import Verdict
+from rtradar.trace.backends.probe import ProbeResult
 
 LIBRARIES = [
     Library("/lib/libLLVM-15.so.1", "environment"),
@@ -22,19 +22,19 @@ LIBRARIES = [
 def _machine(
     monkeypatch: pytest.MonkeyPatch, libraries: list[Library], *, scalar: str = "good"
 ) -> None:
-    def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+    def probe_backend(variant: str, library: Library | None, *, fresh: bool = False) -> ProbeResult:
         if variant.startswith("llvm"):
             assert library is not None
             return (
-                Verdict("good", "23.1.4")
+                ProbeResult("good", "23.1.4")
                 if "23" in library.path
-                else Verdict("aborts the process", "15.0.6")
+                else ProbeResult("aborts the process", "15.0.6")
             )
-        return Verdict(scalar if variant.startswith("scalar") else "no CUDA driver or no GPU")
+        return ProbeResult(scalar if variant.startswith("scalar") else "no CUDA driver or no GPU")
 
     for module in (doctor, backends):
         monkeypatch.setattr(module, "candidates", lambda: libraries)
-        monkeypatch.setattr(module, "judge", judge)
+        monkeypatch.setattr(module, "probe_backend", probe_backend)
     monkeypatch.setattr(backends, "loaded_llvm_version", lambda: None)
 
 

@@ -72,8 +72,8 @@ class BodyTracer:
     ) -> NDArray[np.bool_]:
         """Whether no other part is between ``origins (ray, 3)`` and ``targets (ray, 3)`` [m].
 
-        A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba decides
-        about every line of sight and every part that the line comes near.
+        A target lies on part ``own (ray,)``, which cannot occlude it, or on none, -1. Mitsuba
+        decides about every line of sight and every part that the line comes near.
         """
         if self._pose is None:
             raise RuntimeError("BodyTracer: pose the body before rays are sent")

@@ -1,7 +1,8 @@
 """Surfaces for rays that bounce: Mitsuba says which one a ray meets, float64 says where.
 
-The scene of Mitsuba is in float32 and made of triangles, so of its answer only the name of what was met is kept: the
-part of a body, or the face of a mesh. The place follows in float64 from the ray and that ellipsoid, or that face's plane.
+The scene of Mitsuba is in float32 and made of triangles, so of its answer only the name of what was
+met is kept: the part of a body, or the face of a mesh. The place follows in float64 from the ray
+and that ellipsoid, or that face's plane.
 """
 
 from __future__ import annotations
@@ -19,9 +20,10 @@ SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
 
 _LIFT_OF_PART = 1e-3
-"""Of the largest semi-axis: the traced triangles of a part lie up to 0.07 % outside it, and must not stop rays that leave it."""
+"""Fraction of the largest semi-axis by which rays are lifted off a part: its triangles, up to
+0.07 % outside it, must not stop rays that leave it."""
 _LIFT_OF_MESH = 1e-5
-"""Of the mesh's radius: a hundred times the step of float32."""
+"""Fraction of a mesh's radius by which rays are lifted off it: a hundred steps of float32."""
 _BEHIND = 1e-7  # relative; what is met this little before a point is the point itself
 
 Array = NDArray[np.float64]
@@ -36,24 +38,25 @@ class Surfaces(Protocol):
     flat: bool
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether nothing but the surface that a point lies on, ``own (ray,)``, is nearer to its antenna, both (ray, 3)."""
+        """Whether no surface but its ``own (ray,)`` is nearer to the antenna of a point (ray, 3)."""
         ...
 
     def meets(
         self, points: Array, normals: Array, directions: Array, own: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], Array]:
-        """Surface (ray,) met first from points on surfaces ``own``, on the side of the normals, and how far, in float32 [m].
+        """Surface (ray,) met first from points on surfaces ``own``, and how far it is [m].
 
-        ``directions (ray, 3)`` are unit vectors; the way is infinite where nothing is met.
+        Rays leave on the side of the normals, along unit vectors ``directions (ray, 3)``. The
+        distance is of float32 quality, and infinite where nothing is met.
         """
         ...
 
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
-        """Way to that surface along lines, float64 [m]; NaN where there is none. Leading axes as those of ``surface``."""
+        """Distance to that surface along lines (..., 3), float64 [m]; NaN where they miss it."""
         ...
 
     def normal(self, surface: NDArray[np.int64], points: Array, directions: Array) -> Array:
-        """Unit normals of the surfaces at points on them, on the side that rays along ``directions`` come from."""
+        """Unit normals at points on surfaces, on the side that rays along them come from."""
         ...
 
 
@@ -99,7 +102,7 @@ class BodySurfaces:
         pose_body_scene(self._mi, self._parameters, matrices)
 
     def first_parts(self, origins: Array, directions: Array) -> tuple[NDArray[np.int64], Array]:
-        """Part (ray,) met first, -1 for none, and distance (ray,) [m] along unit vectors (ray, 3)."""
+        """Part (ray,) met first, -1 for none, and distance (ray,) [m] along unit vectors."""
         starts, ahead = into_ball(origins - self._centre, directions, self._ball)
         part, distance = first_met(self._mi, self._scene, starts, directions, self._instances)
         return part, distance + ahead

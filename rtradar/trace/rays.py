@@ -18,8 +18,8 @@ _LANES = 16
 """Numbers of float32 in the widest vectors."""
 
 _LEAST_RAYS = 4096
-"""Rays traced at once, with idle ones among them: else the memory that Dr.Jit keeps for itself would
-grow with the largest number that ever came."""
+"""Rays traced at once, with idle ones among them: else the memory that Dr.Jit keeps for itself
+would grow with the largest number that ever came."""
 
 _ONE_AT_A_TIME = threading.Lock()
 

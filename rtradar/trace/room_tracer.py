@@ -1,7 +1,8 @@
-"""Ask Mitsuba whether furniture stands between two points of a room.
+"""Ask Mitsuba whether furniture is between two points of a room.
 
-Furniture only: walls are rectangles, and few, so they are done in closed form in float64. Mitsuba works in float32, so its
-scene is centred on the furniture, and rays start where they enter the ball around it.
+Furniture only: walls are rectangles, and few, so they are done in closed form in float64. Mitsuba
+works in float32, so its scene is centred on the furniture, and rays start where they enter the ball
+around it.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ from rtradar.scene.mitsuba_scene import triangle_mesh
 from rtradar.trace.rays import any_met
 
 CLEAR_M = 1e-3
-"""Both ends of a leg are drawn in by this, so that a point on a surface is not hidden by that surface: a thousand times what
-float32 is off by some 10 m from the middle."""
+"""Length by which both ends of a leg are drawn in [m], so that a surface does not occlude its own
+points: a thousand times the error of float32 some 10 m from the middle."""
 
 
 class RoomTracer:
@@ -53,12 +54,13 @@ class RoomTracer:
         Parameters
         ----------
         origins, targets : (..., 3) float64
-            World [m]; they broadcast. Both ends are drawn in by `CLEAR_M`, so either may lie on a surface.
+            Ends of the legs, world [m]; they broadcast. Both are drawn in by `CLEAR_M`, so either
+            may be on a surface.
 
         Returns
         -------
         (...) bool
-            False everywhere without furniture, and where two points are no more than twice `CLEAR_M` apart.
+            False without furniture, and where two points are at most twice `CLEAR_M` apart.
         """
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)

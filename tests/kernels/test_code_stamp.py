@@ -311,7 +311,7 @@ def test_settings_of_numba_go_into_it(monkeypatch: pytest.MonkeyPatch, setting: 
 def compiled_functions() -> dict[str, Any]:
     found = {}
     for module in pkgutil.walk_packages(rtradar.__path__, "rtradar."):
-        if module.name not in ("rtradar.__main__", "rtradar.trace.backends.probe"):
+        if module.name not in ("rtradar.__main__", "rtradar.trace.backends.probe_script"):
             for value in vars(importlib.import_module(module.name)).values():
                 if is_jitted(value):
                     found[f"{value.py_func.__module__}.{value.py_func.__qualname__}"] = value

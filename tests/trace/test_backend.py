@@ -13,18 +13,18 @@ import pytest
 
 from rtradar.errors import BackendError, InputError
 from rtradar.trace.backends import backend as backends
-from rtradar.trace.backends import llvm, verdict
+from rtradar.trace.backends import llvm, probe
 from rtradar.trace.backends.backend import Backend, BackendWarning, select, use
 from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
-from rtradar.trace.backends.verdict import Verdict
+from rtradar.trace.backends.probe import ProbeResult
 
 BAD = Library("/lib/libLLVM-15.so.1", "environment")
 WHEEL = Library("/venv/lib/libLLVM.so.23.1", "wheel")
 OLD = Library("/lib/libLLVM-14.so.1", "system")
 FINDINGS = {
-    BAD.path: Verdict("aborts the process", "15.0.6"),
-    WHEEL.path: Verdict("good", "23.1.4"),
-    OLD.path: Verdict("refused by Dr.Jit: too old", "14"),
+    BAD.path: ProbeResult("aborts the process", "15.0.6"),
+    WHEEL.path: ProbeResult("good", "23.1.4"),
+    OLD.path: ProbeResult("refused by Dr.Jit: too old", "14"),
 }
 
 Machine = Callable[..., None]
@@ -39,14 +39,16 @@ def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
         gpu: bool = False,
         loaded: str | None = None,
     ) -> None:
-        def judge(variant: str, library: Library | None, *, fresh: bool = False) -> Verdict:
+        def probe_backend(
+            variant: str, library: Library | None, *, fresh: bool = False
+        ) -> ProbeResult:
             if variant == "cuda_ad_rgb":
-                return Verdict("good" if gpu else "no CUDA driver or no GPU")
+                return ProbeResult("good" if gpu else "no CUDA driver or no GPU")
             assert library is not None
             return FINDINGS[library.path]
 
         monkeypatch.setattr(backends, "candidates", lambda: list(libraries))
-        monkeypatch.setattr(backends, "judge", judge)
+        monkeypatch.setattr(backends, "probe_backend", probe_backend)
         monkeypatch.setattr(backends, "loaded_llvm_version", lambda: loaded)
 
     return set_up
@@ -192,15 +194,15 @@ def empty_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def _counted(monkeypatch: pytest.MonkeyPatch, finding: str, ended: int = 0) -> list[str]:
     probes: list[str] = []
 
-    def probe(variant: str, library: Library | None) -> tuple[Verdict, int]:
+    def answer(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
         probes.append(variant)
-        return Verdict(finding), ended
+        return ProbeResult(finding), ended
 
-    monkeypatch.setattr(verdict, "_probe", probe)
+    monkeypatch.setattr(probe, "_probe", answer)
     return probes
 
 
-def test_a_verdict_is_kept_until_the_library_changes(
+def test_a_result_is_kept_until_the_library_changes(
     empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     probes = _counted(monkeypatch, "aborts the process")
@@ -208,27 +210,27 @@ def test_a_verdict_is_kept_until_the_library_changes(
     file.touch()
     library = Library(str(file), "system")
     assert (
-        verdict.judge("llvm_ad_rgb", library)
-        == verdict.judge("llvm_ad_rgb", library)
-        == Verdict("aborts the process")
+        probe.probe_backend("llvm_ad_rgb", library)
+        == probe.probe_backend("llvm_ad_rgb", library)
+        == ProbeResult("aborts the process")
     )
     assert len(probes) == 1
-    verdict.judge("llvm_ad_rgb", library, fresh=True)
+    probe.probe_backend("llvm_ad_rgb", library, fresh=True)
     assert len(probes) == 2
     os.utime(file, (1, 1))
-    verdict.judge("llvm_ad_rgb", library)
+    probe.probe_backend("llvm_ad_rgb", library)
     assert len(probes) == 3
-    assert [path.name for path in empty_cache.iterdir()] == ["verdicts.json"]
+    assert [path.name for path in empty_cache.iterdir()] == ["probes.json"]
 
 
-def test_a_verdict_is_not_kept_when_another_question_is_asked(
+def test_a_result_is_not_kept_when_another_question_is_asked(
     empty_cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     probes = _counted(monkeypatch, "gives wrong results")
     for text in ("one", "another", "another"):
         (tmp_path / "probe.py").write_text(text)
-        monkeypatch.setattr(verdict, "_PROBE", tmp_path / "probe.py")
-        verdict.judge("scalar_rgb", None)
+        monkeypatch.setattr(probe, "_PROBE", tmp_path / "probe.py")
+        probe.probe_backend("scalar_rgb", None)
     assert len(probes) == 2
 
 
@@ -240,14 +242,14 @@ def test_a_probe_that_was_told_to_end_says_nothing_of_the_library(
 ) -> None:
     probes = _counted(monkeypatch, "aborts the process", ended)
     for _ in range(2):
-        verdict.judge("scalar_rgb", None)
+        probe.probe_backend("scalar_rgb", None)
     assert len(probes) == probed
 
 
-def test_verdicts_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_results_on_gpus_are_not_kept(empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     probes = _counted(monkeypatch, "good")
-    verdict.judge("cuda_ad_rgb", None)
-    verdict.judge("cuda_ad_rgb", None)
+    probe.probe_backend("cuda_ad_rgb", None)
+    probe.probe_backend("cuda_ad_rgb", None)
     assert len(probes) == 2
     assert not empty_cache.exists()
 
@@ -258,9 +260,9 @@ def test_a_spoilt_cache_is_written_anew(
 ) -> None:
     probes = _counted(monkeypatch, "good")
     empty_cache.mkdir()
-    (empty_cache / "verdicts.json").write_text(content, encoding="utf-8")
+    (empty_cache / "probes.json").write_text(content, encoding="utf-8")
     for _ in range(2):
-        assert verdict.judge("scalar_rgb", None).good
+        assert probe.probe_backend("scalar_rgb", None).good
     assert len(probes) == 1
 
 
@@ -270,31 +272,31 @@ def test_a_cache_that_cannot_be_written_does_no_harm(
     _counted(monkeypatch, "good")
     (tmp_path / "file").touch()
     monkeypatch.setenv("RTRADAR_CACHE", str(tmp_path / "file" / "cache"))
-    assert verdict.judge("scalar_rgb", None).good
+    assert probe.probe_backend("scalar_rgb", None).good
 
 
 def test_a_probe_that_takes_too_long_is_no_good_and_is_not_kept(
     empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(verdict, "TIMEOUT_S", 0.01)
-    assert verdict.judge("scalar_rgb", None).finding.startswith("hangs")
+    monkeypatch.setattr(probe, "TIMEOUT_S", 0.01)
+    assert probe.probe_backend("scalar_rgb", None).finding.startswith("hangs")
     assert not empty_cache.exists()
 
 
 def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: Path) -> None:
     file = tmp_path / "libLLVM-23.so.1"
     file.write_text("not a library")
-    assert verdict.judge("llvm_ad_rgb", Library(str(file), "environment")) == Verdict(
+    assert probe.probe_backend("llvm_ad_rgb", Library(str(file), "environment")) == ProbeResult(
         "cannot be loaded", "23"
     )
-    assert verdict.judge("scalar_rgb", Library(str(file), "environment")).good
+    assert probe.probe_backend("scalar_rgb", Library(str(file), "environment")).good
 
 
 def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
     """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
     libraries = [library for library in llvm.candidates() if library.version]
     for library in libraries:
-        found = verdict.judge("llvm_ad_rgb", library)
+        found = probe.probe_backend("llvm_ad_rgb", library)
         major = int((found.version or library.version or "0").split(".")[0])
         assert found.good or major < 19, (library, found)
         assert not (found.good and major < 17), (library, found)
@@ -304,7 +306,7 @@ def test_a_process_that_names_a_bad_library_gets_a_good_one_and_lives() -> None:
     bad = [
         library.path
         for library in llvm.candidates()
-        if not verdict.judge("llvm_ad_rgb", library).good
+        if not probe.probe_backend("llvm_ad_rgb", library).good
     ]
     if not bad:
         pytest.skip("this machine has no libLLVM that is bad")

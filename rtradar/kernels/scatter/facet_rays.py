@@ -1,4 +1,4 @@
-"""Rays along lines of sight from antennas to the vertices of facets, past parts that they come near.
+"""Rays along lines of sight to the vertices of facets, past parts that they come near.
 
 Each line of sight is in the axes where the part that it may meet is the unit sphere, and each ray
 starts two radii before what it may meet. Lines that pass outside a volume a tenth larger than the

@@ -1,4 +1,4 @@
-"""Radiation of the footprints of ray tubes; the equation is in `rtradar.scatter.ray_tubes.footprints`."""
+"""Radiation of the footprints of ray tubes, see `rtradar.scatter.ray_tubes.footprints`."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ def _amplitude(tubes, tube, sx, sy, sz, horizontal, tapered):
 
 @compiled(parallel=True)
 def radiate_tubes(tubes, visible, rx, wavenumber, length, horizontal, spreading, tapered, out):
-    """Add what tubes send to receivers to ``out (chunk, node, rx, group)``, each chunk a part of it.
+    """Add what tubes send to receivers to ``out (chunk, node, rx, group)``, a part in each chunk.
 
     ``visible (rx, tube)``, ``rx (rx, 3)`` [m], ``wavenumber (node,)`` [1/m], and the path ``length
     (rx, group)`` whose phase is taken out [m].

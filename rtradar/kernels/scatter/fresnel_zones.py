@@ -138,7 +138,7 @@ def _axes_of_zone(tx, rx, centre, frame, axes, point, wavenumber, stretch, back,
 
 @inlined()
 def _meridian(angle, pole, along, caps, step):
-    """Fill in a meridian's direction on the unit sphere; return radians a unit of rho, and its rim."""
+    """Fill in a meridian's direction on the unit sphere; return radians per rho, and its rim."""
     for i in range(3):
         step[i] = math.cos(angle) * along[0, i] + math.sin(angle) * along[1, i]
     pace = normalize(step)
@@ -209,7 +209,7 @@ def lay_zones_reference(tx, rx, centre, frame, axes, point, wavenumber):
 
 @compiled()
 def zone_points(maps, zone, x, y, out):
-    """Fill in the points (n, 3) on the ellipsoids at places x, y of zones (n,) in the plane of rho."""
+    """Fill in the points (n, 3) on ellipsoids at places x, y of zones (n,) in the plane of rho."""
     u = np.empty(3)
     for n in range(len(zone)):
         z = zone[n]
@@ -259,7 +259,10 @@ def open_share(a, b, c, d):
 
 @inlined()
 def _open_cell(line, j, here, after, cosine, sine):
-    """Fraction of the cell from j to j + 1 on the positive side of a line; rho a cell on both sides."""
+    """Fraction of the cell from j to j + 1 on the positive side of a line.
+
+    ``here`` and ``after`` are the rho of one cell on its two meridians.
+    """
     a, b, c = line
     first, last = c + a * here * j, c + a * here * (j + 1)
     across = (a * cosine + b * sine) * after
@@ -486,7 +489,7 @@ def zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, 
 
 
 def meridians_reference(maps, zone):
-    """Directions (meridian, 3) between the corners, and paces and rims (meridian, 1) of `_meridian`."""
+    """Directions (meridian, 3) between corners, paces and rims (meridian, 1) of `_meridian`."""
     angle = (np.arange(MERIDIANS)[:, None] + 0.5) * 2 * np.pi / MERIDIANS
     step = np.cos(angle) * maps.along[zone, 0] + np.sin(angle) * maps.along[zone, 1]
     pace = np.linalg.norm(step, axis=1, keepdims=True)

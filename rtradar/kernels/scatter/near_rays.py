@@ -32,7 +32,7 @@ def _bundle(places, group, counts, middle, radius):
 
 @inlined()
 def _near_parts(origins, targets, group, own, pose, centres, longest):
-    """Return which parts' bounding balls come near the bundle of lines of a group, (group, part)."""
+    """Return which parts' bounding balls come near the lines of a group, (group, part)."""
     groups, parts = len(own), centres.shape[1]
     middles, radii = np.zeros((groups, 2, 3)), np.zeros((groups, 2))
     counts = np.zeros(groups)

@@ -1,4 +1,4 @@
-"""How much of an ellipsoid's return is left where others are before it: its Fresnel zones, added up.
+"""How much of an ellipsoid's return is left behind others: its Fresnel zones, added up.
 
 On cells along the meridians of `rtradar.kernels.scatter.fresnel_zones`
 

@@ -1,4 +1,4 @@
-"""The echo model `fresnel`: `specular`, each return weighted by how much of its Fresnel zones is in view."""
+"""The echo model `fresnel`: `specular`, times the visible fractions of the Fresnel zones."""
 
 from __future__ import annotations
 

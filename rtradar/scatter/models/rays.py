@@ -29,10 +29,10 @@ from rtradar.trace.bounces import BodySurfaces
 
 ANCHOR_S = 10e-3
 _KEPT_SHOTS = 1024
-"""Shots remembered, of 12 Tx and 10 ms that is a second: one of 13 nodes, 8 Rx and 42 echoes takes 70 kB."""
+"""Shots remembered: a second of 12 Tx and 10 ms; one with 13 nodes, 8 Rx, 42 echoes has 70 kB."""
 BOUNCES_OF_BODY = 1
 _NODES_PER_HZ = (1e-9, 2.5e-9)
-"""Frequency nodes, beyond three, for the paths over one part, and for those of several bounces that share an echo."""
+"""Frequency nodes beyond three: for paths over one part, and for several bounces in one echo."""
 
 Array = NDArray[np.float64]
 
@@ -40,9 +40,10 @@ Array = NDArray[np.float64]
 class Rays(BuiltInModel):
     """`rays`: tubes fixed in the material of the body, shot from each Tx.
 
-    The path over the specular point of each part is exact at every chirp; rays are shot at anchors, and what varies slowly, the
-    amplitude on that path, is interpolated between them by cubics over four anchors. Of several bounces the mean path is
-    interpolated too.
+    The path over the specular point of each part is exact at every chirp. Rays are shot at
+    keyframes, and the amplitude on that path, which varies slowly, is interpolated by cubics over
+    four of them. For several bounces the mean path is interpolated, too. Rays meet the triangle
+    meshes of the ellipsoids, from which this level scatters.
 
     Parameters
     ----------
@@ -55,8 +56,9 @@ class Rays(BuiltInModel):
     rays_per_wavelength : float
         The edge of a tube's facet is the wavelength at the sweep centre over this.
     bounces : int
-        The most reflections on the way. Two bounces on a body of ellipsoids go mostly by the creases where two of them touch,
-        which no real body has, and reach half the field of one: one is the default.
+        Largest number of reflections on the way. Two bounces on a body of ellipsoids go mostly
+        by the creases where two of them touch, which no real body has, and reach half the field
+        of one: one is the default.
     anchor_s : float
         Time between anchors [s]; 0 shoots at every chirp.
 
@@ -96,7 +98,7 @@ class Rays(BuiltInModel):
         self._shots: KeyframeCache[tuple[int, int], _Shot] = KeyframeCache(0, _KEPT_SHOTS)
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
-        """Echoes at these chirps: of each part one for each number of bounces, by the part of the last bounce."""
+        """Echoes at these chirps: one for each number of bounces and part that was met last."""
         at = chirp_poses(self._radar, self._body, chirps)
         parts, orders = len(at.semi_axes), self._bounces
         frequency = self._nodes(orders > 1)
@@ -183,13 +185,16 @@ class _Shot(NamedTuple):
 
 
 def _cubic(share: float) -> tuple[float, float, float, float]:
-    """Weights of the anchors -1, 0, 1, 2 at ``share`` of the way from 0 to 1: Catmull and Rom's cubic, smooth at anchors."""
+    """Weights of keyframes -1, 0, 1, 2 at ``share`` of the way from 0 to 1, by Catmull and Rom."""
     h0, h1, g0, g1 = hermite_weights(share, 1)
     return -g0 / 2, h0 - g1 / 2, h1 + g0 / 2, g1 / 2
 
 
 def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array:
-    """Path over each part (rx, part) [m], mean by the power of its tubes; ``otherwise (rx, part)`` where there are none."""
+    """Mean path over each part (rx, part) [m], weighted by the power of its tubes.
+
+    ``otherwise (rx, part)`` is taken where there are none.
+    """
     parts = otherwise.shape[1]
     power = (footprints.field**2).sum(axis=1) * footprints.width()
     total = np.bincount(footprints.surface, weights=power, minlength=parts)

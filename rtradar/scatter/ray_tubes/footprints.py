@@ -1,20 +1,23 @@
-"""What the last footprints of tubes of rays send to each receiver: vector physical optics, linear phase, float64.
+"""What the last footprints of ray tubes send to each receiver, by vector physical optics.
 
-A footprint is the triangle of a surface that a tube lights. The field reflected there, E_r = 2 (n.E) n - E, taken as a source
-on the triangle (Huygens' principle), sends to a receiver in direction r, of polarisation p,
+A footprint is the triangle of a surface that a tube lights. The field reflected there,
+E_r = 2 (n.E) n - E, taken as a source on the triangle (Huygens' principle), sends to a receiver in
+direction r, of polarisation p,
 
     F = jk/sqrt(pi) Int a exp(-jk (path in + path out)) dS,
     a = ((p.E) (n.r - n.d) + (p.d) (n.E) - (r.E) (n.p)) / 2,
 
-d the direction in which the field arrives: the mean of what the current 2 n x H sends and of the same with Tx and Rx swapped.
-Where Tx and Rx are one and there is one bounce this is scalar physical optics, a = n.r; at a specular point it is
-cos(i) p.(E - 2 (n.E) n), the sign by which a conducting sphere returns +sqrt(pi) a.
+with d the direction in which the field arrives: the mean of what the current 2 n x H sends and of
+the same with Tx and Rx swapped. Where Tx and Rx are one and there is one bounce, this is scalar
+physical optics, a = n.r; at a specular point it is cos(i) p.(E - 2 (n.E) n), the sign by which a
+conducting sphere returns +sqrt(pi) a.
 
 Where light comes from one side and is received on another, a breaks off at the horizons of both,
-which sends waves that no real body has. Tapered, a is multiplied by 4 (n.r) (-n.d) / (n.r - n.d)^2: 1 at specular points, 0 at horizons.
+which sends waves that no real body has. Tapered, a is multiplied by
+4 (n.r) (-n.d) / (n.r - n.d)^2: 1 at specular points, 0 at horizons.
 
-The phase is taken from the exact paths over the corners, and over the triangle it is linear: the mean of exp(-j phase) is
-then a divided difference (Gordon, IEEE Trans. Antennas Propag. 23 (1975) 590, in the form of Hermite and Genocchi).
+The phase is taken from the exact paths over the corners, and over the triangle it is linear. The
+mean of exp(-j phase) is then a divided difference, see `rtradar.kernels.scatter.triangles`.
 """
 
 from __future__ import annotations
@@ -40,7 +43,8 @@ class Footprints:
     Parameters
     ----------
     places : (tube, 4, 3) float64
-        Where the three corner rays and the middle ray end, world [m]; on a curved surface the middle is off the triangle.
+        Ends of the three corner rays and the middle ray, world [m]; on a curved surface the middle
+        is off the triangle.
     path : (tube, 4) float64
         From the Tx to there over all bounces before [m].
     directions : (tube, 4, 3) float64
@@ -68,7 +72,7 @@ class Footprints:
         return Footprints(*(getattr(self, field.name)[which] for field in fields(self)))
 
     def width(self) -> Array:
-        """Area of each tube across its rays (tube,) [m^2]: what holds the power that the tube carries."""
+        """Area of each tube across its rays (tube,) [m^2], over which its power is spread."""
         p = self.places
         area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 2
         return np.abs((area * self.directions[:, 3]).sum(axis=1))

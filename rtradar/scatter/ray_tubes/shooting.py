@@ -1,12 +1,15 @@
 """Shooting and bouncing: tubes of rays from one Tx, followed over the surfaces of a target.
 
-A tube is a facet seen from the Tx: three corner rays and a middle one, traced by Mitsuba. What the middle ray meets, the
-tube meets: the corner rays are intersected with that same surface in float64 - the smooth ellipsoid, or the plane of the
-face, which has no border - so that a tube meets a surface whole or not at all. Each ray reflects by the smooth normal
-where it is, and so tubes spread as curved mirrors spread them; the field follows from the power in the tube, which does not
-change. Where its rays meet different things, or its path bends too much across its footprint, a tube is split in four, at
-the Tx, up to `MOST_SPLITS` times; a corner ray that even then misses the surface goes on to the tangent plane of the middle's
-place, and a tube whose footprint that stretches out of all proportion, or that leaves beyond a horizon, is dropped.
+A tube is a facet seen from the Tx: three corner rays and a middle one, traced by Mitsuba. What the
+middle ray meets, the tube meets. The corner rays are intersected with that same surface in float64,
+the smooth ellipsoid or the plane of the face, which has no border, so that a tube meets a surface
+whole or not at all. Each ray reflects by the smooth normal where it is, and so tubes spread as
+curved mirrors spread them; the field follows from the power in the tube, which does not change.
+
+Where its rays meet different things, or its path bends too much across its footprint, a tube is
+split in four, at the Tx, up to `MOST_SPLITS` times. A corner ray that even then misses the surface
+goes on to the tangent plane of the middle's place. A tube is dropped if its footprint is stretched
+out of all proportion by that, or if it leaves beyond a horizon.
 
 Ling, Chou, Lee, IEEE Trans. Antennas Propag. 37 (1989) 194: Shooting and bouncing rays.
 """
@@ -27,9 +30,10 @@ from rtradar.trace.bounces import Surfaces
 MOST_SPLITS = 3
 """A tube becomes 64 at most."""
 _BOW_RAD = 0.2
-"""Phase by which a footprint may leave the plane through its corners; of a bow three quarters are made good."""
+"""Phase by which a footprint may leave the plane through its corners; 3/4 of it is corrected."""
 _INSET = 0.01
-"""Share of the way to the middle from which corner rays are traced: on a crease one would not know what it leaves."""
+"""Fraction of the way to the middle at which corner rays begin: on a crease it is not known which
+surface they leave."""
 _GRAZING = 0.02
 """A tube that meets a surface at less than a degree, and still does when split, is dropped."""
 
@@ -80,7 +84,7 @@ class Shooter:
     two_sided: bool = False
 
     def shoot(self, tx: Array) -> list[Footprints]:
-        """Footprints of all tubes from ``tx (3,)`` [m], one set for each number of bounces from 1 on."""
+        """Footprints of all tubes from ``tx (3,)`` [m], a set for each number of bounces from 1."""
         grid = self.grid
         first, lit = self._launch(grid, tx)
         found: list[list[Footprints]] = [[] for _ in range(self.bounces - 1)]
@@ -119,7 +123,7 @@ class Shooter:
     def _follow(
         self, start: Footprints
     ) -> tuple[list[tuple[Footprints, NDArray[np.int64]]], NDArray[np.bool_]]:
-        """Footprints after 2, 3, ... bounces with the tube each comes from, and which tubes want to be split."""
+        """Footprints after 2, 3, ... bounces, the tubes they come from, and which to split."""
         rough = np.zeros(len(start), dtype=bool)
         here, origin, chain = start, np.arange(len(start)), []
         for _ in range(self.bounces - 1):
@@ -162,9 +166,10 @@ def _bounce(
     distance, onward = distance[landed], onward[landed]
     places = here.places + distance[..., None] * onward
     normals = surfaces.normal(landing, places, onward)
-    # NaN, of a corner ray that misses, fails every comparison; a corner on the crease of two faces goes no way at all.
+    # NaN, of a corner ray that misses, fails every comparison; a corner on the crease of two faces
+    # goes no way at all.
     lands = (distance > -1e-9) & (np.einsum("tci,tci->tc", onward, normals) < 0)
-    # Such a corner goes to the tangent plane of the middle's place: what a tube carries lands whole or not at all.
+    # Such a corner goes to the tangent plane of the middle's place: tubes land whole or not at all.
     normals = np.where(lands[..., None], normals, normals[:, 3:])
     steepness = np.einsum("tci,tci->tc", onward, normals)
     height = np.einsum("tci,tci->tc", places[:, 3:] - here.places, normals)

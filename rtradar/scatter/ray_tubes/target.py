@@ -59,8 +59,8 @@ def rays_scattering(
     Returns
     -------
     (n,) complex128
-        [m], for exp(+j omega t): the scattered field times |tx - origin| |rx - origin|, its phase relative to the path
-        over the origin of the coordinates.
+        [m], for exp(+j omega t): the scattered field times |tx - origin| |rx - origin|, its phase
+        relative to the path over the origin of the coordinates.
 
     Raises
     ------

@@ -1,7 +1,8 @@
-"""Tubes of rays: small facets fixed in the material of a target, at whose corners and middles rays are aimed.
+"""Tubes of rays: small facets fixed in the material of a target, at which rays are aimed.
 
-A facet seen from a Tx is a tube. As the facets move with the body, each tube keeps its place in the material, and the sum
-over tubes changes as smoothly from chirp to chirp as the body moves.
+A facet seen from a Tx is a tube: rays go to its corners and its middle. As the facets move with the
+body, each tube keeps its place in the material, and the sum over tubes changes as smoothly from
+chirp to chirp as the body moves.
 """
 
 from __future__ import annotations
@@ -27,7 +28,8 @@ class Tubes:
     Parameters
     ----------
     places, normals : (tube, 4, 3) float64
-        Three corners and the centroid of each facet [m], and the unit normals of the smooth surface there.
+        Three corners and the centroid of each facet [m], and the unit normals of the smooth surface
+        there.
     surface : (tube,) int64
         Part or face that the facet belongs to.
     """
@@ -42,7 +44,7 @@ class Tubes:
 
 @dataclass(frozen=True)
 class EllipsoidGrid:
-    """Facets of the parts of a body, in the axes in which each part is a unit sphere; they outlive every pose.
+    """Facets of the parts of a body, in the axes in which each part is a unit sphere.
 
     Parameters
     ----------
@@ -58,8 +60,8 @@ class EllipsoidGrid:
     def cover(cls, semi_axes: Array, edge: float) -> EllipsoidGrid:
         """As many facets on each part as equilateral triangles of that edge [m] would cover it.
 
-        They are stretched with the part: long where it bends little, which costs no accuracy, for the phase over each is
-        integrated exactly as far as it is linear.
+        They are stretched with the part and long where it bends little. That costs no accuracy,
+        because the phase over each is integrated exactly as far as it is linear.
 
         Raises
         ------
@@ -74,9 +76,10 @@ class EllipsoidGrid:
         )
 
     def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
-        """Those facets, each in four, on the sphere of the corners' own radius less what finer facets stand out less."""
+        """Those facets, each in four, whose corners are farther in as finer facets require."""
         quarters = in_four(self.corners[which])
-        # The corners stand out by 3/2 of what the middle lies below the sphere's mean; a quarter of it with half the edge.
+        # Corners are outside the sphere by 3/2 of what the middle is below the mean radius, and by a
+        # quarter of it with half the edge.
         out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
         size = np.linalg.norm(quarters, axis=-1, keepdims=True)
         quarters *= (1 + np.repeat(out, 4)[:, None, None] / 4) / size
@@ -134,7 +137,7 @@ class MeshGrid:
 
     @classmethod
     def cover(cls, vertices: Array, faces: NDArray[np.integer], edge: float) -> MeshGrid:
-        """Cut every face, along each side into the same number, until no facet has a side longer than ``edge`` [m].
+        """Cut every face evenly until no facet has a side longer than ``edge`` [m].
 
         Raises
         ------
@@ -177,7 +180,8 @@ def _across(triangles: Array) -> Array:
 def _refuse_many(counts: Array) -> None:
     if counts.sum() > MOST_TUBES:
         raise InputError(
-            f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; lower rays_per_wavelength or the frequency"
+            f"rays: {counts.sum():.3g} tubes are more than {MOST_TUBES}; "
+            "lower rays_per_wavelength or the frequency"
         )
 
 
@@ -191,7 +195,7 @@ def _areas(semi_axes: Array) -> Array:
 
 @lru_cache(maxsize=64)
 def _cut(n: int) -> Array:
-    """Barycentric weights (n^2, 3 corners, 3) of a triangle cut into n^2 like ones, all of its orientation."""
+    """Barycentric weights (n^2, 3 corners, 3) of a triangle cut into n^2 similar ones."""
     i, j = (index.ravel() for index in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
     up, down = i + j < n, i + j < n - 1
 
@@ -206,7 +210,7 @@ def _cut(n: int) -> Array:
 
 @lru_cache(maxsize=64)
 def _sphere(n: int) -> Array:
-    """Corners (20 n^2, 3, 3) of an icosahedron cut n-fold and blown up to a sphere whose mean |x|^2 is 1."""
+    """Corners (20 n^2, 3, 3) of an icosahedron cut n-fold, on a sphere with the mean |x|^2 of 1."""
     import trimesh  # slow to import
 
     ball = trimesh.creation.icosahedron()

@@ -1,7 +1,8 @@
 """The choice of Mitsuba's variant, and of the libLLVM behind it: the only place that makes either.
 
-Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for the life of the process. Versions 15
-and 16 are taken and then abort the process, so a library is tried in another process before it is let into this one.
+Dr.Jit loads libLLVM when it is imported, whatever the variant, and keeps it for the life of the
+process. Versions 15 and 16 are loaded and then abort the process, so a library is tried in another
+process before it is loaded here.
 """
 
 from __future__ import annotations
@@ -17,11 +18,11 @@ from typing import Literal
 from rtradar.errors import BackendError, InputError
 from rtradar.trace.backends.jit_threads import begin_with_one
 from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, WHEEL, Library, candidates
-from rtradar.trace.backends.verdict import Verdict, judge
+from rtradar.trace.backends.probe import ProbeResult, probe_backend
 
 Kind = Literal["llvm", "scalar", "cuda"]
 
-# The RGB variants: the only scalar one without spectra, and the same plugins then everywhere. Rays cost the same in all.
+# The RGB variants: the only scalar one without spectra, so all have the same plugins.
 VARIANTS: dict[Kind, str] = {"llvm": "llvm_ad_rgb", "scalar": "scalar_rgb", "cuda": "cuda_ad_rgb"}
 """Mitsuba's variant of each kind of backend."""
 
@@ -39,15 +40,16 @@ class Backend:
     Parameters
     ----------
     kind : {"llvm", "scalar", "cuda"}
-        As the user names it.
+        Name that users give it.
     variant : str
-        As Mitsuba names it.
+        Name that Mitsuba gives it.
     llvm_path : str or None
-        The libLLVM for Dr.Jit, for every kind: it is loaded once and must be good if the kind is changed later.
+        The libLLVM for Dr.Jit, whatever the kind: it is loaded once and must work if the kind is
+        changed later.
     llvm_version : str or None
-        Its version.
+        Version of that library.
     warning : str or None
-        Why it is not what one would wish, and the cure; one line.
+        Why it is slower than it could be, and what to install; one line.
     """
 
     kind: Kind
@@ -63,15 +65,16 @@ def select(variant: str = "auto") -> Backend:
     Parameters
     ----------
     variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does. A GPU traces rays
-        only where ``cuda`` is named.
+        ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does.
+        A GPU traces rays only where ``cuda`` is named.
 
     Raises
     ------
     InputError
         Where there is no such variant.
     BackendError
-        Where the variant was asked for by name and does not work, or Mitsuba is missing; the message names the cure.
+        Where the variant was asked for by name and does not work, or Mitsuba is missing; the
+        message says what to install.
 
     Warns
     -----
@@ -87,14 +90,14 @@ def select(variant: str = "auto") -> Backend:
             raise BackendError(
                 f"the package {package} is not installed; install it: pip install mitsuba"
             )
-    library, verdict, trouble = _first_good()
-    path, version = (library.path, verdict.version) if library and verdict else (None, None)
+    library, result, trouble = _first_good()
+    path, version = (library.path, result.version) if library and result else (None, None)
     if variant == "cuda":
-        verdict = judge(VARIANTS["cuda"], library)
-        if not verdict.good:
+        result = probe_backend(VARIANTS["cuda"], library)
+        if not result.good:
             raise BackendError(
-                f"no CUDA GPU that works was found ({verdict.finding}); it needs an NVIDIA driver with OptiX; "
-                "use --variant auto to run on the CPU"
+                f"no CUDA GPU that works was found ({result.finding}); it needs an NVIDIA driver "
+                "with OptiX; use --variant auto to run on the CPU"
             )
         return Backend("cuda", VARIANTS["cuda"], path, version)
     if variant == "scalar":
@@ -111,13 +114,15 @@ def select(variant: str = "auto") -> Backend:
 def use(backend: Backend) -> ModuleType:
     """Mitsuba with that variant set; may be called again, with the same backend or another one.
 
-    Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one thread until many rays come
-    (`rtradar.trace.backends.jit_threads`); where it was imported before, it keeps the threads it has.
+    Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
+    thread until many rays come (`rtradar.trace.backends.jit_threads`); where it was imported
+    before, it keeps the threads it has.
 
     Raises
     ------
     BackendError
-        Where Dr.Jit was imported with another libLLVM since the backend was selected, or the variant cannot be set.
+        Where Dr.Jit was imported with another libLLVM since the backend was selected, or the
+        variant cannot be set.
     """
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules
@@ -147,7 +152,7 @@ def available() -> tuple[Kind, ...]:
     return tuple(kind for kind in VARIANTS if _works(kind))
 
 
-def cure() -> str:
+def install_hint() -> str:
     """What to install for a good libLLVM on this platform, in half a sentence."""
     if sys.platform == "darwin":
         return "install one: brew install llvm"
@@ -155,7 +160,7 @@ def cure() -> str:
 
 
 def loaded_llvm_version() -> str | None:
-    """Version of the libLLVM that Dr.Jit has in this process, ``none`` where it found none; None before its import."""
+    """Version of the libLLVM that Dr.Jit has, ``none`` if it has none; None before its import."""
     if "drjit" not in sys.modules:
         return None
     import drjit as dr
@@ -164,24 +169,27 @@ def loaded_llvm_version() -> str | None:
     return ".".join(map(str, version)) if version[0] > 0 else "none"
 
 
-def _first_good() -> tuple[Library | None, Verdict | None, str]:
-    """The first library that works and its verdict, or None twice and in words what is wrong, with the cure."""
+def _first_good() -> tuple[Library | None, ProbeResult | None, str]:
+    """The first library that works and its result, or None twice and what is wrong."""
     loaded = loaded_llvm_version()
     refused = []
     for library in candidates():
-        verdict = judge(VARIANTS["llvm"], library)
-        if verdict.good and loaded in (None, verdict.version):
-            return library, verdict, ""
-        if verdict.good:
+        result = probe_backend(VARIANTS["llvm"], library)
+        if result.good and loaded in (None, result.version):
+            return library, result, ""
+        if result.good:
             return None, None, _loaded_before(loaded)
         named = f", named by {ENVIRONMENT_VARIABLE}" if library.origin == "environment" else ""
-        refused.append(f"{library.path}{named}, {verdict.finding}")
-    return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {cure()}"
+        refused.append(f"{library.path}{named}, {result.finding}")
+    return None, None, f"{TROUBLE} ({'; '.join(refused) or 'there is none'}); {install_hint()}"
 
 
 def _loaded_before(loaded: str | None) -> str:
     what = "without a libLLVM" if loaded == "none" else f"with libLLVM {loaded}"
-    return f"Dr.Jit was imported {what} before; let rtradar import it first, or set {ENVIRONMENT_VARIABLE} before Python starts"
+    return (
+        f"Dr.Jit was imported {what} before; let rtradar import it first, "
+        f"or set {ENVIRONMENT_VARIABLE} before Python starts"
+    )
 
 
 def _works(kind: Kind) -> bool:

@@ -44,7 +44,8 @@ class Library:
     Parameters
     ----------
     path : str
-        For the dynamic loader; it exists, except where the environment variable names one that does not.
+        Path for the dynamic loader; it exists unless the environment variable names one that does
+        not.
     origin : {"environment", "wheel", "system"}
         Who brought it.
     """

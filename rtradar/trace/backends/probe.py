@@ -1,48 +1,169 @@
-"""Runs one small kernel on one Mitsuba variant; `rtradar.trace.backends.verdict` starts it in a process of its own.
+"""Whether a Mitsuba variant works with a libLLVM: tried in another process, and kept on disk."""
 
-A libLLVM that does not suit Dr.Jit aborts the process that uses it, so this file is run, never imported. It prints one
-line of JSON before the kernel (the version of the libLLVM that Dr.Jit took) and one after it.
-"""
+from __future__ import annotations
 
+import contextlib
+import importlib.metadata
 import json
+import os
+import platform
+import signal
+import subprocess
 import sys
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
+from rtradar.errors import InputError
+from rtradar.system.files import atomic_file, temporary_folder
+from rtradar.trace.backends.llvm import ENVIRONMENT_VARIABLE, Library
 
-def main(variant: str) -> None:
-    """Intersect a triangle with two rays and take a minimum, the instruction that LLVM 15 and 16 cannot select."""
-    import drjit as dr
-    import mitsuba as mi
+TIMEOUT_S = 120.0
+"""Longest time for a probe. It takes half a second, but longer from a cold disk or on a new GPU."""
 
-    print(json.dumps({"llvm_version": list(dr.detail.llvm_version())}), flush=True)
-    dr.set_thread_count(1)  # as for rtradar, unless rays are many
-    mi.set_variant(variant)
-    mesh = mi.Mesh("triangle", 3, 1)
-    parameters = mi.traverse(mesh)
-    parameters["vertex_positions"] = [0, 0, 0, 1, 0, 0, 0, 1, 0]
-    parameters["faces"] = [0, 1, 2]
-    parameters.update()
-    scene = mi.load_dict({"type": "scene", "triangle": mesh})
-    distances = []
-    for x in (0.25, 2.0):
-        hit = scene.ray_intersect_preliminary(
-            mi.Ray3f(mi.Point3f(x, 0.25, 4.0), mi.Vector3f(0, 0, -1))
+_PROBE = Path(__file__).with_name("probe_script.py")
+
+_STOPPED = {
+    -number
+    for number in (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGKILL", signal.SIGTERM))
+}
+"""Signals by which somebody ended the probe, which says nothing about the library."""
+
+
+@dataclass(frozen=True)
+class ProbeResult:
+    """What a probe found.
+
+    Parameters
+    ----------
+    finding : str
+        ``good``, or in a few words what went wrong.
+    version : str or None
+        Of the libLLVM in use; None where there is none or it does not tell.
+    """
+
+    finding: str
+    version: str | None = None
+
+    @property
+    def good(self) -> bool:
+        """Whether kernels may be run."""
+        return self.finding == "good"
+
+
+def probe_backend(variant: str, library: Library | None, *, fresh: bool = False) -> ProbeResult:
+    """Whether ``variant`` works, with that libLLVM loaded.
+
+    The answer of an earlier process is taken from the disk if the library, Dr.Jit, Mitsuba and the
+    probe are the same. Answers on GPUs, which come and go without a trace in a file, and probes
+    that took too long are not kept.
+
+    Parameters
+    ----------
+    variant : str
+        Mitsuba's name of it.
+    library : Library or None
+        The libLLVM for Dr.Jit; None leaves the choice to Dr.Jit.
+    fresh : bool
+        Probe even where the answer is on the disk.
+    """
+    key = None if variant.startswith("cuda") else _key(variant, library)
+    kept = {} if key is None else _read_cache()
+    if key in kept and not fresh:
+        return ProbeResult(**kept[key])
+    try:
+        result, ended = _probe(variant, library)
+    except subprocess.TimeoutExpired:
+        return ProbeResult(
+            f"hangs: no answer in {TIMEOUT_S:.0f} s", library.version if library else None
         )
-        nearest: Any = dr.slice(dr.minimum(hit.t, dr.opaque(mi.Float, 5.0)))
-        distances.append(float(nearest))
-    # A hit may lie some steps of float32 off: reciprocals of rays are first guessed by the processor, each maker's its own way.
-    works = all(
-        abs(distance - right) < 1e-6 * right
-        for distance, right in zip(distances, (4, 5), strict=True)
-    )
-    print(json.dumps({"works": works}), flush=True)
+    if key is not None and ended not in _STOPPED:
+        _write_cache({**_read_cache(), key: {"finding": result.finding, "version": result.version}})
+    return result
 
 
-if __name__ == "__main__":
-    if sys.platform != "win32":
-        import resource
+def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
+    """What it found, and the status with which it ended."""
+    with temporary_folder() as kernels:
+        # An empty kernel cache: the result must not come from what another libLLVM compiled.
+        environment = {**os.environ, "DRJIT_CACHE_DIR": str(kernels)}
+        if library is not None:
+            environment[ENVIRONMENT_VARIABLE] = library.path
+        # -P keeps the modules beside the script from shadowing others.
+        command = [sys.executable, "-P", str(_PROBE), variant]
+        done = subprocess.run(
+            command,
+            env=environment,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=TIMEOUT_S,
+        )
+    said: dict[str, Any] = {}
+    for line in done.stdout.splitlines():
+        if line.startswith("{"):
+            said |= json.loads(line)
+    told = said.get("llvm_version", [-1])
+    version = ".".join(map(str, told)) if told[0] > 0 else (library.version if library else None)
+    if done.returncode == 0 and said.get("works"):
+        return ProbeResult("good", version), 0
+    return ProbeResult(_what_went_wrong(done, said), version), done.returncode
 
-        resource.setrlimit(
-            resource.RLIMIT_CORE, (0, 0)
-        )  # an abort may come and should leave no core file
-    main(sys.argv[1])
+
+def _what_went_wrong(done: subprocess.CompletedProcess[str], said: dict[str, Any]) -> str:
+    if done.returncode == 0:
+        return "gives wrong results"
+    # A process that calls abort() ends by a signal, which Python tells by a negative status.
+    if done.returncode < 0:
+        return "aborts the process"
+    if "is too old" in done.stderr:
+        return "refused by Dr.Jit: too old"
+    if "Unable to load" in done.stderr:
+        return "cannot be loaded"
+    if "the CUDA backend" in done.stderr:
+        return "no CUDA driver or no GPU"
+    lines = done.stderr.strip().splitlines()
+    last = lines[-1] if lines else f"exit status {done.returncode}"
+    return f"fails: {last[:200]}"
+
+
+# -- memory ----------------------------------------------------------------------------------------
+
+
+def cache_dir() -> Path:
+    """Folder for what rtradar may lose: ``RTRADAR_CACHE``, or the platform's cache folder."""
+    named = os.environ.get("RTRADAR_CACHE")
+    if named:
+        return Path(named)
+    if sys.platform == "darwin":
+        return Path("~/Library/Caches/rtradar").expanduser()
+    return Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "rtradar"
+
+
+def _key(variant: str, library: Library | None) -> str | None:
+    """All that an answer depends on; None where that cannot be told."""
+    try:
+        versions = [f"{name} {importlib.metadata.version(name)}" for name in ("mitsuba", "drjit")]
+        about = [] if library is None else [library.path, str(os.stat(library.path).st_mtime_ns)]
+        about.append(f"probe {zlib.crc32(_PROBE.read_bytes()):08x}")
+    except (importlib.metadata.PackageNotFoundError, OSError):
+        return None
+    return "; ".join([variant, platform.machine(), sys.executable, *versions, *about])
+
+
+def _read_cache() -> dict[str, Any]:
+    try:
+        kept = json.loads((cache_dir() / "probes.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return kept if isinstance(kept, dict) else {}
+
+
+def _write_cache(kept: dict[str, Any]) -> None:
+    # A read-only home costs the next start half a second, no more.
+    with contextlib.suppress(OSError, InputError):
+        folder = cache_dir()
+        folder.mkdir(parents=True, exist_ok=True)
+        with atomic_file(folder / "probes.json") as file:
+            file.write(json.dumps(kept, indent=1).encode())
