@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 
-# Idle threads of OpenMP, which runs compiled loops, would spin and take cores from threads that have
-# work. The variable is read when OpenMP is loaded, with the first loop that runs in parallel.
+# Idle threads of OpenMP, which runs compiled loops, would spin and take cores from threads that
+# have work. The variable is read when OpenMP is loaded, with the first loop that runs in parallel.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 _HOME = {

@@ -60,8 +60,8 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
         opposite = len(names) == 2 and SIDES[names[0]][0] == SIDES[names[1]][0]
         key = echoes.name if opposite else frozenset(names)
         found[key] = found.get(key, 0.0) + gain(echoes)
-    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders fraction
-    # one path.
+    # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders
+    # fraction one path.
     assert len(found) == 6 + 6 + 12
     for name, total in found.items():
         # A conductor mirrors v into v, whatever the angles.
