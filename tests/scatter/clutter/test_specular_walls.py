@@ -61,7 +61,7 @@ def test_a_box_has_all_images_of_two_orders_once_each() -> None:
         key = echoes.name if opposite else frozenset(names)
         found[key] = found.get(key, 0.0) + gain(echoes)
     # Six walls, six sequences of two opposite ones, and twelve edges, over which two orders
-    # fraction one path.
+    # have one path in common.
     assert len(found) == 6 + 6 + 12
     for name, total in found.items():
         # A conductor mirrors v into v, whatever the angles.
