@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -41,8 +42,7 @@ def scattering_length(
         place one counts. Meshes, of perfect conductors, are for ``physical-optics``, ``reference``
         (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
     tx, rx : (n, 3) array_like
-        Antennas, pair by pair [m], in the coordinates of the target. One of them may be a single
-        (3,).
+        Antennas, pair by pair, in the coordinates of the target [m]. One may be a single (3,).
     frequency : float or (n,) array_like
         Frequency of the wave, for all pairs or for each [Hz].
     fidelity : {"analytic", "specular", "fresnel", "physical-optics", "reference", "rays"}
@@ -76,27 +76,10 @@ def scattering_length(
         raise InputError(
             f"scattering_length: polarization {polarization!r} is unknown; allowed: v, h"
         )
-    if fidelity not in (allowed := models_that("scattering")):
-        raise InputError(
-            f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(allowed)}"
-        )
-    model: Any = MODELS[fidelity]
+    model = _model_for(target, fidelity, model_options)
     if isinstance(target, Ellipsoids):
         for name, antennas in (("tx", tx_array), ("rx", rx_array)):
             _refuse_inside(target, name, antennas)
-    elif not model.accepts_meshes:
-        raise InputError(
-            f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it "
-            "needs curvature in closed form"
-        )
-    taken = inspect.signature(model.scattering).parameters
-    known = [name for name in taken if name not in _COMMON]
-    for option in model_options:
-        if option not in known:
-            raise InputError(
-                f"scattering_length: '{fidelity}' has no option '{option}'; it has: "
-                f"{', '.join(known) or 'none'}"
-            )
     if isinstance(target, Ellipsoids) and model.traces:
         target = target.without_repeats()
     if isinstance(target, Ellipsoids) and len(tx_array):
@@ -105,6 +88,29 @@ def scattering_length(
         warn_of_small_radii(target, tx_array, rx_array, wavenumber, amplitude[:, 0], stacklevel=2)
     pairs = tx_array, rx_array, frequencies
     return np.asarray(model.scattering(target, *pairs, polarization=polarization, **model_options))
+
+
+def _model_for(target: object, fidelity: str, options: Iterable[str]) -> Any:
+    """Class of a model that knows such targets and options."""
+    if fidelity not in (allowed := models_that("scattering")):
+        raise InputError(
+            f"scattering_length: fidelity '{fidelity}' is unknown; allowed: {', '.join(allowed)}"
+        )
+    model: Any = MODELS[fidelity]
+    if not isinstance(target, Ellipsoids) and not model.accepts_meshes:
+        raise InputError(
+            f"scattering_length: '{fidelity}' takes rt.Ellipsoids, not {type(target).__name__}: it "
+            "needs curvature in closed form"
+        )
+    taken = inspect.signature(model.scattering).parameters
+    known = [name for name in taken if name not in _COMMON]
+    for option in options:
+        if option not in known:
+            raise InputError(
+                f"scattering_length: '{fidelity}' has no option '{option}'; it has: "
+                f"{', '.join(known) or 'none'}"
+            )
+    return model
 
 
 def _pairs(

@@ -122,6 +122,14 @@ def _to_world(vector, frame):
 
 
 @inlined()
+def _plane_in_world(plane, frame):
+    normal, e, f = plane.normal, plane.e, plane.f
+    return Plane(
+        _to_world(normal, frame), _to_world(e, frame), _to_world(f, frame), plane.curvature
+    )
+
+
+@inlined()
 def _settle(tx, rx, axes, start):
     """Newton's steps from near the specular point, all in the part's axes.
 
@@ -230,14 +238,8 @@ def nearby_echoes(images, tx_index, ellipsoids, near, length, amplitude):
             good, point, plane, out = _settle(tx, middle, axes, guess)
             place = _to_world(point, frame)
             place = (place[0] + centre[0], place[1] + centre[1], place[2] + centre[2])
-            turned = Plane(
-                _to_world(plane.normal, frame),
-                _to_world(plane.e, frame),
-                _to_world(plane.f, frame),
-                plane.curvature,
-            )
             least = min(axes[0], min(axes[1], axes[2]))
-            good &= _correct(rx, place, turned, out, least, room)
+            good &= _correct(rx, place, _plane_in_world(plane, frame), out, least, room)
             if not good:
                 # Search for each receiver, from cold.
                 searched += 1

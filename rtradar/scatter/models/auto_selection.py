@@ -5,12 +5,13 @@ the array: the specular point's return G, the far-field cross-section's A, and t
 curvature in closed form, and by rays the fraction V of the Fresnel zones that others leave in view.
 What is true is taken to be G V; then
 
-    analytic         |A exp(jk dL) - G V|     dL between both paths specular         |G (v - V)|
-    v whether the specular point itself is in view fresnel          3 % of G where an edge cuts the
-    zones (validation/other_methods/fresnel.py) all of optics    G V / (2 k rho)          the next
-    term of its expansion, rho the mean radius physical-optics  1.5 % of G V, which its
-    interpolation leaves (validation/other_methods/ladder.py)
+    analytic         |A exp(jk dL) - G V|   dL between both paths
+    specular         |G (v - V)|            v whether the specular point itself is in view
+    fresnel          3 % of G               where an edge cuts the zones
+    all of optics    G V / (2 k rho)        next term of its expansion, rho the mean radius
+    physical-optics  1.5 % of G V           what its interpolation leaves
 
+(``validation/other_methods/fresnel.py`` and ``ladder.py`` measure the third and the last),
 and that of `reference` is 0, for errors are held against it. All of it through the patterns of the
 radar's antennas.
 """
@@ -98,8 +99,8 @@ def error_budget(
     )
     # A tolerance is held against what the antennas transmit and receive.
     gain = leg_gain(radar, ChirpPoses(np.zeros(len(tx), dtype=np.int64), *at))
-    turned = gain * far * np.exp(1j * wavenumber * (far_length - length))
-    turned, near = (values.reshape(times, pairs, parts) for values in (turned, gain * near))
+    rotated = gain * far * np.exp(1j * wavenumber * (far_length - length))
+    rotated, near = (values.reshape(times, pairs, parts) for values in (rotated, gain * near))
 
     fraction, seen, radius = _views(radar, poses, tracer, wavenumber)
     free = (near**2).mean(axis=1)
@@ -108,8 +109,8 @@ def error_budget(
     wrong, optics = np.zeros_like(power), np.zeros_like(power)
     optics[:, ANALYTIC:PHYSICAL_OPTICS] = (true / (2 * wavenumber * radius) ** 2)[:, None]
     wrong[:, LEFT_OUT] = true
-    power[:, ANALYTIC] = (np.abs(turned) ** 2).mean(axis=1)
-    wrong[:, ANALYTIC] = (np.abs(turned - near * fraction[:, None]) ** 2).mean(axis=1)
+    power[:, ANALYTIC] = (np.abs(rotated) ** 2).mean(axis=1)
+    wrong[:, ANALYTIC] = (np.abs(rotated - near * fraction[:, None]) ** 2).mean(axis=1)
     power[:, SPECULAR] = free * seen
     wrong[:, SPECULAR] = free * np.abs(seen - fraction) ** 2
     power[:, FRESNEL:] = true[:, None]
@@ -126,7 +127,7 @@ def _views(
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64]]:
     """Look at the parts (time, part) from the middle of the array.
 
-    Returned are V, whether the specular point is seen, and the mean radius of curvature there [m].
+    Rerotated are V, whether the specular point is seen, and the mean radius of curvature there [m].
     """
     times, parts = poses.centres.shape[:2]
     eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
