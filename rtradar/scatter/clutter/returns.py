@@ -121,12 +121,16 @@ class RoomEchoes:
         largest = np.abs(self.amplitude).max(initial=0.0)
         for count in _NODES:
             nodes = sweep_nodes(radar, count)
-            fewer = self.at_nodes(nodes)
-            again = np.tensordot(interpolation_weights(nodes, self.frequency), fewer, axes=1)
-            off = float(np.abs(again - self.amplitude).max(initial=0.0))
+            there = interpolation_weights(self.frequency, nodes)
+            change = interpolation_weights(nodes, self.frequency) @ there - np.eye(there.shape[1])
+            # Tx by Tx, which takes less memory.
+            off = max(
+                float(np.abs(np.tensordot(change, own, axes=1)).max(initial=0.0))
+                for own in np.moveaxis(self.amplitude, 1, 0)
+            )
             if off <= error * largest:
-                return replace(self, amplitude=fewer, frequency=nodes, off_m=0.0)
-        return replace(self, amplitude=fewer, frequency=nodes, off_m=off)
+                return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=0.0)
+        return replace(self, amplitude=self.at_nodes(nodes), frequency=nodes, off_m=off)
 
 
 # -- behind walls ----------------------------------------------------------------------------------
@@ -222,19 +226,25 @@ def _together(
 
     What each is longer is in its amplitude.
     """
-    longer = [
-        pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some] for pair in pairs
-    ]
-    left = [pair.left_out[:, :, None, some] * pair.left_back[:, kept][..., some] for pair in pairs]
-    weights = [np.abs(one[len(one) // 2]) for one in left]
-    total = np.sum(weights, axis=0)
-    weighted = np.sum([weight * own for weight, own in zip(weights, longer, strict=True)], axis=0)
+
+    def longer(pair: _Pair) -> Array:
+        return pair.out.extra_m[:, None, some] + pair.back.extra_m[kept][..., some]
+
+    # Pair by pair and node by node, which takes less memory.
+    middle, total, weighted = len(returns.frequency) // 2, np.zeros(1), np.zeros(1)
+    for pair in pairs:
+        left = pair.left_out[middle][:, None, some] * pair.left_back[middle][kept][..., some]
+        total = total + np.abs(left)
+        weighted = weighted + np.abs(left) * longer(pair)
     mean = np.where(total > 0, weighted / np.where(total > 0, total, 1.0), 0.0)
-    wavenumber = 2 * np.pi * returns.frequency[:, None, None, None] / SPEED_OF_LIGHT_MPS
-    factor = sum(
-        one * np.exp(1j * wavenumber * (own - mean)) for one, own in zip(left, longer, strict=True)
-    )
-    return replace(returns, length=returns.length + mean, amplitude=returns.amplitude * factor)
+    amplitude = np.zeros_like(returns.amplitude)
+    for node, wavenumber in enumerate(2 * np.pi * returns.frequency / SPEED_OF_LIGHT_MPS):
+        for pair in pairs:
+            turn = np.exp(1j * wavenumber * (longer(pair) - mean))
+            left = pair.left_out[node][:, None, some] * pair.left_back[node][kept][..., some]
+            amplitude[node] += turn * left
+    amplitude *= returns.amplitude
+    return replace(returns, length=returns.length + mean, amplitude=amplitude)
 
 
 def _worth(sizes: Array) -> NDArray[np.bool_]:
