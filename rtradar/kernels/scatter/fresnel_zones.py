@@ -243,7 +243,7 @@ def _line(first, second, x, y, is_open):
 
 
 @inlined()
-def open_share(a, b, c, d):
+def _open_quadrilateral(a, b, c, d):
     """Fraction of a cell where a function is positive, from its values a, b and c, d at two sides.
 
     The cell is cut into triangles along one diagonal and along the other: no value at a corner can
@@ -269,7 +269,7 @@ def _open_cell(line, j, here, after, cosine, sine):
     other_first, other_last = c + across * j, c + across * (j + 1)
     if j == 0:  # the innermost cell has three corners
         return positive_fraction(first, last, other_last)
-    return open_share(first, last, other_first, other_last)
+    return _open_quadrilateral(first, last, other_first, other_last)
 
 
 @compiled()
@@ -361,7 +361,7 @@ def straight_edge(maps, line, bands):
 
 
 @inlined(fastmath={"reassoc", "contract", "nsz"})
-def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, sums):
+def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, open_t, open_r, sums):
     """Add one meridian to ``sums``: free real and imaginary, lost real and imaginary, open."""
     free_re, free_im, lost_re, lost_im, open_ = 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(len(weight)):
@@ -369,12 +369,12 @@ def _add(weight, facing_t, facing_r, re_t, im_t, re_r, im_r, share_t, share_r, s
         re = strength * (re_t[j] * re_r[j] - im_t[j] * im_r[j])
         im = strength * (re_t[j] * im_r[j] + im_t[j] * re_r[j])
         # Tx and Rx are side by side and see the same edge: the smaller fraction, not the product.
-        share = min(share_t[j], share_r[j])
+        fraction = min(open_t[j], open_r[j])
         free_re += re
         free_im += im
-        lost_re += (1 - share) * re
-        lost_im += (1 - share) * im
-        open_ += share
+        lost_re += (1 - fraction) * re
+        lost_im += (1 - fraction) * im
+        open_ += fraction
     sums[0] += free_re
     sums[1] += free_im
     sums[2] += lost_re

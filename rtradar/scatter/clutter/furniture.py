@@ -304,9 +304,8 @@ def _shot(
             group = groups.of(footprints.places[:, 3])
         visible = exits(surfaces, footprints, rx)
         turn, lit = _reflected(footprints, material, radar.centre_frequency_hz)
-        own = radiate(
-            lit, visible, group, rx, wavenumber, lengths[-1], polarization=radar.polarization
-        )
+        lit = replace(lit, surface=group)
+        own = radiate(lit, visible, rx, wavenumber, lengths[-1], polarization=radar.polarization)
         sums.append(turn * own)
     return np.concatenate(lengths, axis=-1), np.concatenate(sums, axis=-1).conj()
 

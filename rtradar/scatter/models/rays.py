@@ -105,8 +105,8 @@ class Rays(BuiltInModel):
         length = np.zeros((len(at.tx), at.rx.shape[1], orders * parts))
         amplitude = np.zeros((len(frequency), *length.shape), dtype=np.complex128)
         for index, (chirp, tx) in enumerate(zip(chirps, at.tx_index, strict=True)):
-            before, share = divmod(int(chirp), self._step)
-            for place, weight in enumerate(_cubic(share / self._step), start=before - 1):
+            before, fraction = divmod(int(chirp), self._step)
+            for place, weight in enumerate(_cubic(fraction / self._step), start=before - 1):
                 if weight != 0:
                     shot = self._shot(max(place, 0) * self._step, int(tx))
                     length[index] += weight * shot.length
@@ -156,7 +156,6 @@ class Rays(BuiltInModel):
             sums = radiate(
                 footprints,
                 exits(self._surfaces, footprints, rx),
-                footprints.surface,
                 rx,
                 2 * np.pi * nodes / SPEED_OF_LIGHT_MPS,
                 lengths[-1],
@@ -184,9 +183,9 @@ class _Shot(NamedTuple):
     amplitude: NDArray[np.complex128]
 
 
-def _cubic(share: float) -> tuple[float, float, float, float]:
-    """Weights of keyframes -1, 0, 1, 2 at ``share`` of the way from 0 to 1, by Catmull and Rom."""
-    h0, h1, g0, g1 = hermite_weights(share, 1)
+def _cubic(fraction: float) -> tuple[float, float, float, float]:
+    """Weights of keyframes -1, 0, 1, 2 at a fraction of the way from 0 to 1 (Catmull and Rom)."""
+    h0, h1, g0, g1 = hermite_weights(fraction, 1)
     return -g0 / 2, h0 - g1 / 2, h1 + g0 / 2, g1 / 2
 
 

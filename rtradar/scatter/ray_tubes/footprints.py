@@ -81,7 +81,6 @@ class Footprints:
 def radiate(
     footprints: Footprints,
     visible: NDArray[np.bool_],
-    group: NDArray[np.int64],
     rx: Array,
     wavenumber: Array,
     length: Array,
@@ -97,14 +96,13 @@ def radiate(
     footprints : Footprints
     visible : (rx, tube) bool
         Whether the last leg is free.
-    group : (tube,) int64
-        Which sum each footprint goes to.
     rx : (rx, 3) float64
         [m].
     wavenumber : (node,) float64
         [1/m].
     length : (rx, group) float64
-        Path whose phase is taken out [m].
+        Path whose phase is taken out [m]. Footprints are summed by their surface, or all
+        together if there is one group.
     polarization : {"v", "h"}
         Polarization of the receiving antennas.
     spreading : bool
@@ -121,6 +119,7 @@ def radiate(
     parts = np.zeros((chunks, len(wavenumber), *length.shape), dtype=np.complex128)
     if len(footprints):
         f = footprints
+        group = np.zeros_like(f.surface) if length.shape[1] == 1 else f.surface
         arrays = (f.places, f.path, f.directions[:, 3], f.normals[:, 3], f.field, group)
         tubes = Tubes._make(np.ascontiguousarray(array) for array in arrays)
         given = (np.ascontiguousarray(array) for array in (visible, rx, wavenumber, length))

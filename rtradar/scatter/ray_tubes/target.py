@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Grid, Shooter, exits
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid, PosedGrid
 from rtradar.scatter.target import target_mesh
+from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.bounces import BodySurfaces, MeshSurfaces, Surfaces
 
@@ -76,17 +77,7 @@ def rays_scattering(
         return field
     mi = use(select(variant))
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
-    edge = 2 * np.pi / wavenumber.max() / rays_per_wavelength
-    surfaces: Surfaces
-    grid: Grid
-    if isinstance(solid, Ellipsoids):
-        pose = (solid.centres, solid.frames)
-        surfaces = BodySurfaces(mi, solid.semi_axes)
-        surfaces.pose(*pose)
-        grid = PosedGrid(EllipsoidGrid.cover(solid.semi_axes, edge), *pose, solid.semi_axes)
-    else:
-        surfaces = MeshSurfaces(mi, solid.vertices, solid.faces)
-        grid = MeshGrid.cover(solid.vertices, solid.faces, edge)
+    surfaces, grid = _scene(mi, solid, 2 * np.pi / wavenumber.max() / rays_per_wavelength)
     shooter = Shooter(
         surfaces=surfaces,
         grid=grid,
@@ -101,20 +92,23 @@ def rays_scattering(
             own = of_tx[of_rx]
             length = np.full((1, 1), np.linalg.norm(transmitter) + np.linalg.norm(receiver))
             for order, each in enumerate(shots):
-                visible = exits(surfaces, each, receiver[None])
-                sums = radiate(
-                    each,
-                    visible,
-                    np.zeros(len(each), dtype=np.int64),
-                    receiver[None],
-                    wavenumber[own],
-                    length,
-                    polarization=polarization,
-                    tapered=order > 0 and not surfaces.flat,
-                )
+                to = exits(surfaces, each, receiver[None]), receiver[None], wavenumber[own], length
+                tapered = order > 0 and not surfaces.flat
+                sums = radiate(each, *to, polarization=polarization, tapered=tapered)
                 field[own] += sums[:, 0, 0]
             field[own] *= np.linalg.norm(transmitter) * np.linalg.norm(receiver)
     return field
+
+
+def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surfaces, Grid]:
+    """What rays meet, and facets with edges of this length [m] at which they are aimed."""
+    if isinstance(solid, Ellipsoids):
+        surfaces = BodySurfaces(mi, solid.semi_axes)
+        surfaces.pose(solid.centres, solid.frames)
+        facets = EllipsoidGrid.cover(solid.semi_axes, edge)
+        return surfaces, PosedGrid(facets, solid.centres, solid.frames, solid.semi_axes)
+    grid = MeshGrid.cover(solid.vertices, solid.faces, edge)
+    return MeshSurfaces(mi, solid.vertices, solid.faces), grid
 
 
 def check_options(rays_per_wavelength: float, bounces: int) -> None:

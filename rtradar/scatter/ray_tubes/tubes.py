@@ -78,7 +78,7 @@ class EllipsoidGrid:
     def split(self, which: NDArray[np.int64]) -> EllipsoidGrid:
         """Those facets, each in four, whose corners are farther in as finer facets require."""
         quarters = in_four(self.corners[which])
-        # Corners are outside the sphere by 3/2 of what the middle is below the mean radius, and by a
+        # Corners are outside the sphere by 3/2 of what the middle is below the mean radius, by a
         # quarter of it with half the edge.
         out = np.linalg.norm(self.corners[which, 0], axis=-1) - 1
         size = np.linalg.norm(quarters, axis=-1, keepdims=True)
