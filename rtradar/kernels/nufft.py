@@ -81,10 +81,10 @@ def sum_by_nufft(tones: Tones, out: NDArray[np.complex64]) -> None:
         some = slice(first, min(first + _CHIRPS_AT_ONCE, chirps))
         sums = out[some]
         sums[:] = 0
+        # One type and layout, or Numba would compile for each that comes.
+        amplitude = np.ascontiguousarray(tones.amplitude[:, some], dtype=np.complex64)
         for number, parabola in enumerate(parabolas):
-            own = tones._replace(
-                length=tones.length[some], amplitude=tones.amplitude[:, some], powers=parabola
-            )
+            own = tones._replace(length=tones.length[some], amplitude=amplitude, powers=parabola)
             grid = np.empty((len(sums), receivers, cells), dtype=np.complex64)
             _spread_tones(own, half, samples, gaussian, grid)
             summed = fft.ifft(grid, axis=-1, norm="forward", overwrite_x=True, workers=-1)

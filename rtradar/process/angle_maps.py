@@ -95,8 +95,8 @@ def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
             f"range_elevation: radar '{radar.name}' has no line of at least 2 channels along z; "
             "give it one"
         )
-    sines = np.broadcast_to(np.sin(angle_grid(radar)), spectra.z.shape)
-    return _map(spectra, spectra.z, np.ascontiguousarray(sines), radar)
+    sines = np.tile(np.sin(angle_grid(radar)), (len(spectra.z), 1))
+    return _map(spectra, spectra.z, sines, radar)
 
 
 def _map(

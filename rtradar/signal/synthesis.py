@@ -119,7 +119,6 @@ def synthesize(
     shape = (*echoes.length.shape[:2], radar.samples_per_chirp)
     out = array_to_fill("synthesize", out, shape, dtype)
     if _are_many(echoes, radar, out.dtype):
-        # The NUFFT takes a slice of a block as it is, for amplitudes are only picked from it.
         sum_by_nufft(_tones(echoes, echoes.amplitude, radar, 0.0), out)
         return out
     amplitude = np.ascontiguousarray(echoes.amplitude, dtype=np.complex128)
