@@ -117,31 +117,13 @@ def _shade_part(occluder, antenna, part, pose, vertices, corners, room, out):
 
 @compiled()
 def shade(hidden_by, antennas, parts, pose, vertices, corners, row, out):
-    """Fill in what antennas see of facets.
+    """Fill in what antennas see of the facets of some parts; return the number of rows filled.
 
-    Parameters
-    ----------
-    hidden_by : (antenna, n, vertex) int
-        Part that hides each vertex, or -1.
-    antennas : (antenna, 3) float64
-        Positions, world [m].
-    parts : (n,) int64
-        Parts whose facets are asked for.
-    pose : (centres, frames, semi_axes)
-        Pose of the whole body.
-    vertices : (part, vertex, 3) float64
-        Vertices in the axes of the parts [m].
-    corners : (3, facet) uint32
-        Corners of the facets.
-    row : (antenna, n) int64
-        Filled: row of ``out`` for each antenna and part.
-    out : (row, facet) float32
-        Filled: fractions. The first row is that of parts in full view.
-
-    Returns
-    -------
-    int
-        Number of rows that are filled.
+    ``hidden_by (antenna, n, vertex)`` is the part that occludes a vertex, or -1; ``antennas
+    (antenna, 3)`` world [m]; ``parts (n,)``; ``pose`` centres, frames and semi-axes of the body;
+    ``vertices (part, vertex, 3)`` in the axes of the parts; ``corners (3, facet)`` uint32. Filled
+    are ``out (row, facet)`` float32, its first row for parts in full view, and ``row (antenna,
+    n)``, which of them is whose.
     """
     out[0] = 1.0
     count, n_vertices, n_facets = 1, vertices.shape[1], corners.shape[1]

@@ -309,20 +309,10 @@ def search_all(tx, rx, axes, up, options, guess, one, out):
 
 @compiled()
 def solve(begin, end, at, start, options, length, amplitude, point):
-    """Fill length, amplitude (chirp, rx, part) and, unless empty, point (chirp, rx, part, 3).
+    """Fill length, amplitude (chirp, rx, part) and, unless empty, point (chirp, rx, part, 3) [m].
 
-    Parameters
-    ----------
-    begin, end : int
-        Chirps to compute.
-    at : Geometry
-        Antennas and ellipsoids.
-    start : (chirp, part, 3) float64
-        Where the search begins, in the ellipsoid's axes [m]; NaN where nothing is known.
-    options : Options
-        What amplitudes hold.
-    length, amplitude, point : float64
-        Path lengths [m], scattering lengths [m] and specular points, world [m].
+    For chirps from ``begin`` to ``end`` of a `Geometry`; the search starts at ``start (chirp, part,
+    3)`` in the ellipsoid's axes, NaN where nothing is known. `Options` say what amplitudes hold.
     """
     # Unpacked here: to take an array out of a tuple counts a reference, which takes time in loops.
     tx, rx, centres, frames, semi_axes = at

@@ -60,16 +60,9 @@ class FacetShadows:
     def seen(
         self, centres: Array, frames: Array, antennas: Array, parts: NDArray[np.int64]
     ) -> Seen:
-        """Fraction of each facet that no other part hides.
+        """Fraction of each facet of some parts (n,) that antennas (antenna, 3) see past the others.
 
-        Parameters
-        ----------
-        centres, frames : (part, 3), (part, 3, 3) float64
-            Pose of the whole body, world [m].
-        antennas : (antenna, 3) float64
-            Positions, world [m].
-        parts : (n,) int64
-            Parts whose facets are asked for.
+        ``centres (part, 3)`` and ``frames (part, 3, 3)`` are the pose of the whole body, world [m].
         """
         facets, row = self._facets, np.zeros((len(antennas), len(parts)), dtype=np.int64)
         if len(centres) == 1:
@@ -91,27 +84,8 @@ class FacetShadows:
 class FacetBody:
     """The facets of a moving body, which the models `physical-optics` and `reference` share.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
-    facets : int, optional
-        Least number per part; None: by the wavelength, see `body_facets`.
-    nodes : int
-        Number of frequencies over the sweep.
-
-    Attributes
-    ----------
-    variant : str
-        Kind of the backend in use.
-    frequency : (node,) float64
-        Frequencies [Hz].
+    ``facets`` is the least number per part, None for `body_facets`; ``nodes`` the number of
+    frequencies over the sweep, ``frequency (node,)`` [Hz]; ``variant`` the backend in use.
     """
 
     def __init__(
@@ -143,29 +117,12 @@ class FacetBody:
         index: NDArray[np.integer],
         parts: NDArray[np.int64],
     ) -> NDArray[np.complex128]:
-        """Amplitude of `Echoes` for poses and pairs of antennas.
+        """Amplitude (node, pose, pair, n) of `Echoes` for poses and pairs of antennas [m].
 
-        Parameters
-        ----------
-        pose : (pose, part, 3), (pose, part, 3, 3) float64
-            Centres and frames, world [m].
-        antennas : (pose, antenna, 3) float64
-            Positions, world [m].
-        pairs : (pair, 2) int
-            Tx and Rx, among the antennas of a pose.
-        length : (pose, pair, n) float64
-            Carriers [m].
-        seen : Seen
-            What some antennas see of these parts.
-        index : (pose, antenna) int
-            Number of each antenna among those.
-        parts : (n,) int64
-            Parts to compute.
-
-        Returns
-        -------
-        (node, pose, pair, n) complex128
-            Scattering lengths, conjugated [m].
+        ``pose`` are centres and frames of the body, ``antennas (pose, antenna, 3)``, world [m];
+        ``pairs (pair, 2)`` Tx and Rx among these; ``length (pose, pair, n)`` the carriers [m] of
+        the ``parts (n,)``; ``seen`` what some antennas see of them, and ``index (pose, antenna)``
+        the number of each antenna among those.
         """
         centres, frames = (array[:, parts] for array in pose)
         tasks, nodes = centres.shape[0] * len(parts), len(self.frequency)

@@ -73,39 +73,11 @@ def facet_scattering(
     variant: str = "auto",
     facets: int | None = None,
 ) -> NDArray[np.complex128]:
-    """Co-polar scattering length by physical optics over the facets that both antennas see.
+    """Co-polar scattering length (n,) by physical optics over the facets that both antennas see.
 
-    Parameters
-    ----------
-    target : Ellipsoids or trimesh.Trimesh
-        Target; an open mesh is a thin sheet, lit from both sides.
-    tx, rx : (n, 3) float64
-        Antennas [m].
-    frequency : (n,) float64
-        Frequency of each pair [Hz].
-    polarization : {"v", "h"}
-        Polarisation of both antennas, v along world z.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    facets : int, optional
-        Least number per ellipsoid; None: enough for 0.1 dB, up to ka = 400. A mesh has its own.
-
-    Returns
-    -------
-    (n,) complex128
-        F |tx| |rx| [m], phase relative to the path over the origin; 0 where nothing is lit.
-
-    Raises
-    ------
-    InputError
-        Where ka is above 400 and facets are too few, ``facets`` does not fit the target, or a mesh
-        cannot be used.
-    BackendError
-        Where no backend of that kind works here.
-
-    Notes
-    -----
-    Equations :eq:`po` and :eq:`facet` of the theory page.
+    Parameters, returns and errors are those of `scattering_length`; ``facets`` is the least number
+    per ellipsoid, None for 0.1 dB up to ka = 400. Equations :eq:`po` and :eq:`facet` of the theory
+    page.
     """
     wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
     solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)

@@ -68,22 +68,9 @@ class ErrorBudget(NamedTuple):
 def error_budget(
     radar: Radar, poses: Poses, tracer: BodyTracer, *, spreading: bool = True
 ) -> ErrorBudget:
-    """Estimate the errors of all candidates.
+    """Estimate the errors of all candidates at some poses of the tracer's body.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    poses : Poses
-        Poses of the body at the instants to evaluate.
-    tracer : BodyTracer
-        Tracer of the same body.
-    spreading : bool
-        Whether powers hold 1 / (R1 R2)^2.
-
-    Returns
-    -------
-    ErrorBudget
+    With ``spreading`` powers hold 1 / (R1 R2)^2.
     """
     times, parts = poses.centres.shape[:2]
     wavenumber = 2 * math.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS

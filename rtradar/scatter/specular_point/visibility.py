@@ -54,20 +54,10 @@ def unobstructed(
     rx: NDArray[np.float64],
     points: NDArray[np.float64],
 ) -> NDArray[np.bool_]:
-    """Whether no other part of the posed body occludes either leg to the point of each part.
+    """Whether no other part of the posed body occludes either leg, (chirp, rx, part) bool.
 
-    Parameters
-    ----------
-    tracer : BodyTracer
-        Posed tracer.
-    tx, rx : (chirp, 3), (chirp, rx, 3) float64
-        Antennas [m].
-    points : (chirp, rx, part, 3) float64
-        One point on each part [m].
-
-    Returns
-    -------
-    (chirp, rx, part) bool
+    The legs run from ``tx (chirp, 3)`` and ``rx (chirp, rx, 3)`` to one point on each part,
+    ``points (chirp, rx, part, 3)``, world [m].
     """
     own = np.broadcast_to(np.arange(points.shape[2]), points.shape[:3]).ravel()
     targets = points.reshape(-1, 3)
