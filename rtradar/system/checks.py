@@ -112,7 +112,7 @@ def _number(value: object) -> float | None:
     return number if math.isfinite(number) else None
 
 
-# -- tables of TOML files ---------------------------------------------------------------------------
+# -- tables of TOML files --------------------------------------------------------------------------
 
 
 def read_toml(path: Path, what: str, cure: str) -> Table:
