@@ -22,7 +22,7 @@ demo: $(VENV)/.installed
 	$(RUN) --fidelity specular --out out/demo/specular
 
 test: $(VENV)/.installed-test
-	$(BIN)/python -m pytest -q -n auto --dist loadfile
+	$(BIN)/python -m pytest -q -n auto --dist loadfile --no-loadscope-reorder
 
 TESTS ?= tests
 test-fresh: $(VENV)/.installed-test

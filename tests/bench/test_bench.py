@@ -17,6 +17,8 @@ from rtradar.bench.plan import Case
 from rtradar.bench.runs import Baseline, Run, RunError, Runner, Spread
 from rtradar.cli import main
 
+pytestmark = pytest.mark.drawn
+
 CHIRPS = 1596 * 3  # three frames of the paper's radar
 RATES = Rates(1e10, 1e8, 1e10, 1e6, 1e6, 1e6, 1e6)
 BASELINE = Baseline(

@@ -21,6 +21,8 @@ from rtradar.classify.training import Examples, predict
 from rtradar.cli import main
 from rtradar.errors import InputError
 
+pytestmark = pytest.mark.drawn
+
 TINY = ["--points", "24", "--epochs", "2", "--folds", "2"]
 
 

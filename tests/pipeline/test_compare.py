@@ -14,6 +14,8 @@ import rtradar as rt
 from rtradar.cli import main
 from rtradar.errors import InputError
 
+pytestmark = pytest.mark.drawn
+
 RADAR = rt.Radar(
     name="small",
     tx_y=2,

@@ -15,6 +15,8 @@ from rtradar.pipeline.writer import ReceivedFrame
 from rtradar.scatter import build_model
 from rtradar.scatter.multipath.path_summary import ghosts
 
+pytestmark = pytest.mark.drawn
+
 RADAR = rt.Radar(
     name="small",
     tx_y=2,

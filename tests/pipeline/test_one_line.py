@@ -17,6 +17,8 @@ import rtradar as rt
 from rtradar.exchange import read_cloud
 from rtradar.pipeline.view import load_run_view, view
 
+pytestmark = pytest.mark.drawn
+
 LINES = {
     "y": {"tx_y": 2, "tx_z": 0, "rx_y": 4, "rx_z": 0},
     "z": {"tx_y": 0, "tx_z": 2, "rx_y": 0, "rx_z": 4},

@@ -125,6 +125,7 @@ def test_a_person_who_turns_is_another_echo(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.drawn
 def test_noise_alone_leaves_an_empty_cloud_and_says_so(tmp_path: Path) -> None:
     with pytest.warns(ValidityWarning, match="nothing was detected"):
         result, _ = run(tmp_path / "out", snr_db=-90.0, pfa=1e-12)

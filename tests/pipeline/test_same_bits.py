@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import ast
+import json
 import os
 import re
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -16,11 +16,17 @@ import pytest
 
 import rtradar
 from rtradar.system.threads import thread_environment
+from rtradar.trace.backends.backend import available
 
-RADAR = (
-    "tx_y = 2\ntx_z = 2\nrx_y = 4\nrx_z = 4\nchirp_duration_s = 125e-6\n"
-    "samples_per_chirp = 128\nframe_duration_s = 0.05\n"
-)
+RADAR = """
+tx_y = 2
+tx_z = 2
+rx_y = 4
+rx_z = 4
+chirp_duration_s = 125e-6
+samples_per_chirp = 128
+frame_duration_s = 0.05
+"""
 
 
 def bits(folder: Path) -> dict[str, bytes]:
@@ -34,46 +40,41 @@ def bits(folder: Path) -> dict[str, bytes]:
     return found
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    "options", [["--fidelity", "analytic"], ["--fidelity", "specular"], ["--fidelity", "auto"]]
-)
-def test_one_thread_and_three_give_the_same_bits(tmp_path: Path, options: list[Any]) -> None:
-    (tmp_path / "small.toml").write_text(RADAR)
-    found = []
+RUNS = """
+import json, sys
+from rtradar.cli import main
+for words in json.loads(sys.argv[1]):
+    assert main(words) == 0, words
+"""
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Runs of each fidelity level by one thread and by three, a process for each number."""
+    folder = tmp_path_factory.mktemp("runs")
+    radar = folder / "small.toml"
+    radar.write_text(RADAR)
+    traced = ["--variant", "llvm"] if "llvm" in available() else ["--variant", "scalar"]
     for threads in (1, 3):
-        out = tmp_path / str(threads)
-        command = [
-            sys.executable,
-            "-m",
-            "rtradar",
-            "run",
-            "synthetic:kick",
-            "--duration",
-            "0.2",
-            "--out",
-            str(out),
-            *options,
+        commands = [
+            ["run", "synthetic:kick", "--duration", "0.2", "--radar", str(radar)]
+            + ["--fidelity", fidelity, "--out", str(folder / fidelity / str(threads))]
+            + (traced if fidelity != "analytic" else [])
+            for fidelity in ("analytic", "specular", "auto")
         ]
-        command += [
-            "--radar",
-            str(tmp_path / "small.toml"),
-            "--variant",
-            "auto" if "analytic" in options else "llvm",
-        ]
-        done = subprocess.run(
-            command,
-            env={**os.environ, **thread_environment(threads)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        if "--variant llvm" in done.stderr:
-            pytest.skip("no LLVM backend here")
+        environment = os.environ | thread_environment(threads)
+        words = [sys.executable, "-c", RUNS, json.dumps(commands)]
+        done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
         assert done.returncode == 0, done.stderr
-        found.append(bits(out))
-    assert len(found[0]) > 10
-    assert [name for name in found[0] if found[0][name] != found[1].get(name)] == []
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fidelity", ["analytic", "specular", "auto"])
+def test_one_thread_and_three_give_the_same_bits(runs: Path, fidelity: str) -> None:
+    one, three = (bits(runs / fidelity / threads) for threads in ("1", "3"))
+    assert len(one) > 10
+    assert [name for name in one if one[name] != three.get(name)] == []
 
 
 ADD_TONES = """

@@ -16,6 +16,8 @@ from rtradar.pipeline.snapshots import snapshots_of
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 
+pytestmark = pytest.mark.drawn
+
 # One antenna at one place, so that lengths are those of a radar in the middle of its array.
 RADAR = rt.Radar(
     tx_y=1,

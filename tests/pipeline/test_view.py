@@ -20,6 +20,8 @@ from rtradar.cli import main
 from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import COLOURS
 
+pytestmark = pytest.mark.drawn
+
 
 @pytest.fixture(scope="module")
 def made(

@@ -21,6 +21,8 @@ from rtradar.process.spectrogram import SlidingSpectrogram, spectrogram
 from rtradar.radar import Radar
 from rtradar.report.figures.maps import draw_spectrogram
 
+pytestmark = pytest.mark.drawn
+
 LOW, HIGH = Radar.preset("paper-12ghz"), Radar.preset("paper-77ghz")
 TINY = Radar(tx_y=3, tx_z=0, rx_y=2, rx_z=0, samples_per_chirp=4)
 

@@ -211,9 +211,17 @@ class Browser:
 
 
 @pytest.fixture(scope="session")
-def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
     if CHROMIUM is None:
         pytest.skip("no Chromium on PATH: install the package chromium (Debian, Ubuntu, Fedora)")
     opened = Browser(tmp_path_factory.mktemp("chromium"))
     yield opened
     opened.close()
+
+
+@pytest.fixture
+def browser(chromium: Browser) -> Iterator[Browser]:
+    """A browser whose page is empty after each test, because one that plays takes a whole core."""
+    yield chromium
+    with contextlib.suppress(AssertionError, OSError):  # after a failure it may not answer
+        chromium.call("Page.navigate", url="about:blank")

@@ -16,7 +16,7 @@ from rtradar.clouds.spatial import SpatialCloud
 from rtradar.motion import place
 from rtradar.report.pages.run_page import write_report
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.drawn]
 
 
 @pytest.fixture(scope="module")

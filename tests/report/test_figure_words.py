@@ -36,6 +36,8 @@ from rtradar.report.pages.comparison import (
 )
 from rtradar.signal import synthesize
 
+pytestmark = pytest.mark.drawn
+
 RADAR = rt.Radar(samples_per_chirp=16, tx_y=1, tx_z=0, rx_y=2, rx_z=0)
 FILE = Path("out.png")
 POWER = np.random.default_rng(0).exponential(size=(16, 8))

@@ -11,6 +11,8 @@ from rtradar.radar import Radar
 from rtradar.report.figures import rooms as room_figures
 from rtradar.scene import Furniture, Scene, material
 
+pytestmark = pytest.mark.drawn
+
 
 def test_a_plan_draws_no_more_faces_than_cover_the_furniture(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -30,6 +30,8 @@ from rtradar.report.view.three_d import (
     spatial_data,
 )
 
+pytestmark = pytest.mark.drawn
+
 RADAR = rt.Radar.preset("paper-12ghz")
 EVIL = "walk</script><script>alert('1')</script><img src=x>&\"amc"
 

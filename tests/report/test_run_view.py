@@ -16,6 +16,8 @@ from rtradar.report.view.run_view import GROUPS, Levels, RunView, group_of_parts
 from rtradar.report.view.snapshots import Snapshots
 from rtradar.report.view.three_d import semi_axis_poses
 
+pytestmark = pytest.mark.drawn
+
 RADAR = rt.Radar.preset("paper-12ghz")
 LOW_DB = -60.0
 

@@ -12,6 +12,8 @@ import pytest
 import rtradar as rt
 from rtradar.report.view.snapshots import Snapshots, load_snapshots, save_snapshots
 
+pytestmark = pytest.mark.drawn
+
 
 def example() -> Snapshots:
     rng = np.random.default_rng(0)

@@ -15,14 +15,16 @@ from rtradar.pipeline.view import load_run_view, view
 from rtradar.report.view.run_view import RunView
 from rtradar.scene import Furniture, material
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.drawn]
 
 FIGURE = "document.getElementById('scene-figure')"
 
 
 @pytest.fixture(scope="module")
 def seen(
-    browser: Any, beside_a_wall: tuple[rt.Radar, rt.Scene], tmp_path_factory: pytest.TempPathFactory
+    chromium: Any,
+    beside_a_wall: tuple[rt.Radar, rt.Scene],
+    tmp_path_factory: pytest.TempPathFactory,
 ) -> tuple[str, RunView]:
     """Address of the page, and what it was made of."""
     folder, (radar, room) = tmp_path_factory.mktemp("seen"), beside_a_wall
@@ -166,8 +168,8 @@ def test_saves_a_picture_of_what_is_seen(
     browser: Any, seen: tuple[str, RunView], tmp_path: Path
 ) -> None:
     address, _ = seen
-    browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     browser.open(f"{address}#t=0.1")
+    browser.call("Page.setDownloadBehavior", behavior="allow", downloadPath=str(tmp_path))
     browser.evaluate("document.getElementById('save').click()")
     saved: list[Path] = []
     while not saved:
