@@ -102,8 +102,7 @@ def test_mirror_paths_lose_what_the_ball_covers_of_their_fresnel_zone(
             )
             legs.append(covered(offset, radius, ball.radius))
         expected.append(np.maximum(*legs))
-        # Of 24 points spread evenly a straight edge through a disc finds its fraction to some two.
-        # them.
+        # Of 24 points spread evenly, a straight edge through a disc finds the fraction to some two.
         np.testing.assert_allclose(fraction[..., first], expected[-1], atol=0.1)
     largest = np.max(expected)
     assert (largest > 0.5) == (keyframe < 60)
