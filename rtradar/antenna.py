@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_number
-from rtradar.system.toml_tables import check_keys
+from rtradar.system.checks import brief, check_keys, check_number
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
 _PATTERNS = ("isotropic", "cosine", "dipole", "table")

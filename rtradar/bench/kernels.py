@@ -1,8 +1,9 @@
 """``rtradar bench --only kernels``: what each compiled kernel buys beside its plain reference.
 
-A case is a function that makes arguments, as `rtradar.bench.kernel_cases` has them. It returns two
-functions without arguments, which call the kernel and its reference and give the same arrays.
-``tests/kernels/test_references.py`` holds each kernel to its reference within the tolerance.
+A case is a function that makes arguments, as `rtradar.bench.kernel_cases` and
+`rtradar.bench.scatter_cases` have them. It returns two functions without arguments, which call the
+kernel and its reference and give the same arrays. ``tests/kernels/test_references.py`` holds each
+kernel to its reference within the tolerance.
 """
 
 from __future__ import annotations
@@ -89,7 +90,8 @@ def _arrays(values: Any) -> tuple[Any, ...]:
 
 def measure_kernels() -> list[dict[str, Any]]:
     """A row for each kernel: best times [s] of both, their ratio, and the largest difference."""
-    import rtradar.bench.kernel_cases  # noqa: F401  (fills CASES)
+    import rtradar.bench.kernel_cases  # (fills CASES)
+    import rtradar.bench.scatter_cases  # noqa: F401
 
     rows = []
     for case in CASES.values():

@@ -23,9 +23,19 @@ from rtradar.scatter import MODELS
 from rtradar.scatter.common.polarization import BODY_MATERIALS
 from rtradar.scene import Scene
 from rtradar.settings import RunSettings
-from rtradar.system.checks import brief, check_number, check_text, check_vector, inside
+from rtradar.system.checks import (
+    Table,
+    brief,
+    check_keys,
+    check_number,
+    check_text,
+    check_vector,
+    inside,
+    read_toml,
+    table_at,
+    tables_at,
+)
 from rtradar.system.seeds import check_seed
-from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
     "heading_deg": ((0.0, 0.0), -360.0, 360.0),

@@ -21,7 +21,7 @@ from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.pipeline.summary import cost, plain, summary_of
-from rtradar.pipeline.timing import forget_peak_memory, keep_memory_low
+from rtradar.pipeline.timing import forget_peak_memory
 from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_array
 from rtradar.radar import Radar
 from rtradar.report import write_report
@@ -109,7 +109,6 @@ def simulate(
 ) -> Result:
     """Run with these settings; see `run`."""
     started, rays_before = time.perf_counter(), rays_traced()
-    keep_memory_low()
     forget_peak_memory()
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
@@ -186,7 +185,6 @@ def clouds_of(
     InputError, BackendError
         As in `run`.
     """
-    keep_memory_low()
     options.setdefault("variant", "cpu")  # workers share the cores
     capture = prepare(motion, radar, scene or Scene(), RunSettings(**options))
     maker = CloudMaker(capture.processing)

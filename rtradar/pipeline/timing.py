@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import platform
 import resource
 import sys
 import time
@@ -26,36 +24,6 @@ class Stages:
             yield
         finally:
             self.seconds[name] = self.seconds.get(name, 0.0) + time.perf_counter() - start
-
-
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD, _M_ARENA_MAX = -1, -3, -8  # malloc.h of the GNU C library
-_HEAP_BYTES = 1 << 24
-
-
-def keep_memory_low() -> None:
-    """Make the GNU C library keep one heap and return large arrays at once; for the whole process.
-
-    Otherwise each thread may get a heap of its own, which keeps what was freed in it, and the size
-    from which an array is returned to the system grows with what was freed before. Memory then
-    depends on how threads met, and creeps for seconds. Smaller arrays stay in the heap: the blocks
-    of a run use the same memory again, and the system need not clear new pages for each.
-    """
-    library = _gnu_c_library()
-    if library is not None:
-        library.mallopt(_M_ARENA_MAX, 1)
-        library.mallopt(_M_MMAP_THRESHOLD, _HEAP_BYTES)
-        library.mallopt(_M_TRIM_THRESHOLD, 2 * _HEAP_BYTES)
-
-
-def give_back_memory() -> None:
-    """Return all that is free in the heap of the GNU C library; takes milliseconds."""
-    library = _gnu_c_library()
-    if library is not None:
-        library.malloc_trim(0)
-
-
-def _gnu_c_library() -> ctypes.CDLL | None:
-    return ctypes.CDLL(None) if platform.libc_ver()[0] == "glibc" else None
 
 
 def forget_peak_memory() -> None:

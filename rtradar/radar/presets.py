@@ -12,9 +12,8 @@ from pathlib import Path
 
 from rtradar.errors import InputError
 from rtradar.radar.radar import Radar
-from rtradar.system.checks import printable
+from rtradar.system.checks import check_keys, printable, read_toml
 from rtradar.system.registry import Registry
-from rtradar.system.toml_tables import check_keys, read_toml
 
 PRESETS = Registry(
     "rtradar.radars",

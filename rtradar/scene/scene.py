@@ -18,15 +18,19 @@ from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
 from rtradar.system.checks import (
+    Table,
     Vector,
     brief,
+    check_keys,
     check_number,
     check_text,
     check_vector,
     inside,
     printable,
+    read_toml,
+    table_at,
+    tables_at,
 )
-from rtradar.system.toml_tables import Table, check_keys, read_toml, table_at, tables_at
 
 Piece = TypeVar("Piece", Wall, Furniture)
 

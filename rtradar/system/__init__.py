@@ -1,1 +1,1 @@
-"""Files, output folders, threads, GPUs and checks of input: what the machine and the user ask for."""
+"""Files, output folders, threads, seeds, names in registries, and checks of input."""

@@ -1,9 +1,10 @@
-"""Checks of single values from files and from Python, each with its one line of complaint."""
+"""Checks of values and of tables from TOML files, each with a one-line error."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +12,17 @@ import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.system.files import read_bytes
 
 Vector = tuple[float, float, float]
+Table = Mapping[str, Any]
+
+_MAX_TOML_BYTES = 1_000_000
+_MAX_TABLES = 1000
 
 
 def brief(value: object) -> str:
-    """A value as messages show it: one line, not too long."""
+    """Return a short representation of a value for a message, in one line."""
     if isinstance(value, int) and abs(value) >= 10**20:
         return "a number of more than 20 digits"
     try:
@@ -29,12 +35,12 @@ def brief(value: object) -> str:
 
 
 def printable(text: str) -> str:
-    """The same with ``?`` for what no page can hold: line ends, and bytes of a file's name that are not UTF-8."""
+    """Replace what no page can hold by ``?``: line ends, and bytes of a name that are not UTF-8."""
     return "".join(letter if letter.isprintable() else "?" for letter in text)
 
 
 def inside(folder: Path, name: str) -> Path | None:
-    """A file or folder in ``folder`` or below, links followed; None where the name leads elsewhere, or nowhere at all."""
+    """Return the path of a name in or below ``folder``, links followed; None if it is elsewhere."""
     try:
         if not Path(name).is_absolute() and (folder / name).resolve().is_relative_to(
             folder.resolve()
@@ -46,7 +52,7 @@ def inside(folder: Path, name: str) -> Path | None:
 
 
 def check_number(where: str, key: str, value: object, least: float, most: float) -> float:
-    """A finite number from ``least`` to ``most``, as a float."""
+    """Return a finite number from ``least`` to ``most`` as a float."""
     number = _number(value)
     if number is None or not least <= number <= most:
         raise InputError(
@@ -58,7 +64,7 @@ def check_number(where: str, key: str, value: object, least: float, most: float)
 def check_vector(
     where: str, key: str, value: object, size: int, most: float = 1000.0
 ) -> tuple[float, ...]:
-    """So many finite numbers, none larger than ``most`` in size, as a tuple of floats."""
+    """Return ``size`` finite numbers of magnitude up to ``most`` as a tuple of floats."""
     if (
         isinstance(value, Sequence | np.ndarray)
         and not isinstance(value, str | bytes)
@@ -75,7 +81,7 @@ def check_vector(
 
 
 def check_text(where: str, key: str, value: object) -> str:
-    """One line of text, not empty."""
+    """Return a text of one line, not empty."""
     if isinstance(value, str) and value.strip() and value.isprintable():
         return value
     raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
@@ -84,18 +90,19 @@ def check_text(where: str, key: str, value: object) -> str:
 def array_to_fill(
     where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike
 ) -> NDArray[Any]:
-    """The array that was given to be filled; where none was, a new one."""
+    """Return the array given to be filled, or a new one."""
     if out is None:
         return np.empty(shape, dtype=dtype)
     if out.shape == shape and out.dtype == dtype and out.flags.carray:
         return out
     raise ValueError(
-        f"{where}: out has shape {out.shape}, type {out.dtype}; it must have {shape}, {np.dtype(dtype)}, C-contiguous, writeable"
+        f"{where}: out has shape {out.shape}, type {out.dtype}; "
+        f"it must have {shape}, {np.dtype(dtype)}, C-contiguous, writeable"
     )
 
 
 def _number(value: object) -> float | None:
-    """A finite number as a float, None for anything else."""
+    """Return a finite number as a float, and None for anything else."""
     if isinstance(value, bool) or not isinstance(value, int | float | np.integer | np.floating):
         return None
     try:
@@ -103,3 +110,65 @@ def _number(value: object) -> float | None:
     except OverflowError:  # an integer that no float can hold
         return None
     return number if math.isfinite(number) else None
+
+
+# -- tables of TOML files --------------------------------------------------------------------------
+
+
+def read_toml(path: Path, what: str, cure: str) -> Table:
+    """Return the table of a TOML file; InputError if it cannot be read, is too large or no TOML.
+
+    Messages call it a ``what`` file, and tell the ``cure`` if it cannot be read.
+    """
+    where = f"{what} file '{path}'"
+    try:
+        content = read_bytes(path, _MAX_TOML_BYTES)
+    except OSError as error:
+        raise InputError(f"{where}: {error.strerror}; {cure}") from None
+    except ValueError:
+        raise InputError(
+            f"{where} is larger than {_MAX_TOML_BYTES / 1e6:g} MB: it is no {what}"
+        ) from None
+    try:
+        # Windows' editors begin a file with a byte order mark, which is no part of its text.
+        return tomllib.loads(content.decode("utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise InputError(f"{where} is not TOML: {brief(str(error))[1:-1]}") from None
+    except ValueError as error:  # an integer of too many digits
+        raise InputError(f"{where} cannot be used: {brief(str(error))[1:-1]}") from None
+
+
+def table_at(key: str, table: Table, parent: str = "") -> Table:
+    """Return the table under a key; empty if there is none."""
+    value = table.get(key, {})
+    if not isinstance(value, dict):
+        raise InputError(
+            f"{parent}{brief(key)[1:-1]} = {brief(value)}; "
+            f"it must be a table: [{parent}{brief(key)[1:-1]}]"
+        )
+    return value
+
+
+def tables_at(key: str, table: Table) -> list[tuple[str, Table]]:
+    """Return the tables of a list, each with its place in the file."""
+    value = table.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(piece, dict) for piece in value):
+        raise InputError(
+            f"{key} = {brief(value)}; it must be a list of tables: [[{key}]] once for each"
+        )
+    if len(value) > _MAX_TABLES:
+        raise InputError(f"[[{key}]] stands there {len(value)} times; {_MAX_TABLES} are allowed")
+    return [(f"[[{key}]] number {number} ", piece) for number, piece in enumerate(value, start=1)]
+
+
+def check_keys(
+    where: str, table: Table, needed: tuple[str, ...], optional: tuple[str, ...]
+) -> None:
+    """Refuse unknown and missing keys; ``where`` ends with a blank if it is not empty."""
+    allowed = (*needed, *optional)
+    for key in table:
+        if key not in allowed:
+            raise InputError(f"{where}unknown key {brief(key)}; allowed: {', '.join(allowed)}")
+    for key in needed:
+        if key not in table:
+            raise InputError(f"{where}{key} is missing; needed: {', '.join(needed)}")

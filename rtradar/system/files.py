@@ -1,4 +1,4 @@
-"""Files that are whole or not there, also where the process is told to end meanwhile, and files that may be anybody's, read."""
+"""Files that are written whole or not at all, and readers of files that may be anybody's."""
 
 from __future__ import annotations
 
@@ -34,17 +34,15 @@ _OTHER_KINDS = {
     stat.S_IFCHR: "a device",
     stat.S_IFBLK: "a device",
 }
-"""What has the name of a file and is none."""
 
-_PATIENCE_S = 1.0
-"""Waited, at the end, for a file that is just taking its name."""
+_PATIENCE_S = 1.0  # at the end of the process, for a file that is just taking its name
 
 DISK_ERRORS = frozenset(
     getattr(errno, name)
     for name in ("ENOSPC", "EDQUOT", "EFBIG", "EIO", "EROFS")
     if hasattr(errno, name)
 )
-"""Numbers of errors that say that a disk takes no more."""
+"""Error numbers of a disk that takes no more."""
 
 _T = TypeVar("_T")
 
@@ -54,22 +52,10 @@ _unfinished: list[Callable[[], object]] = []
 
 @contextmanager
 def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
-    """A binary file to write; it takes its name when all went well, and leaves nothing otherwise.
+    """Open a binary file that gets its name, or replaces one of it, only if no error occurs.
 
-    Parameters
-    ----------
-    path : path
-        Where the file shall be; one that is there already is replaced.
-
-    Yields
-    ------
-    binary file
-        Open for writing and reading, in the same folder under another name.
-
-    Raises
-    ------
-    InputError
-        Where the folder is missing or cannot be written, or something other than a file has the name.
+    It yields a file for writing and reading, in the same folder under another name. InputError is
+    raised if the folder cannot be written, or something other than a file has the name.
     """
     target = Path(path)
     with suppress(OSError):
@@ -84,7 +70,8 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
             file = open(beside, "w+b")  # noqa: SIM115 - closed below, before the file is moved
         except OSError as error:
             raise InputError(
-                f"cannot write '{target}': {error.strerror}; give a folder that exists and can be written"
+                f"cannot write '{target}': {error.strerror}; "
+                "give a folder that exists and can be written"
             ) from None
         try:
             with file:
@@ -102,13 +89,9 @@ def atomic_file(path: str | os.PathLike[str]) -> Iterator[BinaryIO]:
 class LastingFile:
     """A binary file for HDF5 to write, whose failures wait until `check` is called.
 
-    HDF5 cannot close a file that it cannot write: it would print a traceback for each object that it holds, and crash as the
-    process ends. So after the first failure what is written here is dropped, and whoever writes asks what went wrong.
-
-    Parameters
-    ----------
-    file : binary file
-        Open for writing and reading.
+    HDF5 cannot close a file that it cannot write: it would print a traceback for each open object,
+    and crash as the process ends. So after the first failure further data are dropped, and `check`
+    raises the error.
     """
 
     def __init__(self, file: BinaryIO) -> None:
@@ -116,13 +99,7 @@ class LastingFile:
         self._error: OSError | None = None
 
     def check(self) -> None:
-        """Raise what went wrong first.
-
-        Raises
-        ------
-        OSError
-            Where something could not be written.
-        """
+        """Raise the first error, an OSError."""
         if self._error is not None:
             raise self._error
 
@@ -133,13 +110,7 @@ class LastingFile:
         self.close()
 
     def close(self) -> None:
-        """Close the file, and raise what went wrong first; may be called again.
-
-        Raises
-        ------
-        OSError
-            Where something could not be written.
-        """
+        """Close the file and raise the first error; may be called again."""
         self._try(self._file.close, None)
         self.check()
 
@@ -182,14 +153,9 @@ class LastingFile:
 
 
 def remove_parts(folder: Path, names: str) -> int:
-    """Remove what `atomic_file` left of files as it was killed; how many.
+    """Remove and count what a killed `atomic_file` left of files with these names (a pattern).
 
-    Parameters
-    ----------
-    folder : path
-        One into which no other command writes.
-    names : str
-        Regular expression that the whole name of such a file matches.
+    No other command may write into the folder.
     """
     part = re.compile(rf"\.({names})\.[0-9a-f]{{{2 * _TOKEN_BYTES}}}\.part")
     count = 0
@@ -201,13 +167,7 @@ def remove_parts(folder: Path, names: str) -> int:
 
 
 def check_place(path: Path | None, option: str = "--json") -> None:
-    """Find out before the work, not after it, that a file cannot be written there.
-
-    Raises
-    ------
-    InputError
-        Where it has no folder, is one, or no file can have its name; the message names the command line's ``option``.
-    """
+    """Raise InputError, which names the ``option``, before the work if no file can be written."""
     if path is None:
         return
     folder = Path(
@@ -223,13 +183,7 @@ def check_place(path: Path | None, option: str = "--json") -> None:
 
 
 def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None:
-    """Write plain values as indented JSON, whole or not at all.
-
-    Raises
-    ------
-    InputError
-        Where it cannot be written; the message names the command line's ``--json``.
-    """
+    """Write plain values as JSON, whole or not at all; InputError, for ``--json``, if it fails."""
     text = json.dumps(content, indent=1, allow_nan=False) + "\n"
     try:
         if (stream := _standard_stream(path)) is not None:
@@ -250,7 +204,7 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
 
 
 def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
-    """The one that this is a name of, such as /dev/stdout; it may well be a file, which has to stay."""
+    """Return the stream that a path such as /dev/stdout names; a file behind it has to stay."""
     for stream in (sys.stdout, sys.stderr):
         with suppress(
             OSError, ValueError, AttributeError
@@ -261,14 +215,10 @@ def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
 
 
 def read_json(path: Path) -> Any:
-    """Plain values of a JSON file that may be anybody's.
+    """Read a JSON file that may be anybody's.
 
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    ValueError
-        Where it is no JSON, is nested deeper than Python goes, or is larger than 100 MB.
+    Raises OSError if it cannot be read, and ValueError if it is no JSON, nested too deep, or larger
+    than 100 MB.
     """
     try:
         return json.loads(read_bytes(path, _MOST_JSON_BYTES).decode("utf-8-sig"))
@@ -277,14 +227,10 @@ def read_json(path: Path) -> Any:
 
 
 def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArray[Any]]:
-    """All arrays of a NumPy archive that may be anybody's, by their names; none of Python objects.
+    """Read the arrays of a NumPy archive that may be anybody's; none of Python objects.
 
-    Raises
-    ------
-    OSError
-        Where it cannot be read.
-    ValueError
-        Where it is no such archive, is damaged, claims more than it holds, or is larger than ``most_bytes`` once unpacked.
+    Raises OSError if it cannot be read, and ValueError if it is no such archive, is damaged, claims
+    more than it holds, or is larger than ``most_bytes`` when unpacked.
     """
     found = {}
     with open_regular(path) as file:
@@ -302,15 +248,13 @@ def read_arrays(path: Path, most_bytes: int = 1_000_000_000) -> dict[str, NDArra
                             found[entry.filename.removesuffix(".npy")] = array
         except OSError:
             raise
-        except (
-            Exception
-        ) as error:  # what readers of archives and of headers raise at damaged ones is of any type
+        except Exception as error:  # readers raise errors of any type at damaged archives
             raise ValueError(" ".join(str(error).split())[:100] or type(error).__name__) from None
     return found
 
 
 def _check_claim(member: Any, size: int) -> None:
-    """Raise where an array would take more memory than its file has: NumPy takes it before it looks."""
+    """Raise if an array claims more memory than its file has: NumPy allocates before it reads."""
     version = np.lib.format.read_magic(member)
     read_header = (
         np.lib.format.read_array_header_1_0
@@ -323,7 +267,7 @@ def _check_claim(member: Any, size: int) -> None:
 
 
 def _check_text(array: NDArray[Any]) -> None:
-    """Raise where a text holds a number that is no character: Python cannot even show it."""
+    """Raise if a text holds a number that is no character, which Python cannot show."""
     if array.dtype.kind == "U" and array.dtype.itemsize:
         letters = (
             np.ascontiguousarray(array.astype(array.dtype.newbyteorder("=")))
@@ -335,24 +279,10 @@ def _check_text(array: NDArray[Any]) -> None:
 
 
 def stored(file: Any, name: str) -> Any:
-    """A dataset of an open HDF5 file that may be anybody's, if all that it claims is in that file.
+    """Return an uncompressed dataset of an open HDF5 file that may be anybody's.
 
-    Parameters
-    ----------
-    file : h5py.File
-        Of those that rtradar writes, whose arrays are not packed.
-    name : str
-
-    Returns
-    -------
-    h5py.Dataset
-
-    Raises
-    ------
-    KeyError
-        Where there is none.
-    ValueError
-        Where it is no dataset, lies in another file, or is larger than its file.
+    Raises KeyError if there is none, and ValueError if it is no dataset, lies in another file, or
+    claims more than its file holds.
     """
     import h5py
 
@@ -377,7 +307,7 @@ def stored(file: Any, name: str) -> Any:
 
 @contextmanager
 def temporary_folder(prefix: str = "rtradar-", inside: Path | None = None) -> Iterator[Path]:
-    """A folder that is gone at the end, also where the process is told to end before."""
+    """Make a folder that is removed at the end, also if a signal ends the process."""
     with (
         tempfile.TemporaryDirectory(prefix=prefix, dir=inside) as name,
         cleanup_on_exit(lambda: shutil.rmtree(name, ignore_errors=True)),
@@ -387,7 +317,7 @@ def temporary_folder(prefix: str = "rtradar-", inside: Path | None = None) -> It
 
 @contextmanager
 def cleanup_on_exit(remove: Callable[[], object]) -> Iterator[None]:
-    """While this lasts there is something that ``remove`` takes away, should the process have to end meanwhile."""
+    """Call ``remove`` if a signal ends the process meanwhile."""
     with _lock:
         _unfinished.append(remove)
     try:
@@ -399,13 +329,13 @@ def cleanup_on_exit(remove: Callable[[], object]) -> Iterator[None]:
 
 @contextmanager
 def uninterruptible() -> Iterator[None]:
-    """What is done here is short, and is done to its end or not begun, should the process have to end."""
+    """Let a short step end, or not begin, if a signal ends the process."""
     with _lock:
         yield
 
 
 def discard_unfinished() -> None:
-    """Take away all that is unfinished; from now on other threads of this process neither begin nor finish a file."""
+    """Remove what is unfinished; other threads neither begin nor finish a file from now on."""
     _lock.acquire(timeout=_PATIENCE_S)  # and never given back
     for remove in reversed(_unfinished):
         with suppress(Exception):
@@ -413,24 +343,10 @@ def discard_unfinished() -> None:
 
 
 def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
-    """Open a file for reading that may be anybody's: a regular file, not a folder, pipe, socket or device.
+    """Open a regular file for reading; OSError if it is a folder, pipe, socket or device.
 
-    Nothing waits here, as opening a pipe would until somebody writes to it. A device is not even opened, for that alone may
-    move it; and what counts is what was opened, should something else have taken the name since it was looked at.
-
-    Parameters
-    ----------
-    path : path
-        Links are followed.
-
-    Returns
-    -------
-    io.BufferedReader
-
-    Raises
-    ------
-    OSError
-        Where it cannot be opened or is no regular file; ``strerror`` says why.
+    Links are followed. Opening a pipe would wait for somebody to write to it, and opening a device
+    may move it, so the kind is checked before; and after, for the name may have changed its file.
     """
     try:
         _check_regular(path, os.stat(path))
@@ -451,7 +367,7 @@ def open_regular(path: str | os.PathLike[str]) -> io.BufferedReader:
 
 
 def special_kind(path: str | os.PathLike[str]) -> str:
-    """What a path names where that is a pipe, a socket or a device, at which a reader may wait; empty for anything else."""
+    """Name the kind of a pipe, socket or device, at which a reader may wait; else empty."""
     try:
         kind = stat.S_IFMT(os.stat(path).st_mode)
     except (OSError, ValueError):
@@ -462,7 +378,7 @@ def special_kind(path: str | os.PathLike[str]) -> str:
 
 
 def _check_regular(path: str | os.PathLike[str], status: os.stat_result) -> None:
-    """Raise OSError where the status is that of anything but a regular file."""
+    """Raise OSError if the status is not that of a regular file."""
     kind = stat.S_IFMT(status.st_mode)
     if kind != stat.S_IFREG:
         said = _OTHER_KINDS.get(kind, "of an unknown kind")
@@ -471,27 +387,12 @@ def _check_regular(path: str | os.PathLike[str], status: os.stat_result) -> None
 
 
 def read_bytes(path: str | os.PathLike[str], most_bytes: int) -> bytes:
-    """All of a regular file that may be anybody's.
+    """Read a regular file that may be anybody's.
 
-    Parameters
-    ----------
-    path : path
-    most_bytes : int
-        How large it may be.
-
-    Returns
-    -------
-    bytes
-
-    Raises
-    ------
-    OSError
-        As in `open_regular`.
-    ValueError
-        Where it is larger.
+    Raises OSError as `open_regular` does, and ValueError if it is larger than ``most_bytes``.
     """
     with open_regular(path) as file:
-        # The size is asked first: what is read may take no more memory than what is allowed.
+        # The size is checked first, so that reading takes no more memory than allowed.
         if (
             os.fstat(file.fileno()).st_size > most_bytes
             or len(content := file.read(most_bytes + 1)) > most_bytes

@@ -1,13 +1,15 @@
-"""Output folders: all files of a command appear together or none does, and nothing else in the folder is ever touched.
+"""Output folders: all files of a command appear together or none does, and others stay untouched.
 
-A command writes into a work folder of its own inside the output folder, and its files are moved when all of them are there. What
-an output folder already holds may be anybody's. So a file is replaced or removed only if it is a regular file, has a name that
-this command gives to its files, and stands in the list that an earlier command left in the folder (``files`` in
-``summary.json``). A folder that holds anything else of such a name is refused.
+A command writes into a work folder inside the output folder, and moves its files when all of them
+are there. What an output folder already holds may be anybody's. So a file is replaced or removed
+only if it is a regular file, has a name that this command gives to its files, and is in the list
+that an earlier command left in the folder (``files`` in ``summary.json``). A folder that holds
+anything else of such a name is refused.
 
-A process that is killed while it moves its files leaves a list that says ``unfinished``: who reads the folder refuses it, and the
-next command that writes there replaces what the list names. A process that is killed earlier leaves its work folder, which the
-next command that writes there removes. Commands that only read change nothing.
+A process that is killed while it moves its files leaves a list that says ``unfinished``: readers of
+the folder refuse it, and the next command that writes there replaces what the list names. A process
+that is killed earlier leaves its work folder, which the next command that writes there removes.
+Commands that only read change nothing.
 """
 
 from __future__ import annotations
@@ -40,17 +42,17 @@ _HDF5_ERRNO = re.compile(r"\berrno = (\d+)")
 
 @dataclass(frozen=True)
 class OutputFiles:
-    """Which files a command may leave in its output folder.
+    """Files that a command may leave in its output folder.
 
     Parameters
     ----------
     listing : str
-        Name of the JSON file whose entry ``files`` lists them, in plain names relative to the folder; an entry that ends with a
-        slash stands for all files of a store. It is one of the files.
+        JSON file, one of the files, whose entry ``files`` lists their relative names; an entry that
+        ends with a slash means all files of a store.
     files : str
-        Regular expression that the whole relative name of each file matches, with ``/`` between its parts.
+        Regular expression of the whole relative name of each file, with ``/`` between its parts.
     folders : str
-        Regular expression that the whole relative name of each folder matches that may hold such files.
+        Regular expression of the whole relative name of each folder that may hold such files.
     """
 
     listing: str
@@ -58,42 +60,43 @@ class OutputFiles:
     folders: str = r"(?!)"
 
     def is_file(self, name: str) -> bool:
-        """Whether a file of the command may have this relative name."""
+        """Tell whether a file of the command may have this relative name."""
         return re.fullmatch(self.files, name) is not None
 
     def is_folder(self, name: str) -> bool:
-        """Whether a folder of the command may have this relative name."""
+        """Tell whether a folder of the command may have this relative name."""
         return re.fullmatch(self.folders, name) is not None
 
     def list_of(self, folder: Path) -> list[str]:
-        """The entry ``files`` of a folder in which all files lie but, perhaps, the listing itself."""
+        """Return the entry ``files`` of a folder that holds all files but, perhaps, the listing."""
         with _Directory.at(folder) as directory:
             return _entries([self.listing, *_all_files(directory)])
 
 
 @contextmanager
 def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> Iterator[Path]:
-    """A folder to write into; at the end its files move to ``out``, all of them or none.
+    """Make a folder to write into; at the end its files move to ``out``, all of them or none.
 
     Parameters
     ----------
     out : path
-        Made if it is not there. Files of an earlier command of this kind are replaced, or removed where this one has none of the
-        name; everything else in it stays as it is.
+        Output folder, which is made if it does not exist. Files of an earlier command of this kind
+        are replaced or removed; all others stay as they are.
     kind : OutputFiles
-        What the command makes. The listing must be written into the folder, with `OutputFiles.list_of` as its entry ``files``.
+        Files of the command. The listing must be written into the folder, with
+        `OutputFiles.list_of` as its entry ``files``.
     overwrite : bool
-        Whether files that ``out`` holds under names of this command's files are replaced, too, though no list names them.
+        Whether files under names of this command's files are replaced though no list names them.
 
     Yields
     ------
     path
-        A folder inside ``out``. After an error it is removed with all in it, and ``out`` too where it was made here.
+        Folder inside ``out``. After an error it is removed, and ``out`` too if it was made here.
 
     Raises
     ------
     InputError
-        Where ``out`` cannot be made or written, holds files of others, is moved meanwhile, or the disk is full.
+        If ``out`` cannot be written, holds files of others or is moved, or the disk is full.
     """
     with ExitStack() as stack:
         try:
@@ -105,25 +108,25 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
             work = stack.enter_context(_new_work_folder(place))
         except OSError as error:
             raise InputError(
-                f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
+                f"cannot write to '{out}': {error.strerror}; "
+                "give a folder that can be written (--out)"
             ) from None
 
         moving = False
 
-        def give_up() -> None:
+        def abandon() -> None:
             if moving:
                 return  # what is moved and what is not belong together
             gone = f"{work.path.name}-gone"
             with suppress(OSError):
-                place.move(
-                    work.path.name, place, gone
-                )  # nobody who still writes finds the way into it
+                # So that no thread that still writes finds the way into it.
+                place.move(work.path.name, place, gone)
             place.remove_tree(gone)
             for folder in made if place.is_in_place() else ():
                 with suppress(OSError):
                     folder.rmdir()  # an empty one only
 
-        with cleanup_on_exit(give_up):
+        with cleanup_on_exit(abandon):
             try:
                 yield work.path
                 with uninterruptible():
@@ -133,19 +136,19 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
                         moving = True
                         _move(work, place, kind)
                     place.remove_tree(work.path.name)
-                    _remove_leftovers(
-                        place, but=None
-                    )  # what a killed command had still to move is replaced now
+                    # Files that a killed command had still to move are replaced now.
+                    _remove_leftovers(place, but=None)
             except BaseException as error:
                 if moving:
-                    raise _parted(out, work.path, error) from None
+                    raise _while_moving(out, work.path, error) from None
                 moved_away = not work.is_in_place()
-                give_up()
+                abandon()
                 if moved_away and isinstance(error, Exception):
                     raise InputError(
-                        f"'{out}' was renamed, moved or removed while the command wrote into it; give a folder that stays (--out)"
+                        f"'{out}' was renamed, moved or removed while the command wrote into it; "
+                        "give a folder that stays (--out)"
                     ) from None
-                if why := _trouble_of_disk(error):
+                if why := _disk_error(error):
                     raise InputError(
                         f"cannot write to '{out}': {why}; make room, or give another folder (--out)"
                     ) from None
@@ -154,47 +157,25 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
 
 @contextmanager
 def exclusive_lock(folder: Path) -> Iterator[None]:
-    """While this lasts no other process of this machine does the same in the folder; after the end of a process it may.
-
-    Parameters
-    ----------
-    folder : path
-        One that is there.
-
-    Raises
-    ------
-    InputError
-        Where another is in it.
-    """
+    """Lock an existing folder until the process ends; InputError if another process has it."""
     try:
         place = _Directory.at(folder)
     except OSError as error:
         raise InputError(
-            f"cannot write to '{folder}': {error.strerror}; give a folder that can be written (--out)"
+            f"cannot write to '{folder}': {error.strerror}; "
+            "give a folder that can be written (--out)"
         ) from None
     with place:
         if not place.lock():
             raise InputError(
-                f"another command writes into '{folder}'; wait for its end, or give another folder (--out)"
+                f"another command writes into '{folder}'; "
+                "wait for its end, or give another folder (--out)"
             )
         yield
 
 
 def check_whole(folder: Path, listing: str = "summary.json") -> None:
-    """Refuse to read a folder whose files are of two runs, for the second was killed as it moved its files there.
-
-    Parameters
-    ----------
-    folder : path
-        That of a run; nothing is refused where there is none, or no list in it.
-    listing : str
-        The list's name.
-
-    Raises
-    ------
-    InputError
-        Where the list says so.
-    """
+    """Raise InputError if the list of a folder says that a killed run left files of two runs."""
     try:
         with _Directory.at(folder) as place:
             told = _read_json(place, listing)
@@ -202,16 +183,16 @@ def check_whole(folder: Path, listing: str = "summary.json") -> None:
         return
     if isinstance(told, dict) and isinstance(rest := told.get("unfinished"), str):
         raise InputError(
-            f"'{folder}' holds files of two runs, for the second was killed as it moved its files there; run it again into that "
-            f"folder, or move what is left in '{rest[:40]}' by hand"
+            f"'{folder}' holds files of two runs, for the second was killed as it moved its files "
+            f"there; run it again into that folder, or move what is left in '{rest[:40]}' by hand"
         )
 
 
-# -- what a folder holds -------------------------------------------------------------------------------------------------
+# -- what a folder holds ---------------------------------------------------------------------------
 
 
 def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dict[str, int]:
-    """Entries under names of the command's files and folders, and the mode of each (`stat`); other entries are left out."""
+    """Return the mode of each entry under a name of the command's files and folders."""
     found: dict[str, int] = {}
     names = directory.names()
     for name in sorted(names):
@@ -224,14 +205,13 @@ def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dic
             elif mode:
                 found[path] = mode
         elif kind.is_file(prefix + own) and own not in names and directory.mode(own):
-            found[path] = directory.mode(
-                name
-            )  # the same file to a file system that takes no notice of capitals
+            # The same file to a file system that ignores case.
+            found[path] = directory.mode(name)
     return found
 
 
 def _all_files(directory: _Directory, prefix: str = "") -> Iterator[str]:
-    """Relative names of everything below a work folder that is not a folder, but of what keeps account of it."""
+    """Yield the relative names of all files of a work folder, but its marker and its list."""
     for name in sorted(directory.names()):
         if stat.S_ISDIR(directory.mode(name)):
             with directory.open(name) as inner:
@@ -241,12 +221,12 @@ def _all_files(directory: _Directory, prefix: str = "") -> Iterator[str]:
 
 
 def _entries(names: Iterable[str]) -> list[str]:
-    """Names as a list has them: of a store, which may have thousands of files, its folder alone."""
+    """Return the names for a list: of a store of thousands of files, its folder alone."""
     return sorted({store[1] if (store := _STORE.match(name)) else name for name in names})
 
 
 def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
-    """What the list of a folder says, ``files`` and perhaps ``unfinished``; empty where it is none of ours."""
+    """Return ``files`` and perhaps ``unfinished`` of the list of a folder; empty if not ours."""
     told = _read_json(directory, kind.listing)
     if (
         not isinstance(told, dict)
@@ -264,14 +244,14 @@ def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
 
 
 def _read_json(directory: _Directory, name: str) -> Any:
-    """Content of a regular JSON file of bounded size; None where it is anything else."""
+    """Return the content of a regular JSON file of bounded size; None for anything else."""
     with suppress(OSError, ValueError, RecursionError), directory.open_file(name) as file:
         return json.loads(file.read(_MOST_LIST_BYTES))
     return None
 
 
 def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
-    """Which of the entries are the command's to replace: regular files that the list names."""
+    """Return the entries that the command may replace: regular files that the list names."""
     files = frozenset(listed)
     stores = tuple(name for name in files if name.endswith("/"))
     return {
@@ -293,18 +273,20 @@ def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> No
     if overwrite and odd:
         is_not = "no folder" if kind.is_folder(odd[0]) else "no file"
         raise InputError(
-            f"'{place.path}' holds '{odd[0]}', which is {is_not}; move it away, or give another folder (--out)"
+            f"'{place.path}' holds '{odd[0]}', which is {is_not}; "
+            "move it away, or give another folder (--out)"
         )
     if foreign and not overwrite:
         more = f" and {len(foreign) - 1} more" if len(foreign) > 1 else ""
         raise InputError(
-            f"'{place.path}' holds '{foreign[0]}'{more}, which its {kind.listing} does not list as made by rtradar; give another "
-            "folder (--out), or replace what has the names of new files (--overwrite)"
+            f"'{place.path}' holds '{foreign[0]}'{more}, which its {kind.listing} does not list "
+            "as made by rtradar; give another folder (--out), or replace what has the names of new "
+            "files (--overwrite)"
         )
 
 
 def _check_made(work: _Directory, kind: OutputFiles) -> None:
-    """A command whose files are not all foreseen would leave some that the next one takes for somebody else's."""
+    """Raise if a file is not foreseen: the next command would take it for somebody else's."""
     made = list(_all_files(work))
     unforeseen = [name for name in made if not kind.is_file(name)]
     if unforeseen or kind.listing not in made:
@@ -313,11 +295,11 @@ def _check_made(work: _Directory, kind: OutputFiles) -> None:
         )
 
 
-# -- moving --------------------------------------------------------------------------------------------------------------
+# -- moving ----------------------------------------------------------------------------------------
 
 
 def _move(work: _Directory, place: _Directory, kind: OutputFiles) -> None:
-    """Everything in ``work`` to its place; the list comes last, and until then says that the folder is unfinished."""
+    """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
     made, there = list(_all_files(work)), _existing(place, kind)
     owned = _owned(there, _read_list(place, kind).get("files", ()))
     said = {"unfinished": work.path.name, "files": _entries({kind.listing, *owned, *made})}
@@ -339,22 +321,22 @@ def _move(work: _Directory, place: _Directory, kind: OutputFiles) -> None:
 
 
 def _folders_of(name: str) -> Iterator[str]:
-    """Relative names of the folders that a relative name goes through."""
+    """Yield the relative names of the folders above a relative name."""
     while name := name.rpartition("/")[0]:
         yield name
 
 
-def _parted(out: Path, work: Path, error: BaseException) -> BaseException:
+def _while_moving(out: Path, work: Path, error: BaseException) -> BaseException:
     if not isinstance(error, OSError):
         return error
     return InputError(
-        f"cannot move the files of '{work}' into '{out}': {error.strerror}; mend that and run it again into that folder, or move "
-        "what is left by hand"
+        f"cannot move the files of '{work}' into '{out}': {error.strerror}; mend that and run it "
+        "again into that folder, or move what is left by hand"
     )
 
 
 def _new_work_folder(place: _Directory) -> _Directory:
-    """A new folder in the output folder, locked for as long as its command lives, with a marker that says whose it is."""
+    """Make a work folder, locked as long as its command lives, with a marker of its owner."""
     while True:
         name = f".rtradar-{secrets.token_hex(8)}"
         with suppress(FileExistsError):
@@ -367,10 +349,9 @@ def _new_work_folder(place: _Directory) -> _Directory:
 
 
 def _remove_leftovers(place: _Directory, but: str | None) -> None:
-    """Remove work folders of commands that were killed.
+    """Remove work folders of killed commands: those whose marker holds their own inode number.
 
-    One that rtradar made says so: its marker holds the number (inode) that the file system gave to that very folder. A folder
-    that came from elsewhere, or that the user made, has no such marker, and stays.
+    A folder that came from elsewhere, or that the user made, has no such marker, and stays.
     """
     if sys.platform == "win32":  # no locks, and no numbers that tell
         return
@@ -386,13 +367,13 @@ def _remove_leftovers(place: _Directory, but: str | None) -> None:
                 place.remove_tree(name)
 
 
-# -- one directory -------------------------------------------------------------------------------------------------------
+# -- one directory ---------------------------------------------------------------------------------
 
 
 class _Directory:
-    """An open directory, whose entries are reached through it: no link that somebody puts in the way is ever followed.
+    """An open directory; its entries are opened relative to it, so that no link is followed.
 
-    Where the system cannot do that (Windows) entries are reached by their paths.
+    Where the system cannot do that (Windows), entries are opened by their paths.
     """
 
     def __init__(self, path: Path, descriptor: int | None) -> None:
@@ -400,7 +381,7 @@ class _Directory:
 
     @classmethod
     def at(cls, path: Path) -> _Directory:
-        """The directory of a path, which may be a link to one."""
+        """Open the directory of a path, which may be a link to one."""
         if not _BY_DESCRIPTOR:
             os.listdir(path)  # raises as opening it would
             return cls(path, None)
@@ -414,18 +395,18 @@ class _Directory:
             os.close(self._descriptor)
 
     def names(self) -> list[str]:
-        """Names of the entries."""
+        """Return the names of the entries."""
         return os.listdir(self.path if self._descriptor is None else self._descriptor)
 
     def mode(self, name: str) -> int:
-        """Type and permissions of an entry, that of a link itself; 0 where there is none."""
+        """Return type and permissions of an entry, not following a link; 0 if there is none."""
         try:
             return os.stat(self._name(name), dir_fd=self._descriptor, follow_symlinks=False).st_mode
         except FileNotFoundError:
             return 0
 
     def open(self, name: str) -> _Directory:
-        """A directory in this one; OSError where the entry is no directory, or a link."""
+        """Open a directory in this one; OSError if the entry is no directory, or a link."""
         if self._descriptor is None:
             if not stat.S_ISDIR(self.mode(name)):
                 raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), name)
@@ -435,7 +416,7 @@ class _Directory:
 
     @contextmanager
     def parent_of(self, name: str, *, make: bool = False) -> Iterator[_Directory]:
-        """The directory that holds a file of a relative name, made where need be."""
+        """Open the directory that holds a file of a relative name; make it if asked."""
         with ExitStack() as stack:
             here = self
             for part in name.split("/")[:-1]:
@@ -445,7 +426,7 @@ class _Directory:
             yield here
 
     def open_file(self, name: str, *, write: bool = False) -> IO[bytes]:
-        """A regular file, to read, or a new one to write; OSError where the entry is anything else."""
+        """Open a regular file to read, or a new one to write; OSError for anything else."""
         flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(
             os, "O_BINARY", 0
         )
@@ -479,7 +460,7 @@ class _Directory:
 
     @property
     def number(self) -> int:
-        """That the file system has given it."""
+        """Inode number."""
         return (
             os.stat(self.path).st_ino
             if self._descriptor is None
@@ -487,11 +468,11 @@ class _Directory:
         )
 
     def is_own(self) -> bool:
-        """Whether it belongs to the user who asks."""
+        """Tell whether it belongs to the user of this process."""
         return self._descriptor is not None and os.fstat(self._descriptor).st_uid == os.geteuid()
 
     def is_in_place(self) -> bool:
-        """Whether its path still leads to it."""
+        """Tell whether its path still leads to it."""
         try:
             return self._descriptor is None or os.path.samestat(
                 os.stat(self.path), os.fstat(self._descriptor)
@@ -500,7 +481,7 @@ class _Directory:
             return False
 
     def lock(self, *, wait: bool = False) -> bool:
-        """Lock it until it is closed, or the process ends; False where another has it. On Windows there are no such locks."""
+        """Lock it until it is closed; False if another process has it. Windows has no such lock."""
         if sys.platform == "win32" or self._descriptor is None:
             return True
         import fcntl
@@ -513,7 +494,7 @@ class _Directory:
 
     @contextmanager
     def locked(self) -> Iterator[None]:
-        """While this lasts no other command moves files there: of two that end at once, one waits."""
+        """Wait for other commands that move files there, and keep them out."""
         if self._descriptor is None:
             yield
             return
@@ -537,8 +518,8 @@ _BY_DESCRIPTOR = {
 } <= os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
 
 
-def _trouble_of_disk(error: BaseException) -> str:
-    """What the disk has against more files, in few words; empty where something else went wrong."""
+def _disk_error(error: BaseException) -> str:
+    """Return the message of an error of the disk; empty for any other error."""
     number = error.errno if isinstance(error, OSError) else None
     if (
         number is None
@@ -550,5 +531,5 @@ def _trouble_of_disk(error: BaseException) -> str:
 
 
 def one_of(names: Sequence[str]) -> str:
-    """Regular expression that matches any of these names, and nothing else."""
+    """Return a regular expression that matches any of these names."""
     return "|".join(re.escape(name) for name in names)

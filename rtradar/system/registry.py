@@ -1,7 +1,8 @@
-"""What has a name on the command line and may come from other packages: models, motion readers, radars and detectors.
+"""Registries of models, motion readers, radars and detectors, which other packages can extend.
 
-Each kind has one `Registry`. What comes with rtradar stands in it by the place of its code, loaded on use; other packages add
-theirs by an entry point of the registry's group, found when a name is asked for; a running program adds its own by `register`.
+Each kind has one `Registry`. It lists what comes with rtradar by the place of its code, loaded on
+use. Other packages add theirs by an entry point of the registry's group, and a running program adds
+its own by `register`.
 """
 
 from __future__ import annotations
@@ -64,7 +65,8 @@ class Registry(Mapping[str, Callable[..., Any]]):
             raise InputError(f"{self.noun} '{name}' is there already; choose another name")
         if not callable(make):
             raise InputError(
-                f"{self.noun} '{name}': a {type(make).__name__} cannot be called; give a function or a class"
+                f"{self.noun} '{name}': a {type(make).__name__} cannot be called; "
+                "give a function or a class"
             )
         self._registered[name] = make
 
@@ -97,7 +99,8 @@ class Registry(Mapping[str, Callable[..., Any]]):
                 _package(entry) for entry in installed
             ]
             raise ExtensionError(
-                f"{self.noun} '{name}' is claimed by {' and by '.join(owners)}; uninstall one of them"
+                f"{self.noun} '{name}' is claimed by {' and by '.join(owners)}; "
+                "uninstall one of them"
             )
         if name in self._registered:
             return self._registered[name]
@@ -111,7 +114,8 @@ class Registry(Mapping[str, Callable[..., Any]]):
             made = installed[0].load()
         if not callable(made):
             raise ExtensionError(
-                f"{self.owner(name)}: {installed[0].value} is a {type(made).__name__}, not a function or class"
+                f"{self.owner(name)}: {installed[0].value} is a {type(made).__name__}, "
+                "not a function or class"
             )
         return made
 
@@ -133,24 +137,26 @@ class Registry(Mapping[str, Callable[..., Any]]):
 
     @contextmanager
     def guarded(self, name: str) -> Iterator[None]:
-        """Around code that rtradar did not write: what goes wrong in it is said in one line.
+        """Run code that rtradar did not write, and report its errors in one line.
 
         Raises
         ------
         ExtensionError
-            In place of any error but those that have a meaning to the user already; a class of its own makes none of them.
+            Replaces any error but those that already have a meaning to the user.
         """
         try:
             yield
         except (InputError, BackendError, ExtensionError, MemoryError):
             raise
         except BaseException as error:
-            # A fault of rtradar's own shows where it is, and Ctrl-C ends the process; what is derived from it is not Ctrl-C.
+            # A fault of rtradar's own keeps its traceback. Ctrl-C ends the process; an exception
+            # derived from KeyboardInterrupt is not Ctrl-C.
             if name in self.built_in or type(error) is KeyboardInterrupt:
                 raise
             said = _first_line(error)
             raise ExtensionError(
-                f"{self.owner(name)} failed: {type(error).__name__}{f': {said}' if said else ''}; mend or uninstall it"
+                f"{self.owner(name)} failed: {type(error).__name__}{f': {said}' if said else ''}; "
+                "mend or uninstall it"
             ) from error
 
     def refuse(self, name: str, why: str) -> ExtensionError:
@@ -166,7 +172,7 @@ def _first_line(error: BaseException) -> str:
 
 
 def _readable_entries(group: str) -> list[EntryPoint]:
-    """Entry points of all packages but those whose files cannot be read, each of which is named by a warning."""
+    """Return the entry points of all readable packages, and warn of each of the others."""
     found: dict[str, list[EntryPoint]] = {}
     for package in distributions():
         name = "of unknown name"
@@ -177,7 +183,8 @@ def _readable_entries(group: str) -> list[EntryPoint]:
             )  # of two of one name the first is imported
         except Exception as error:
             warnings.warn(
-                f"package {name}: its entry points cannot be read ({_first_line(error)}); reinstall it",
+                f"package {name}: its entry points cannot be read ({_first_line(error)}); "
+                "reinstall it",
                 stacklevel=2,
             )
     return [entry for entries in found.values() for entry in entries]

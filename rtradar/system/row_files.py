@@ -1,10 +1,11 @@
-"""Long arrays that come row by row: they wait in a file without a name, so that memory does not grow with them.
+"""Long arrays that come row by row, kept in an unnamed file so that memory does not grow with them.
 
-The file is mapped, and looks like any other array, if one that cannot be written to. Pages that were looked at count as this
-process's memory until they are let go, which costs nothing: the system still has them, as long as nobody needs the room.
+The file is mapped and looks like any other read-only array. Pages that were read count as memory of
+this process until they are released, which costs nothing: the system keeps them as long as nobody
+needs the room.
 
-Where the folder for temporary files is itself in memory (tmpfs, as ``/tmp`` is on some systems), so are the files: the
-environment variable TMPDIR names another folder.
+Where the folder for temporary files is in memory itself, as ``/tmp`` is on some systems, so are the
+files: the environment variable TMPDIR names another folder.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ _mapped: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
 class FileBackedRows:
-    """Takes rows of float64, some at a time, and gives them all as one array."""
+    """Collects rows of float64 and returns them as one array."""
 
     def __init__(self) -> None:
         self._waiting: list[NDArray[np.float64]] = []
@@ -64,15 +65,16 @@ class FileBackedRows:
             if self._file is None and error.errno in (errno.EMFILE, errno.ENFILE):
                 return  # others have all the files that there may be
             raise InputError(
-                f"a long recording, {self._bytes / 1e6:.0f} MB so far, finds no room in {tempfile.tempdir or 'any folder'} "
-                f"for temporary files ({error.strerror}); let the environment variable TMPDIR name one that has some"
+                f"a long recording, {self._bytes / 1e6:.0f} MB so far, finds no room in "
+                f"{tempfile.tempdir or 'any folder'} for temporary files ({error.strerror}); "
+                "let the environment variable TMPDIR name one that has some"
             ) from None
         self._waiting = [
             np.empty((0, *rows.shape[1:]))
         ]  # which keeps the shape of a row, and none of the memory
 
     def rows(self) -> NDArray[np.float64]:
-        """All rows so far, at least one block of them; to be asked for once."""
+        """Return all rows, at least one block of them; can be called once."""
         if self._file is None:
             return self._waiting[0] if len(self._waiting) == 1 else np.concatenate(self._waiting)
         try:
@@ -92,7 +94,7 @@ def _close(file: IO[bytes]) -> None:
 
 
 def file_backed(blocks: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Blocks of rows as one array, (row, ...)."""
+    """Return blocks of rows as one array, (row, ...)."""
     rows = FileBackedRows()
     for block in blocks:
         rows.append(block)
@@ -100,19 +102,19 @@ def file_backed(blocks: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def in_blocks(*arrays: NDArray[np.float64]) -> Iterator[tuple[NDArray[np.float64], ...]]:
-    """Rows of arrays that have as many, some at a time; they are let go when the next are asked for."""
+    """Yield blocks of rows of arrays of one length; their pages are released after use."""
     for first in range(0, len(arrays[0]), _ROWS_AT_ONCE):
         yield tuple(array[first : first + _ROWS_AT_ONCE] for array in arrays)
         release_pages(*arrays)
 
 
 def column(array: NDArray[np.float64], number: int | list[int]) -> NDArray[np.float64]:
-    """A copy of ``array[:, number]``, which is in memory."""
+    """Return a copy of ``array[:, number]`` in memory."""
     return np.concatenate([rows[:, number].copy() for (rows,) in in_blocks(array)])
 
 
 def release_pages(*arrays: NDArray[np.float64]) -> None:
-    """Let the pages of arrays that wait in a file no longer count as memory; of others nothing happens."""
+    """Release the pages of arrays that are kept in a file; others stay as they are."""
     for array in arrays:
         owner: Any = array
         while isinstance(owner, np.ndarray):

@@ -1,4 +1,4 @@
-"""Seeds: which are allowed, and the random streams that follow from one; by one rule everywhere."""
+"""Seeds: their range, and the random streams that follow from one."""
 
 from __future__ import annotations
 
@@ -8,31 +8,14 @@ from rtradar.errors import InputError
 from rtradar.system.checks import brief
 
 MOST_SEED = 2**63 - 1
-"""Fits the whole numbers of every file that keeps it."""
+"""Largest seed, which fits the integers of every file format."""
 
 _WORD = 2**32
-"""A seed below it is one of the words that NumPy mixes."""
+"""Seeds below it are single words of the entropy that NumPy mixes."""
 
 
 def check_seed(where: str, seed: object) -> int:
-    """A whole number from 0 to `MOST_SEED`, as an int.
-
-    Parameters
-    ----------
-    where : str
-        What the message begins with, such as a table of a file; may be empty.
-    seed : object
-        As given.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        Where it is anything else.
-    """
+    """Return a seed from 0 to `MOST_SEED` as an int; InputError, begun with ``where``, if not."""
     if (
         isinstance(seed, bool)
         or not isinstance(seed, int | np.integer)
@@ -45,14 +28,15 @@ def check_seed(where: str, seed: object) -> int:
 
 
 def stream(seed: int, *numbers: int) -> np.random.SeedSequence:
-    """What seeds the random stream of these numbers, unlike that of other numbers and of other seeds.
+    """Return the seed sequence of a random stream, unlike that of other numbers or seeds.
 
     Parameters
     ----------
     seed : int
-        As of `check_seed`.
+        Seed from 0 to `MOST_SEED`.
     *numbers : int
-        At least 0, each below 2^32 but the last; always as many of them for one purpose.
+        Numbers of the stream, at least 0, each below 2^32 but the last; always as many of them for
+        one purpose.
 
     Returns
     -------
@@ -61,32 +45,18 @@ def stream(seed: int, *numbers: int) -> np.random.SeedSequence:
     Raises
     ------
     InputError
-        Where the seed is not allowed.
+        If the seed is out of range.
     """
     seed = check_seed("", seed)
     if seed < _WORD:
         return np.random.SeedSequence([seed, *numbers])
-    # NumPy would write the words of seed and numbers in a row, and 7 + 5 2^32 with 0 would be 7 with 5. It sets those of a spawn
-    # key apart: they come after at least four words of the seed, and their count keeps the key from being empty.
+    # NumPy would write the words of seed and numbers in a row: 7 + 5 2^32 with 0 would be 7 with 5.
+    # Those of a spawn key it sets apart, after at least four words of the seed; their count keeps
+    # the key from being empty.
     return np.random.SeedSequence(seed, spawn_key=(len(numbers), *numbers))
 
 
 def word(seed: int) -> int:
-    """The seed itself below 2^32, else 32 bits that follow from it: for packages that take no more.
-
-    Parameters
-    ----------
-    seed : int
-        As of `check_seed`.
-
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    InputError
-        Where the seed is not allowed.
-    """
+    """Return 32 bits that follow from a seed, for packages that take no more."""
     seed = check_seed("", seed)
     return seed if seed < _WORD else int(stream(seed).generate_state(1)[0])

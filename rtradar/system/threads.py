@@ -1,4 +1,4 @@
-"""Threads that stay: to start some for every call costs as much as a short call's work."""
+"""A thread map on threads that stay: starting some costs as much as the work of a short call."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from functools import lru_cache
 from typing import Any, TypeVar
 
 THREADS_VARIABLE = "RTRADAR_THREADS"
-"""Environment variable that limits the threads of this process, where it shares the cores with others of its kind."""
+"""Environment variable that limits the threads of this process, for workers that share cores."""
 
 _Result = TypeVar("_Result")
 
 
 def thread_limit() -> int | None:
-    """Threads this process may use, where the environment says so."""
+    """Return the number of threads that the environment allows, if it gives one."""
     named = os.environ.get(THREADS_VARIABLE, "")
     return int(named) if named.isdigit() and int(named) > 0 else None
 
@@ -33,7 +33,7 @@ def _cores() -> int:
 
 
 def thread_environment(threads: int) -> dict[str, str]:
-    """Environment that holds a new process to that many threads: ours, those of compiled loops, and of linear algebra."""
+    """Return environment variables that limit all threads of a new process, also of libraries."""
     own = (
         THREADS_VARIABLE,
         "NUMBA_NUM_THREADS",
@@ -45,9 +45,10 @@ def thread_environment(threads: int) -> dict[str, str]:
 
 
 def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
-    """Results in the order of the items; NumPy, the FFT and compiled loops release the interpreter lock, so threads do pay.
+    """Map a function over items in threads; return results in order, or raise the first error.
 
-    The caller works too: to sleep and be woken takes as long as many an item. Of errors that of the first item is raised.
+    NumPy, the FFT and compiled loops release the interpreter lock, so threads pay. The caller works
+    too, because waking up takes as long as many an item.
     """
     results: list[Any] = [None] * len(items)
     failed: dict[int, BaseException] = {}
@@ -67,8 +68,8 @@ def thread_map(work: Callable[[int], _Result], items: range) -> list[_Result]:
     take()
     # Who has not woken by now has nothing left to do.
     awake = [helper for helper in helpers if not helper.cancel()]
-    # What is cancelled stays in the pool's queue until a thread wakes, on a busy machine for seconds, and is not to keep
-    # the arrays of this work, and of all that follows, until then.
+    # Cancelled work stays in the pool's queue until a thread wakes, on a busy machine for seconds,
+    # and must not keep the arrays of this work until then.
     shared.clear()
     try:
         wait(awake)

@@ -203,10 +203,10 @@ def test_a_long_recording_takes_no_more_memory_than_a_short_one(
     code = (
         "import sys; from pathlib import Path\n"
         "from rtradar.exchange import export\n"
-        "from rtradar.pipeline.timing import forget_peak_memory, give_back_memory, peak_memory_mb\n"
+        "from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb\n"
         "folder, suffix = Path(sys.argv[1]), sys.argv[2]\n"
         "export(folder / 'short', folder / f'short{suffix}')\n"
-        "give_back_memory(); forget_peak_memory(); before = peak_memory_mb()\n"
+        "forget_peak_memory(); before = peak_memory_mb()\n"
         "export(folder / 'long', folder / f'long{suffix}')\n"
         "print(peak_memory_mb() - before)\n"
     )

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rtradar.pipeline.map_store import MapStore
-from rtradar.pipeline.timing import forget_peak_memory, give_back_memory, peak_memory_mb
+from rtradar.pipeline.timing import forget_peak_memory, peak_memory_mb
 
 FIXED = {"range": np.arange(256.0), "velocity": np.arange(128.0)}
 
@@ -45,7 +45,6 @@ def test_a_long_file_takes_no_more_memory_than_a_short_one(tmp_path: Path) -> No
             store.extend("slow_time", window + np.arange(64) / 64, range_time=rows)
 
     write(range(5))
-    give_back_memory()
     forget_peak_memory()
     before = peak_memory_mb()
     write(range(5, 205))

@@ -11,8 +11,8 @@ import pytest
 import rtradar as rt
 from rtradar.errors import InputError
 from rtradar.motion.formats.text_file import TextFile
+from rtradar.system.checks import read_toml
 from rtradar.system.files import read_json
-from rtradar.system.toml_tables import read_toml
 
 ASF = """:version 1.10
 :units
