@@ -17,6 +17,7 @@ from rtradar.motion import Motion, place
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import indoors
 from rtradar.pipeline.processing import Processing
+from rtradar.pipeline.timing import reuse_freed_memory
 from rtradar.pipeline.warm_up import processing_compiled_beside, warm_up_processing
 from rtradar.radar import Radar
 from rtradar.scatter import EchoModel, build_model
@@ -33,6 +34,7 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
 
     Errors are those of `rtradar.run`.
     """
+    reuse_freed_memory()
     processing = Processing.of(radar, settings)
     if settings.snr_db == "physical":
         # They report a missing value before the work.
