@@ -77,17 +77,11 @@ def _zone_points() -> tuple[Call, Call]:
     return call, lambda: zone_points_reference(*given)
 
 
-@kernel_case(
-    "scatter.fresnel_zones.open_fractions", "cells of a zone cut by an edge, counted", 0.06
-)
+@kernel_case("scatter.zone_edges.open_fractions", "cells of a zone cut by an edge, counted", 0.06)
 def _open_fractions() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import (
-        CELLS,
-        MERIDIANS,
-        open_fractions,
-        straight_edge,
-    )
-    from rtradar.kernels.scatter.fresnel_zones import open_fractions_reference as reference
+    from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS
+    from rtradar.kernels.scatter.zone_edges import open_fractions, straight_edge
+    from rtradar.kernels.scatter.zone_edges import open_fractions_reference as reference
 
     (maps, _), line = _zones(1), (np.cos(0.4), np.sin(0.4), 1.7)
     given = maps, straight_edge(maps, line, 12)

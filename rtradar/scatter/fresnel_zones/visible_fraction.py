@@ -23,13 +23,12 @@ from rtradar.errors import InputError
 from rtradar.kernels.scatter.fresnel_zones import (
     CELLS,
     MERIDIANS,
-    Edges,
     ZoneMaps,
     lay_zones,
-    open_fractions,
     zone_points,
     zone_sums,
 )
+from rtradar.kernels.scatter.zone_edges import Edges, open_fractions
 from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 

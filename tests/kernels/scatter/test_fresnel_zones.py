@@ -13,13 +13,15 @@ from rtradar.kernels.scatter.fresnel_zones import (
     RIM,
     ZoneMaps,
     lay_zones,
-    open_fractions,
-    open_fractions_reference,
-    straight_edge,
     zone_points,
     zone_points_reference,
 )
 from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.kernels.scatter.zone_edges import (
+    open_fractions,
+    open_fractions_reference,
+    straight_edge,
+)
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 Array = NDArray[np.float64]
