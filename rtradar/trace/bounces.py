@@ -38,7 +38,7 @@ class Surfaces(Protocol):
     flat: bool
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether no surface but its ``own (ray,)`` is nearer to an antenna than a point (ray, 3)."""
+        """Whether no surface but ``own (ray,)`` is nearer to an antenna than a point (ray, 3)."""
         ...
 
     def meets(
