@@ -52,8 +52,8 @@ def plain(echoes: Echoes, radar: Radar) -> NDArray[np.complex128]:
         amplitude += echoes.amplitude[node][..., None] * np.prod(
             (frequency[:, None] - others) / (own - others), axis=1
         )
-    heard = (beat >= 0) & (beat < radar.sample_rate_hz)
-    return np.asarray(np.sum(np.where(heard, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2))
+    in_band = (beat >= 0) & (beat < radar.sample_rate_hz)
+    return np.asarray(np.sum(np.where(in_band, amplitude, 0) * np.exp(2j * np.pi * turns), axis=2))
 
 
 # One grid up to three nodes, two up to six; beyond, no grid. Ten times the rounding of complex64.

@@ -400,7 +400,7 @@ def test_warns_of_an_echo_that_moves_a_tenth_of_a_bin_in_a_chirp(radar: Radar, s
         synthesize(*moving(radar, sign * velocity, 36))
 
 
-def test_an_echo_that_is_not_heard_says_nothing_of_motion() -> None:
+def test_an_echo_out_of_band_gives_no_warning_of_motion() -> None:
     echoes, radar, times = moving(LOW, 1000.0, 36)
     hidden = dataclasses.replace(echoes, amplitude=np.zeros_like(echoes.amplitude))
     assert not synthesize(hidden, radar, times).any()  # warnings are errors in tests

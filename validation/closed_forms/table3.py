@@ -467,9 +467,9 @@ def measure(quick: bool) -> list[Row]:
         analytic.join(tally_of(activity, "analytic", every, 1)[0])
     for scheme in PAPER:
         rows += analytic.rows("all four, analytic", NOISE_FREE, scheme)
-    ladder = tally_of_recipes("jumping_jack", every, RECIPES)
+    tally = tally_of_recipes("jumping_jack", every, RECIPES)
     for recipe, scheme in itertools.product(RECIPES, PAPER):
-        rows += ladder.rows("jumping_jack", recipe.name, scheme)
+        rows += tally.rows("jumping_jack", recipe.name, scheme)
     return rows
 
 

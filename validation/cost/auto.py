@@ -36,7 +36,7 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "other_methods"))
 
-from ladder import FRAMES, spectrum
+from whole_bodies import FRAMES, spectrum
 
 DURATION_S = 3.0
 REPEATS = 5

@@ -1,6 +1,6 @@
 """Speed against accuracy: the cost of every model and option, and its distance from `reference`.
 
-The error is that of ``ladder.py``: the received spectrum H(f, t) of the corner channels over one
+The error is that of ``whole_bodies.py``: the received spectrum H(f, t) of the corner channels over one
 frame of 100 ms, rms over rms, and the power of that frame. The cost is the time of echoes and IF
 samples of that frame, all channels, over that of `analytic` in the same run; each first runs a
 little, so that nothing is compiled, and the best of several counts. `rays` and `reference`, which
@@ -37,7 +37,7 @@ from rtradar.scatter.models.rays import ANCHOR_S
 
 sys.path.append(str(Path(__file__).resolve().parents[1] / "other_methods"))
 
-from ladder import FRAMES, PRESETS, Scene
+from whole_bodies import FRAMES, PRESETS, Scene
 
 CHEAPEST = "analytic"  # all costs are relative to it
 # In the order of the table; `reference` has a cost and no error.

@@ -11,7 +11,7 @@ What is true is taken to be G V; then
     all of optics    G V / (2 k rho)        next term of its expansion, rho the mean radius
     physical-optics  1.5 % of G V           what its interpolation leaves
 
-(``validation/other_methods/fresnel.py`` and ``ladder.py`` measure the third and the last),
+(``validation/other_methods/fresnel.py`` and ``whole_bodies.py`` measure the third and the last),
 and that of `reference` is 0, for errors are held against it. All of it through the patterns of the
 radar's antennas.
 """

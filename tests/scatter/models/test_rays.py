@@ -261,7 +261,7 @@ def test_echoes_are_the_scattering_lengths_of_the_pose() -> None:
         rx = radar.rx[radar.rx_of_tx[chirp % 12]][3]
         k = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
         path = np.exp(-1j * k[:, None] * echoes.length[index, 3])
-        heard = (amplitude[:, index, 3].conj() * path).sum(axis=1)
+        received = (amplitude[:, index, 3].conj() * path).sum(axis=1)
         same = {"bounces": 2, "rays_per_wavelength": 0.7 * 14 / 16}
         expected = rays_scattering(
             pose, np.tile(tx, (3, 1)), np.tile(rx, (3, 1)), frequency, **same
@@ -271,7 +271,7 @@ def test_echoes_are_the_scattering_lengths_of_the_pose() -> None:
         )
         # The polynomial through the nodes of the sweep; 7 and 13 leave 2 and 5 % of one bounce and
         # of two.
-        np.testing.assert_allclose(heard, expected, atol=0.05 * np.abs(expected).max())
+        np.testing.assert_allclose(received, expected, atol=0.05 * np.abs(expected).max())
 
 
 @pytest.mark.slow

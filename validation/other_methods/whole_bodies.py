@@ -8,7 +8,7 @@ reported. Physical optics is judged on the walk: 2 % at 12 GHz, 4 % at 77 GHz. A
 tolerance of frame power is judged by it. The others omit effects by design, and are reported.
 `reference` itself is compared with itself with four times the facets.
 
-    python validation/other_methods/ladder.py [--quick] [--json FILE]
+    python validation/other_methods/whole_bodies.py [--quick] [--json FILE]
 """
 
 from __future__ import annotations
