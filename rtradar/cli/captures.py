@@ -51,17 +51,17 @@ def add(commands: Subcommands) -> None:
     )
     _add_capture(run)
     _add_settings(run, _ONLY_RUN)
-    run.add_argument(
+    run.option(
         "--tolerance-db",
+        "X",
+        "of auto: error of a frame's power that will do [dB] (default: 0.5)",
         type=number,
-        metavar="X",
-        help="of auto: error of a frame's power that will do [dB] (default: 0.5)",
     )
-    run.add_argument(
+    run.option(
         "--tolerance-complex",
+        "X",
+        "of auto: rms error of the field that will do, over its rms",
         type=number,
-        metavar="X",
-        help="of auto: rms error of the field that will do, over its rms",
     )
     run.add_argument(
         "--model-option",
@@ -77,30 +77,28 @@ def add(commands: Subcommands) -> None:
         "compare", help="one recording by several models, with the same noise, and what differs"
     )
     _add_capture(compare)
-    compare.add_argument(
+    compare.option(
         "--fidelities",
+        "A,B,...",
+        "two or more, the last is the reference (default: %(default)s)",
         default="analytic-paper,analytic,specular",
-        metavar="A,B,...",
-        help="two or more, the last is the reference (default: %(default)s)",
     )
     compare.set_defaults(command=_compare)
 
 
 def _add_capture(command: OneLineParser) -> None:
     """Add what every command that simulates a capture takes."""
-    command.add_argument(
+    command.option(
         "motion",
-        metavar="MOTION",
-        help="an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack",
+        "MOTION",
+        "an .amc, .bvh or .c3d file, or synthetic:walk, :kick, :punch, :jumping_jack",
     )
-    command.add_argument(
-        "--skeleton", type=path, metavar="ASF", help="the .asf of an .amc recording"
-    )
-    command.add_argument(
+    command.option("--skeleton", "ASF", "the .asf of an .amc recording", type=path)
+    command.option(
         "--radar",
+        "NAME|TOML",
+        f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: %(default)s)",
         default="paper-12ghz",
-        metavar="NAME|TOML",
-        help=f"{', '.join(PRESETS.built_in)}, a TOML file, or of a package (default: %(default)s)",
     )
     scene = command.add_argument("--scene", default="free-space", metavar="NAME|TOML")
     command.help_later(scene, lambda: f"{_scenes()}, or a TOML file (default: %(default)s)")

@@ -17,29 +17,20 @@ def add(commands: Subcommands) -> None:
     doctor = commands.add_parser(
         "doctor", help="which ray-tracing backends work on this machine, and what to install"
     )
-    doctor.add_argument(
-        "--json", type=path, metavar="FILE", help="write the findings there as JSON"
-    )
+    doctor.option("--json", "FILE", "write the findings there as JSON", type=path)
     doctor.set_defaults(command=_doctor)
 
     validate = commands.add_parser(
         "validate", help="hold every claim against its reference; 1 where one fails"
     )
-    validate.add_argument("--quick", action="store_true", help="fewer cases of each claim")
-    validate.add_argument(
-        "--only",
-        metavar="NAME",
-        help="one claim by its key (sphere, path, doppler, ...), or one script",
+    validate.flag("--quick", "fewer cases of each claim")
+    validate.option(
+        "--only", "NAME", "one claim by its key (sphere, path, doppler, ...), or one script"
     )
-    validate.add_argument("--json", type=path, metavar="FILE", help="write all rows there as JSON")
-    validate.add_argument(
-        "--figure", type=path, metavar="DIR", help="draw one picture a script there"
-    )
-    validate.add_argument(
-        "--readme",
-        type=path,
-        metavar="FILE",
-        help="replace the table of figures in this markdown file",
+    validate.option("--json", "FILE", "write all rows there as JSON", type=path)
+    validate.option("--figure", "DIR", "draw one picture a script there", type=path)
+    validate.option(
+        "--readme", "FILE", "replace the table of figures in this markdown file", type=path
     )
     validate.set_defaults(command=_validate)
 
@@ -47,39 +38,29 @@ def add(commands: Subcommands) -> None:
         "bench",
         help="how long every stage takes, beside other models, the paper's method and floors",
     )
-    bench.add_argument(
+    bench.option(
         "--radar",
-        metavar="A,B,...",
-        help="presets or TOML files (default: both presets; with --quick the first)",
+        "A,B,...",
+        "presets or TOML files (default: both presets; with --quick the first)",
     )
-    bench.add_argument(
+    bench.option(
         "--fidelity",
-        metavar="A,B,...",
-        help="models (default: analytic-paper,analytic,specular,fresnel,physical-optics; "
+        "A,B,...",
+        "models (default: analytic-paper,analytic,specular,fresnel,physical-optics; "
         "with --quick without the last two)",
     )
-    bench.add_argument(
-        "--repeats",
-        type=whole,
-        metavar="N",
-        help="repeats of each measurement (default: 3; with --quick 1)",
+    bench.option(
+        "--repeats", "N", "repeats of each measurement (default: 3; with --quick 1)", type=whole
     )
-    bench.add_argument(
-        "--duration",
-        type=seconds,
-        metavar="S",
-        help="length of the capture [s] (default: 3; with --quick 0.5)",
+    bench.option(
+        "--duration", "S", "length of the capture [s] (default: 3; with --quick 0.5)", type=seconds
     )
-    bench.add_argument(
-        "--only",
-        metavar="PART",
-        help="models (with the paper's method and floors), growth, or kernels",
+    bench.option(
+        "--only", "PART", "models (with the paper's method and floors), growth, or kernels"
     )
-    bench.add_argument("--quick", action="store_true", help="little of everything, in some minutes")
-    bench.add_argument(
-        "--json", type=path, metavar="FILE", help="write all that is measured there as JSON"
-    )
-    bench.add_argument("--figure", type=path, metavar="FILE", help="draw it there, as PNG")
+    bench.flag("--quick", "little of everything, in some minutes")
+    bench.option("--json", "FILE", "write all that is measured there as JSON", type=path)
+    bench.option("--figure", "FILE", "draw it there, as PNG", type=path)
     bench.set_defaults(command=_bench)
 
 

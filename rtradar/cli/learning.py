@@ -41,24 +41,16 @@ def add(commands: Subcommands) -> None:
     )
 
 
-def _add_dataset(dataset: argparse.ArgumentParser) -> None:
+def _add_dataset(dataset: OneLineParser) -> None:
     build = dataset.add_subparsers(
         required=True, metavar="COMMAND", parser_class=OneLineParser
     ).add_parser(
         "build",
         help="make the samples of a collection that are missing or damaged; may be run again",
     )
-    build.add_argument(
-        "spec", type=path, metavar="SPEC.toml", help="what the collection shall hold"
-    )
-    build.add_argument(
-        "--out", type=path, required=True, metavar="DIR", help="folder of the collection"
-    )
-    build.add_argument(
-        "--plan",
-        action="store_true",
-        help="make a sample of each kind, and say how long the others will take",
-    )
+    build.option("spec", "SPEC.toml", "what the collection shall hold", type=path)
+    build.option("--out", "DIR", "folder of the collection", type=path, required=True)
+    build.flag("--plan", "make a sample of each kind, and say how long the others will take")
     place = build.add_mutually_exclusive_group()
     place.add_argument(
         "--workers",
@@ -76,56 +68,37 @@ def _add_dataset(dataset: argparse.ArgumentParser) -> None:
     )
 
 
-def _add_train(train: argparse.ArgumentParser) -> None:
-    train.add_argument(
-        "data",
-        type=path,
-        nargs="+",
-        metavar="DIR",
-        help="folders of clouds, made by rtradar dataset build",
+def _add_train(train: OneLineParser) -> None:
+    train.option(
+        "data", "DIR", "folders of clouds, made by rtradar dataset build", type=path, nargs="+"
     )
-    train.add_argument(
+    train.option(
         "--out",
+        "OUT",
+        "folder for the trainings; one that is there is gone on with",
         type=path,
         required=True,
-        metavar="OUT",
-        help="folder for the trainings; one that is there is gone on with",
     )
     train.add_argument("--recipe", default="lean", help="lean, our own, or paper (default: lean)")
-    train.add_argument(
+    train.option(
         "--split",
-        default="folds",
-        metavar="HOW",
-        help="folds (the paper's, over clouds), recording, subject, recorded (learn from "
+        "HOW",
+        "folds (the paper's, over clouds), recording, subject, recorded (learn from "
         "synthetic motion), or across:COLUMN, which learns from one value of a column, such as "
         "fidelity, and asks about all (default: folds)",
+        default="folds",
     )
-    train.add_argument(
+    train.option(
         "--folds",
+        "N",
+        "number of folds (default: 10; across: 5; fewer where a class has fewer groups)",
         type=whole,
-        metavar="N",
-        help="number of folds (default: 10; across: 5; fewer where a class has fewer groups)",
     )
-    train.add_argument(
-        "--fold",
-        type=numbers,
-        metavar="N,M,...",
-        help="only these trainings, from 1 (default: all)",
-    )
-    train.add_argument(
-        "--points", type=whole, metavar="N", help="points of each cloud (default: 1000)"
-    )
-    train.add_argument(
-        "--epochs", type=whole, metavar="N", help="number of epochs (default: lean 30, paper 200)"
-    )
-    train.add_argument(
-        "--rate", type=number, metavar="X", help="learning rate (default: lean 2e-3, paper 1e-4)"
-    )
-    train.add_argument(
-        "--all-epochs",
-        action="store_true",
-        help="with paper: go on when the halved rate is below 1e-6",
-    )
+    train.option("--fold", "N,M,...", "only these trainings, from 1 (default: all)", type=numbers)
+    train.option("--points", "N", "points of each cloud (default: 1000)", type=whole)
+    train.option("--epochs", "N", "number of epochs (default: lean 30, paper 200)", type=whole)
+    train.option("--rate", "X", "learning rate (default: lean 2e-3, paper 1e-4)", type=number)
+    train.flag("--all-epochs", "with paper: go on when the halved rate is below 1e-6")
     train.add_argument(
         "--augmentation",
         help="none, physical, or rotation, which is the paper's "
@@ -147,45 +120,30 @@ def _add_train(train: argparse.ArgumentParser) -> None:
         default="auto",
         help="where to compute (default: auto)",
     )
-    train.add_argument(
-        "--seed",
-        type=whole,
-        default=0,
-        metavar="N",
-        help="seed of splits and trainings (default: 0)",
-    )
+    train.option("--seed", "N", "seed of splits and trainings (default: 0)", type=whole, default=0)
     train.set_defaults(
         command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is"
     )
 
 
-def _add_evaluate(evaluate: argparse.ArgumentParser) -> None:
-    evaluate.add_argument(
+def _add_evaluate(evaluate: OneLineParser) -> None:
+    evaluate.option(
         "trained",
+        "OUT",
+        "folders that rtradar train made, of the same clouds",
         type=path,
         nargs="+",
-        metavar="OUT",
-        help="folders that rtradar train made, of the same clouds",
     )
-    evaluate.add_argument(
-        "--baselines",
-        action="store_true",
-        help="also evaluate simple classifiers, on the clouds and the split of the first",
+    evaluate.flag(
+        "--baselines", "also evaluate simple classifiers, on the clouds and the split of the first"
     )
-    evaluate.add_argument(
-        "--data",
-        type=path,
-        nargs="+",
-        metavar="DIR",
-        help="clouds for --baselines (default: where they were)",
+    evaluate.option(
+        "--data", "DIR", "clouds for --baselines (default: where they were)", type=path, nargs="+"
     )
-    evaluate.add_argument(
-        "--out",
-        type=path,
-        metavar="DIR",
-        help="folder for tables and pictures (default: the first OUT)",
+    evaluate.option(
+        "--out", "DIR", "folder for tables and pictures (default: the first OUT)", type=path
     )
-    evaluate.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
+    evaluate.flag("--overwrite", OVERWRITE_HELP)
     add_files(evaluate, json="write the numbers there too")
     evaluate.set_defaults(command=_evaluate)
 

@@ -20,50 +20,43 @@ def add(commands: Subcommands) -> None:
     view = commands.add_parser(
         "view", help="body, room, paths, echoes, maps and cloud of a run over time, in the browser"
     )
-    view.add_argument("folder", type=path, metavar="DIR", help="folder of 'rtradar run --out DIR'")
-    view.add_argument(
+    view.option("folder", "DIR", "folder of 'rtradar run --out DIR'", type=path)
+    view.option(
         "--out",
+        "FILE.html",
+        "write the page there, and open nothing (default: DIR/view.html, opened)",
         type=path,
-        metavar="FILE.html",
-        help="write the page there, and open nothing (default: DIR/view.html, opened)",
     )
-    view.add_argument(
-        "--no-browser", action="store_true", help="write the page, but do not open it"
-    )
+    view.flag("--no-browser", "write the page, but do not open it")
     view.add_argument(
         "--colour",
         choices=("part", "power", "velocity"),
         default="part",
         help="quantity that colours show at first (default: part)",
     )
-    view.add_argument(
-        "--still",
-        type=path,
-        metavar="FILE.png",
-        help="draw one snapshot; without --out there is no page then",
+    view.option(
+        "--still", "FILE.png", "draw one snapshot; without --out there is no page then", type=path
     )
-    view.add_argument(
-        "--time", type=seconds, metavar="S", help="time of the still [s] (default: the middle)"
-    )
+    view.option("--time", "S", "time of the still [s] (default: the middle)", type=seconds)
     add_files(view, json="write what was shown and written there")
     view.set_defaults(command=_view)
 
     export = commands.add_parser(
         "export", help="IF samples for MATLAB, xarray or as int16, clouds as PLY or PCD"
     )
-    export.add_argument(
+    export.option(
         "source",
+        "SOURCE",
+        "folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd",
         type=path,
-        metavar="SOURCE",
-        help="folder of rtradar run --save-if, or a cloud: .npz, .ply or .pcd",
     )
-    export.add_argument(
+    export.option(
         "--out",
+        "FILE",
+        "its suffix gives the format: .mat, .nc or .bin of IF samples; "
+        ".ply, .pcd or .npz of a cloud",
         type=path,
         required=True,
-        metavar="FILE",
-        help="its suffix gives the format: .mat, .nc or .bin of IF samples; "
-        ".ply, .pcd or .npz of a cloud",
     )
     add_files(export, json="write there as JSON what was written")
     export.set_defaults(command=_export)

@@ -26,6 +26,14 @@ class OneLineParser(argparse.ArgumentParser):
         """End with status 2."""
         self.exit(2, f"{self.prog}: {message}; see '{self.prog} --help'\n")
 
+    def option(self, name: str, metavar: str, text: str, **more: Any) -> None:
+        """Add an option, or an argument, that takes a value; ``text`` is its help."""
+        self.add_argument(name, metavar=metavar, help=text, **more)
+
+    def flag(self, name: str, text: str) -> None:
+        """Add an option without a value; ``text`` is its help."""
+        self.add_argument(name, action="store_true", help=text)
+
     def help_later(self, action: argparse.Action, text: Callable[[], str]) -> None:
         """Set the help of an option to this text once the help is asked for."""
         self._later.append((action, text))
@@ -37,12 +45,12 @@ class OneLineParser(argparse.ArgumentParser):
         return super().format_help()
 
 
-def add_files(command: argparse.ArgumentParser, *, out: str = "", json: str) -> None:
+def add_files(command: OneLineParser, *, out: str = "", json: str) -> None:
     """Add ``--json``, and ``--out`` with ``--overwrite`` where ``out`` says what goes there."""
     if out:
-        command.add_argument("--out", type=path, required=True, metavar="DIR", help=out)
-        command.add_argument("--overwrite", action="store_true", help=OVERWRITE_HELP)
-    command.add_argument("--json", type=path, metavar="FILE", help=json)
+        command.option("--out", "DIR", out, type=path, required=True)
+        command.flag("--overwrite", OVERWRITE_HELP)
+    command.option("--json", "FILE", json, type=path)
 
 
 OVERWRITE_HELP = "replace files of others that have the names of new ones"
