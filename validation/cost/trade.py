@@ -1,8 +1,8 @@
 """Speed against accuracy: the cost of every model and option, and its distance from `reference`.
 
 The error is that of ``whole_bodies.py``: the received spectrum H(f, t) of the corner channels over
-one frame of 100 ms, rms over rms, and the power of that frame. The cost is the time of echoes and IF
-samples of that frame, all channels, over that of `analytic` in the same run; each first runs a
+one frame of 100 ms, rms over rms, and the power of that frame. The cost is the time of echoes and
+IF samples of that frame, all channels, over that of `analytic` in the same run; each first runs a
 little, so that nothing is compiled, and the best of several counts. `rays` and `reference`, which
 take minutes for a frame, are timed on a part of it: `rays` on one Tx over the time between two
 keyframes, `reference` on two TDM cycles.
