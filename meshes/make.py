@@ -3,9 +3,10 @@
     python meshes/make.py            # writes them beside this script
     python meshes/make.py DIR        # or elsewhere
 
-Furniture is a union of boxes or a turned body. It stands on z = 0, its footprint centred on the z axis (what hangs on or
-leans against a wall has its back in the plane x = 0 instead), and its front looks along +x. A corner reflector has its
-corner at the origin and opens along +x. The same script makes the same bytes everywhere.
+Furniture is a union of boxes or a body of revolution. It is placed on z = 0 with its footprint
+centred on the z axis, and its front looks along +x; what hangs on a wall or leans against it has
+its back in the plane x = 0 instead. A corner reflector has its corner at the origin and opens along
++x. The same script makes the same bytes everywhere.
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ EDGE_M = 0.4
 
 
 def boxes(solid: Sequence[Box], hollow: Sequence[Box] = ()) -> Mesh:
-    """The surface of a union of boxes, less other boxes: the outside of a lattice whose planes are all their faces."""
+    """Surface of a union of boxes less other boxes, on the lattice of the planes of all faces."""
     everything = np.round(np.array([*solid, *hollow]), 6).reshape(-1, 3, 2)
     planes = [np.unique(everything[:, axis]) for axis in range(3)]
     filled = np.zeros([len(plane) + 1 for plane in planes], dtype=bool)  # an empty cell all round
@@ -64,7 +65,10 @@ def boxes(solid: Sequence[Box], hollow: Sequence[Box] = ()) -> Mesh:
 
 
 def turned(profile: Sequence[tuple[float, float]], sides: int) -> Mesh:
-    """A body turned about the z axis; its profile (radius, z) begins and ends on the axis, going round it upward outside."""
+    """Body of revolution about the z axis.
+
+    Its profile (radius, z) begins and ends on the axis, and goes upward on the outside.
+    """
     angles = 2 * np.pi * np.arange(sides) / sides
     ring = np.stack([np.cos(angles), np.sin(angles)], axis=1)
     rows = []
@@ -88,11 +92,8 @@ def turned(profile: Sequence[tuple[float, float]], sides: int) -> Mesh:
 def legs(width: float, depth: float, height: float, thick: float) -> list[Box]:
     """Four square legs; width along y, depth along x."""
     x, y = depth / 2, width / 2
-    return [
-        (*sorted((sx * x, sx * (x - thick))), *sorted((sy * y, sy * (y - thick))), 0.0, height)  # type: ignore[misc]
-        for sx in (-1, 1)
-        for sy in (-1, 1)
-    ]
+    along_x, along_y = (((-end, thick - end), (end - thick, end)) for end in (x, y))
+    return [(*ends_x, *ends_y, 0.0, height) for ends_x in along_x for ends_y in along_y]
 
 
 def bed() -> Mesh:
@@ -263,7 +264,7 @@ def door() -> Mesh:
 
 
 def radiator() -> Mesh:
-    """1.0 m wide, 0.6 m high, its front of upright ribs, 0.12 m above the floor; the wall is the plane x = 0."""
+    """Radiator 1.0 m wide and 0.6 m high, 0.12 m above the floor; the wall is the plane x = 0."""
     ribs: list[Box] = [
         (0.09, 0.11, -0.475 + 0.1 * k, -0.425 + 0.1 * k, 0.15, 0.69) for k in range(10)
     ]
@@ -271,9 +272,9 @@ def radiator() -> Mesh:
 
 
 def trihedral() -> Mesh:
-    """Triangular trihedral corner reflector, an open sheet of three triangles whose normals look out of it, about +x.
+    """Triangular trihedral corner reflector: an open sheet of three triangles that face +x.
 
-    Its edges along which two triangles meet are `EDGE_M` long, one of them leaning up in the plane y = 0.
+    Edges between two triangles are `EDGE_M` long; one of them leans up in the plane y = 0.
     """
     along, radius = EDGE_M / sqrt(3), EDGE_M * sqrt(2 / 3)
     tips = [

@@ -45,7 +45,7 @@ class Tones(NamedTuple):
     powers : (power, node) float64
         Weights of these in the polynomial in the sample number over the number of samples.
     start_frequency, slope, sample_rate : float
-        Of the sweep [Hz], [Hz/s], and of its samples [Hz].
+        Start and slope of the sweep [Hz], [Hz/s], and rate of its samples [Hz].
     """
 
     length: NDArray[np.float64]

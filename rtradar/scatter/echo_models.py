@@ -130,8 +130,8 @@ def models_that(ability: str) -> list[str]:
 
 def affordable_models(most: float) -> list[str]:
     """Names of the built-in models that cost at most so many times as much as `analytic`."""
-    costs = {name: MODELS[name].relative_cost for name in models_that("relative_cost")}  # type: ignore[attr-defined]
-    return [name for name, cost in costs.items() if cost <= most]
+    priced = models_that("relative_cost")
+    return [name for name in priced if MODELS[name].relative_cost <= most]
 
 
 def takes_backend(fidelity: str) -> bool:

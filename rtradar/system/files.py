@@ -18,7 +18,7 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, BinaryIO, TextIO, TypeVar
+from typing import Any, BinaryIO, TextIO, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +125,8 @@ class LastingFile:
 
     def readinto(self, buffer: Any) -> int:
         """Read into a buffer."""
-        return self._try(lambda: self._file.readinto(buffer), memoryview(buffer).nbytes)  # type: ignore[attr-defined]
+        size = memoryview(buffer).nbytes
+        return self._try(lambda: cast("io.BytesIO", self._file).readinto(buffer), size)
 
     def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
         """Move to a place."""

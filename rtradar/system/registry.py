@@ -24,7 +24,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
     Parameters
     ----------
     group : str
-        Of the entry points that add to it, such as ``rtradar.models``.
+        Group of the entry points that add to it, such as ``rtradar.models``.
     noun : str
         What one is called in messages.
     built_in : mapping
@@ -92,7 +92,7 @@ class Registry(Mapping[str, Callable[..., Any]]):
             )
         return self[name]
 
-    def __getitem__(self, name: str) -> Callable[..., Any]:
+    def __getitem__(self, name: str) -> Any:
         installed = self._installed.get(name, [])
         if len(installed) + (name in self.built_in) + (name in self._registered) > 1:
             owners = ["rtradar"] * (name in self.built_in) + [

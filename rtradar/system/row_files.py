@@ -56,7 +56,8 @@ class FileBackedRows:
             return
         try:
             if self._file is None:
-                self._file = tempfile.TemporaryFile()  # noqa: SIM115 (it is closed below, or when nobody wants the rows)
+                # It is closed below, or when nobody wants the rows any more.
+                self._file = tempfile.TemporaryFile()  # noqa: SIM115
                 weakref.finalize(self, _close, self._file)
             for waiting in self._waiting:
                 self._file.write(waiting.data)

@@ -139,7 +139,7 @@ def _views(
 
 # -- selection -------------------------------------------------------------------------------------
 
-_COST = np.array([0.0, *(MODELS[name].relative_cost for name in CANDIDATES[1:])])  # type: ignore[attr-defined]
+_COST = np.array([0.0, *(MODELS[name].relative_cost for name in CANDIDATES[1:])])
 """Rough cost of a part: which change to try first, where several would do."""
 
 

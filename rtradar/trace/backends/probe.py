@@ -40,7 +40,7 @@ class ProbeResult:
     finding : str
         ``good``, or in a few words what went wrong.
     version : str or None
-        Of the libLLVM in use; None where there is none or it does not tell.
+        Version of the libLLVM in use; None without one, or where it does not say.
     """
 
     finding: str
