@@ -8,7 +8,7 @@ import math
 import os
 from collections import Counter
 from collections.abc import Iterator
-from functools import cache
+from functools import cache, wraps
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +69,7 @@ class _Pictures:
         return file.getvalue()
 
     @staticmethod
+    @wraps(Figure.savefig)  # pyplot, imported later, reads its name
     def save_or_blank(figure: Figure, file: Any, **options: Any) -> None:
         """Do what `Figure.savefig` does, or save a blank picture in place of a PNG."""
         kind = options.get("format") or Path(file).suffix[1:]
