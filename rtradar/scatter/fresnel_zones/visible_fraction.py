@@ -7,7 +7,7 @@ On cells along the meridians of `rtradar.kernels.scatter.fresnel_zones`
 with dL exact in float64 for each pair of antennas, f the open fraction of a cell, and w a window
 that falls to 0 at the rim: without it the rim itself would diffract. Mitsuba decides whether an
 antenna sees a corner of a cell. Where it sees one end of a side and not the other, more rays bisect
-that side until the edge is known to 1 / 4096 of it. So V changes smoothly as an edge
+that side until the edge is known to 1 / 16384 of it. So V changes smoothly as an edge
 wanders over the zones, and is exactly 1 in full view and 0 behind.
 """
 
@@ -32,8 +32,9 @@ from rtradar.kernels.scatter.zone_edges import Edges, open_fractions
 from rtradar.system.threads import thread_map
 from rtradar.trace.body_tracer import BodyTracer
 
-BISECTIONS = 11
-"""Rays that find an edge on a side of a cell."""
+BISECTIONS = 13
+"""Rays that find an edge on a side of a cell. As an edge wanders in steps of 0.002 zones, second
+differences of V are 2e-4 with 11 rays, 6e-5 with 13, and would be 5e-6 with exact edges."""
 
 _AT_ONCE = 64
 """Zones whose rays are traced together; so many take some 20 MB."""
