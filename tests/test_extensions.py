@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import re
@@ -20,6 +21,7 @@ from rtradar.motion.formats import READERS
 from rtradar.process import DETECTORS, build_detector
 from rtradar.radar import PRESETS
 from rtradar.scatter import MODELS, build_model
+from rtradar.scene import Wall, material
 from rtradar.system.registry import Registry
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -302,6 +304,39 @@ def registered() -> Iterator[None]:
     yield
     for registry, known in zip(REGISTRIES, before, strict=True):
         registry._registered = known
+
+
+@pytest.mark.usefixtures("registered")
+def test_the_model_for_rooms_of_the_page_has_a_ghost_over_a_wall(
+    tmp_path: Path, here: Install
+) -> None:
+    page = (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")
+    code = re.search(r"^### In rooms$.*?^```python\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    assert code is not None
+    here(tmp_path / "site", {"outside_room.py": code[1]})
+    rt.register_model("room-points", importlib.import_module("outside_room").RoomPoints)
+    body = rt.Body.from_motion(rt.synthetic_motion("walk", seed=0, duration_s=0.2))
+    wall = Wall(
+        name="left",
+        corner_m=(-10.0, 3.0, -5.0),
+        edge_u_m=(20.0, 0.0, 0.0),
+        edge_v_m=(0.0, 0.0, 10.0),
+        material=material("perfect-conductor"),
+        thickness_m=0.1,
+    )
+    alone, inside = (
+        build_model("room-points", rt.Radar(), body, scene=scene).echoes(np.arange(2))
+        for scene in (None, rt.Scene(walls=(wall,)))
+    )
+    parts = len(body.part_names)
+    # Direct, and over the wall on the way out or on the way back.
+    assert inside.length.shape[2] == 3 * parts
+    np.testing.assert_array_equal(inside.length[..., :parts], alone.length)
+    np.testing.assert_allclose(
+        np.abs(inside.amplitude[0, ..., :parts]), np.abs(alone.amplitude[0]), rtol=1e-6
+    )
+    assert (inside.length[..., parts : 2 * parts] > alone.length).all()
+    assert (np.abs(inside.amplitude[..., parts:]) > 0).all()
 
 
 @pytest.mark.usefixtures("registered")
