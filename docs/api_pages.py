@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import ast
 import inspect
 from dataclasses import is_dataclass
 from importlib import import_module
+from itertools import pairwise
 from pathlib import Path
 from types import ModuleType
 
@@ -47,6 +49,24 @@ def public(package: str) -> dict[str, object]:
     return {name: thing for name, thing in found.items() if not isinstance(thing, ModuleType)}
 
 
+def text_of(module: str, name: str) -> str:
+    """Text below a constant in the module that sets it, however often it is imported from there."""
+    tree = ast.parse(inspect.getsource(import_module(module)))
+    for node, after in pairwise([*tree.body, ast.Pass()]):
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            names = {getattr(leaf, "id", "") for target in targets for leaf in ast.walk(target)}
+            text = after.value if isinstance(after, ast.Expr) else None
+            if name in names and isinstance(text, ast.Constant) and isinstance(text.value, str):
+                return inspect.cleandoc(text.value)
+    for source in ast.walk(tree):
+        if isinstance(source, ast.ImportFrom) and source.module:
+            for one in source.names:
+                if (one.asname or one.name) == name:
+                    return text_of(source.module, one.name)
+    return ""
+
+
 def page(package: str) -> str:
     """The page of a package; what stands on the first page is not told again."""
     first = {id(thing) for thing in public("rtradar").values()} if package != "rtradar" else set()
@@ -76,13 +96,16 @@ def page(package: str) -> str:
             if inspect.isroutine(thing)
             else "data"
         )
-        lines.append(f".. auto{kind}:: {package}.{name}")
+        if kind == "data":
+            # Sphinx would show what Python says of the type, such as int or tuple.
+            lines += [f".. py:data:: {package}.{name}", ""]
+            lines += [f"   {line}".rstrip() for line in text_of(package, name).splitlines()]
+        else:
+            lines.append(f".. auto{kind}:: {package}.{name}")
         if kind == "class":
             lines.append("   :members:")
             if any(is_dataclass(base) for base in getattr(thing, "__bases__", ())):
                 lines.append("   :inherited-members:")
-        if kind == "data":
-            lines.append("   :no-value:")
         lines.append("")
     return "\n".join(lines)
 

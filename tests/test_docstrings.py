@@ -48,6 +48,13 @@ def members(thing: type) -> dict[str, Any]:
 THINGS = dict(public())
 
 
+def test_every_public_constant_has_a_text_on_its_page() -> None:
+    for package in PAGES["PACKAGES"]:
+        for name, thing in PAGES["public"](package).items():
+            if not (inspect.isclass(thing) or inspect.isroutine(thing)):
+                assert PAGES["text_of"](package, name), f"{package}.{name}"
+
+
 def section(text: str, title: str) -> str:
     """Lines below a title of numpydoc."""
     found = re.search(rf"^{title}\n-+\n(.*?)(?=^\w[\w ]*\n-+\n|\Z)", text, re.MULTILINE | re.DOTALL)

@@ -45,6 +45,7 @@ from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
 
 CLUTTER_REMOVALS = ("none", "mean", "exponential", "mti")
+"""Names of the methods of `clutter_removal`."""
 
 _TIME_CONSTANT_S = 1.0
 _PULSES = 2

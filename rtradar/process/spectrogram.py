@@ -30,7 +30,7 @@ from rtradar.process.window_functions import HANN, WindowFunctions, weights
 from rtradar.radar import Radar
 
 WINDOW_CYCLES, OVERLAP = 128, 0.95
-"""Window and overlap of the paper's spectrograms (section 3.2.3)."""
+"""Cycles in a frame of the paper's spectrograms, and the overlap of frames (section 3.2.3)."""
 
 
 def window_cycles(radar: Radar) -> int:
