@@ -20,7 +20,7 @@ import multiprocessing
 import numpy as np
 from rtradar.cli import main
 from rtradar.kernels.jit import check_cache, compiled, is_on_disk
-from rtradar.kernels.small_vectors import dot
+from rtradar.kernels.elementary import dot
 
 @compiled()
 def squared(vector):

@@ -11,9 +11,9 @@ from rtradar.bench.kernels import Call, filled, kernel_case
 # -- general ---------------------------------------------------------------------------------------
 
 
-@kernel_case("phasor.fill_phasors", "unit phasors of 100 000 phases", 1e-15)
+@kernel_case("elementary.fill_phasors", "unit phasors of 100 000 phases", 1e-15)
 def _phasors() -> tuple[Call, Call]:
-    from rtradar.kernels.phasor import fill_phasors, phasor_reference
+    from rtradar.kernels.elementary import fill_phasors, phasor_reference
 
     turns = np.random.default_rng(0).uniform(-1e3, 1e3, 100_000)
     out = np.empty(len(turns), dtype=np.complex128)

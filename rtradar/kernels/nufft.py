@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.elementary import phasor
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.phasor import phasor
 from rtradar.kernels.tone_sum import Tones
 
 _POWERS = 3

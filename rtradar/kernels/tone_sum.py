@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.kernels.elementary import phasor
 from rtradar.kernels.jit import compiled, inlined, on_cache_lines
-from rtradar.kernels.phasor import phasor
 
 LANES = 32
 """Samples that are computed side by side."""

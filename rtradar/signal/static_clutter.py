@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
-from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.rooms import Shadow, add_fading
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache

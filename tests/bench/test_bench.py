@@ -269,10 +269,10 @@ def test_kernels_beside_their_references(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(
-        kernels, "CASES", {"phasor.fill_phasors": kernels.CASES["phasor.fill_phasors"]}
+        kernels, "CASES", {"elementary.fill_phasors": kernels.CASES["elementary.fill_phasors"]}
     )
     assert main(["bench", "--only", "kernels", "--json", str(tmp_path / "b.json")]) == 0
     (row,) = json.loads((tmp_path / "b.json").read_text())["kernels"]
     assert row["difference"] < 1e-15
     assert row["ratio"] == row["reference_s"] / row["kernel_s"]
-    assert "| `phasor.fill_phasors` | unit phasors" in capsys.readouterr().out
+    assert "| `elementary.fill_phasors` | unit phasors" in capsys.readouterr().out

@@ -330,12 +330,12 @@ def test_each_function_of_the_package_has_a_stamp() -> None:
     ("inlined", "by", "not_by"),
     [
         (
-            "rtradar.kernels.phasor.phasor",
+            "rtradar.kernels.elementary.phasor",
             "rtradar.kernels.nufft._spread_tones",
             "rtradar.kernels.gaussian_noise.add_noise",
         ),
         (
-            "rtradar.kernels.small_vectors.dot",
+            "rtradar.kernels.elementary.dot",
             "rtradar.kernels.scatter.fresnel_zones.zone_sums",
             "rtradar.kernels.scatter.specular_point.solve",
         ),

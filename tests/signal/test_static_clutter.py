@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.elementary import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.clutter.body_shadow import ClutterShadow
 from rtradar.scatter.clutter.static_clutter import Clutter

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.jit import compiled, inlined
 
 PLACES = 8

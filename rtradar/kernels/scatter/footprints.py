@@ -9,8 +9,8 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
+from rtradar.kernels.elementary import phasor
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.phasor import phasor
 from rtradar.kernels.scatter.triangles import mean_of_phasor
 
 _STEEP = 1e-9

@@ -19,10 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 
-from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.elementary import (
+    apply,
+    apply_transposed,
+    dot,
+    hermite_weights,
+    normalize,
+    phasor,
+    subtract,
+)
 from rtradar.kernels.jit import compiled, inlined
-from rtradar.kernels.phasor import phasor
-from rtradar.kernels.small_vectors import apply, apply_transposed, dot, normalize, subtract
 
 RIM = 7.0
 """Largest sqrt(k dL) of the zones that are added up: 7.8 wavelengths of excess path."""

@@ -9,7 +9,7 @@ import numpy as np
 from numba import prange
 from numpy.typing import NDArray
 
-from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.jit import compiled, inlined
 
 Array = NDArray[np.float64]

@@ -14,8 +14,8 @@ import math
 
 import numpy as np
 
+from rtradar.kernels.elementary import fast_phasor
 from rtradar.kernels.jit import inlined
-from rtradar.kernels.phasor import fast_phasor
 
 FAST = {"reassoc", "contract", "nsz", "arcp"}
 """Sums may be reordered; NaN and infinity keep their meaning."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.elementary import smoothstep
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights

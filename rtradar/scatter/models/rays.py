@@ -13,7 +13,7 @@ from rtradar.body import Body
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
-from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes

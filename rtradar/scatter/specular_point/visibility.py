@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body import Body
-from rtradar.kernels.blends import smoothstep
+from rtradar.kernels.elementary import smoothstep
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
 from rtradar.scatter.common.poses import ChirpPoses, chirp_poses

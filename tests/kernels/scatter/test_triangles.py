@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from rtradar.kernels.phasor import fast_phasor
+from rtradar.kernels.elementary import fast_phasor
 from rtradar.kernels.scatter.triangles import (
     SERIES,
     _sine,

@@ -15,7 +15,7 @@ import rtradar as rt
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.blends import hermite_weights
+from rtradar.kernels.elementary import hermite_weights
 from rtradar.kernels.scatter.envelope import PLACES, stretch
 from rtradar.scatter.common.interpolation import array_nodes, spread_nodes
 from rtradar.scatter.facets.envelope import TOGETHER, Envelope, Sample

@@ -1,4 +1,7 @@
-"""The complex exponential of a phase, in vector lanes."""
+"""What many kernels need: the phasor of an angle, blends of keyframes, and vectors of three.
+
+NumPy's functions for such small vectors take seconds to compile.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,47 @@ import math
 import numpy as np
 
 from rtradar.kernels.jit import compiled, inlined
+
+
+@inlined()
+def dot(a, b):
+    """Product of two vectors."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined()
+def apply(matrix, vector, out):
+    """Fill ``out`` with the matrix times the vector."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        out[i] = matrix[i, 0] * x + matrix[i, 1] * y + matrix[i, 2] * z
+
+
+@inlined()
+def apply_transposed(matrix, vector, out):
+    """Fill ``out`` with the transpose of the matrix times the vector."""
+    x, y, z = vector[0], vector[1], vector[2]
+    for i in range(3):
+        out[i] = matrix[0, i] * x + matrix[1, i] * y + matrix[2, i] * z
+
+
+@inlined()
+def subtract(a, b, out):
+    """Fill ``out`` with a - b."""
+    for i in range(3):
+        out[i] = a[i] - b[i]
+
+
+@inlined()
+def normalize(vector):
+    """Make a unit vector of it; its length is returned."""
+    length = math.sqrt(dot(vector, vector))
+    for i in range(3):
+        vector[i] /= length
+    return length
+
+
+# -- phasors --
 
 
 @inlined(fastmath={"reassoc", "contract", "nsz", "arcp"})
@@ -56,3 +100,19 @@ def fill_phasors(turns, out):
 def phasor_reference(turns):
     """The same by NumPy."""
     return np.exp(2j * np.pi * (turns - np.rint(turns)))
+
+
+# -- blends of keyframes --
+
+
+@inlined()
+def smoothstep(fraction):
+    """Cubic from 0 to 1 that is level at both ends, at a fraction of the interval from 0 to 1."""
+    return fraction * fraction * (3 - 2 * fraction)
+
+
+@inlined()
+def hermite_weights(fraction, width):
+    """Weights of both values, then of both slopes, in the cubic through an interval of a width."""
+    x, y = fraction, 1 - fraction
+    return y * y * (1 + 2 * x), smoothstep(x), x * y * y * width, -x * x * y * width
