@@ -29,6 +29,13 @@ def test_growth_is_of_specular_or_of_the_last_model() -> None:
     assert Plan(fidelities=("analytic", "fresnel")).growing_fidelity == "fresnel"
 
 
+def test_a_quick_measurement_has_the_usual_model() -> None:
+    given = dict.fromkeys(("radar", "fidelity", "repeats", "duration_s", "only"))
+    plan = plan_of(**given, quick=True)  # type: ignore[arg-type]
+    assert plan.fidelities == ("analytic-paper", "analytic", "specular")
+    assert plan.growing_fidelity == "specular"
+
+
 def test_every_model_with_every_radar() -> None:
     plan = Plan(("paper-12ghz", "paper-77ghz"), ("analytic-paper", "specular"), duration_s=1.0)
     assert [(case.radar[6:8], case.fidelity) for case in model_cases(plan)] == [
