@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, TypedDict
 
 from rtradar.errors import InputError
+from rtradar.system.checks import check_order
 from rtradar.system.seeds import check_seed
 
 MAX_SNR_DB = 200.0
@@ -81,7 +82,7 @@ class RunSettings:
     body_material : {"perfect-conductor", "skin"}
         Material of the person's surface.
     order : int
-        Largest number of reflections at walls, floors and ceilings on the way of an echo.
+        Largest number of reflections at walls, floors and ceilings on the way of an echo, 0 to 3.
     keep_all : bool
         Whether paths, walls and furniture are kept even where they stay below the noise.
     save_if : bool
@@ -97,7 +98,7 @@ class RunSettings:
     Raises
     ------
     InputError
-        If ``snr_db``, ``noise_power_m2``, ``pfa`` or ``seed`` is no such value.
+        If ``snr_db``, ``noise_power_m2``, ``pfa``, ``seed`` or ``order`` is no such value.
     """
 
     fidelity: str = "specular"
@@ -127,6 +128,7 @@ class RunSettings:
                 f"pfa = {self.pfa}; a false-alarm rate lies between 0 and 1, both excluded (--pfa)"
             )
         check_seed("", self.seed)
+        check_order(self.order)
         if self.snr_db == "physical" and not self.spreading:
             raise InputError(
                 "snr_db = physical needs the loss with distance; "

@@ -87,6 +87,15 @@ def check_text(where: str, key: str, value: object) -> str:
     raise InputError(f"{where}: {key} = {brief(value)}; it must be a string of one line, not empty")
 
 
+def check_order(order: object) -> None:
+    """Refuse what is no number of reflections at walls on a path."""
+    whole = isinstance(order, int | np.integer) and not isinstance(order, bool)
+    if not whole or order not in range(4):
+        raise InputError(
+            f"order = {brief(order)} of reflections at walls; it must be a whole number from 0 to 3"
+        )
+
+
 def array_to_fill(
     where: str, out: NDArray[Any] | None, shape: tuple[int, ...], dtype: DTypeLike
 ) -> NDArray[Any]:

@@ -17,6 +17,7 @@ import rtradar as rt
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError, ValidityWarning
 from rtradar.pipeline import clouds_of
+from rtradar.scatter import MODELS
 
 RADAR = rt.Radar(
     name="small",
@@ -170,7 +171,10 @@ def test_scalars_of_numpy_do_as_well(tmp_path: Path) -> None:
         ({"noise_power_m2": math.nan}, "noise_power_m2 = nan"),
         ({"pfa": 1.0}, "pfa = 1"),
         ({"seed": -1}, "seed = -1"),
-        ({"fidelity": "perfect"}, "allowed: analytic-paper, analytic, specular"),
+        ({"order": -3}, "order = -3 of reflections at walls; it must be a whole number from 0"),
+        ({"order": 4}, "order = 4"),
+        ({"order": True}, "order = True"),
+        ({"fidelity": "perfect"}, f"allowed: {', '.join(MODELS)}$"),
         ({"duration_s": 0.01}, "no whole frame"),
         ({"start_s": 5.0}, "5"),
         ({"variant": "metal", "fidelity": "specular"}, "allowed: auto, cpu, llvm, scalar, cuda"),

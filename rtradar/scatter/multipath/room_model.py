@@ -32,6 +32,7 @@ from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summa
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_interaction import WallResponse
 from rtradar.scene import Scene
+from rtradar.system.checks import check_order
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 from rtradar.trace.room_tracer import RoomTracer
@@ -115,10 +116,7 @@ class RoomModel:
                 f"scene '{scene.name}': spreading may be off in free space only; leave "
                 "--no-spreading out"
             )
-        if isinstance(order, bool) or order not in range(4):
-            raise InputError(
-                f"order = {order!r} of reflections at walls; it must be a whole number from 0 to 3"
-            )
+        check_order(order)
         self.person, self._radar, self._body = model, radar, body
         self.variant = model.variant
         series = room_series(
