@@ -337,6 +337,12 @@ def test_the_model_for_rooms_of_the_page_has_a_ghost_over_a_wall(
     )
     assert (inside.length[..., parts : 2 * parts] > alone.length).all()
     assert (np.abs(inside.amplitude[..., parts:]) > 0).all()
+    (tmp_path / "site" / "outside_model.py").write_text("import nowhere_to_be_found")
+    forget()
+    with pytest.raises(
+        rt.InputError, match=r"allowed in a room: analytic.*specular.*, room-points$"
+    ):
+        build_model("fresnel", rt.Radar(), body, scene=rt.Scene(walls=(wall,)))
 
 
 @pytest.mark.usefixtures("registered")

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import inspect
 import json
+from collections.abc import Iterable
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -11,7 +13,7 @@ from numpy.typing import NDArray
 
 from rtradar.body import Body
 from rtradar.echoes import Echoes
-from rtradar.errors import InputError
+from rtradar.errors import ExtensionError, InputError
 from rtradar.radar import Radar
 from rtradar.scatter.antenna_gain import is_shaped, through_antennas
 from rtradar.scatter.common.poses import EchoModel, account_of
@@ -113,7 +115,7 @@ def build_model(
 
 def _check_for_room(fidelity: str, radar: Radar, scene: Scene) -> None:
     if not getattr(MODELS.find(fidelity), "supports_rooms", False):
-        allowed = ", ".join(models_that("supports_rooms"))
+        allowed = ", ".join(models_that("supports_rooms", MODELS))
         raise InputError(f"fidelity '{fidelity}' knows no walls; allowed in a room: {allowed}")
     if is_shaped(radar.tx_antenna) or is_shaped(radar.rx_antenna):
         raise InputError(
@@ -123,9 +125,27 @@ def _check_for_room(fidelity: str, radar: Radar, scene: Scene) -> None:
         )
 
 
-def models_that(ability: str) -> list[str]:
-    """Names of the built-in models with an ability, such as ``supports_rooms``, cheapest first."""
-    return [name for name in MODELS.built_in if getattr(MODELS[name], ability, False)]
+def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:
+    """List the models with an ability, such as ``supports_rooms``.
+
+    Parameters
+    ----------
+    ability : str
+        Attribute of the models' classes, as in `BuiltInModel`.
+    names : iterable of str
+        Models among which to look; the built-in ones, cheapest first, if left out.
+
+    Returns
+    -------
+    list of str
+        Their names in the same order, without models of packages that cannot be loaded.
+    """
+    found = []
+    for name in names:
+        with suppress(ExtensionError), MODELS.guarded(name):
+            if getattr(MODELS[name], ability, False):
+                found.append(name)
+    return found
 
 
 def affordable_models(most: float) -> list[str]:

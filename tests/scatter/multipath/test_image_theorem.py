@@ -18,6 +18,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.echo_models import models_that
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images, wall_paths
 from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
@@ -483,7 +484,7 @@ def test_without_noise_only_what_is_never_seen_is_left_out(backend: Backend) -> 
         ({"spreading": False}, "spreading may be off in free space only"),
         ({"order": -1}, "order = -1"),
         ({"order": True}, "order = True"),
-        ({"fidelity": "rays"}, "allowed in a room: analytic, specular"),
+        ({"fidelity": "rays"}, f"allowed in a room: {', '.join(models_that('supports_rooms'))}$"),
         ({"material": "wood"}, "allowed: perfect-conductor, skin"),
     ],
 )
