@@ -1,10 +1,13 @@
-"""The README repeats figures of the pages; each of them is one that a script wrote there."""
+"""Pages repeat figures of each other and of the code; they must be the same everywhere."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 import pytest
+
+from rtradar.cli.captures import _FLAGS
+from rtradar.settings import RunSettings
 
 ROOT = Path(__file__).parents[1]
 
@@ -42,3 +45,18 @@ def test_costs_and_errors_of_the_readme_are_those_of_the_page_of_levels(level: l
         if row[0] == level[0]
     )
     assert (level[4] if error != "-" else "-", level[3]) == (error, cost)
+
+
+def test_defaults_of_the_page_for_beginners_are_those_of_the_settings() -> None:
+    compared = 0
+    for options, _, shown in rows("docs/start.md", "| option | meaning | default"):
+        for name, (flag, _) in _FLAGS.items():
+            default, text = getattr(RunSettings(), name), shown.strip("`")
+            if f"`{flag}" not in options or name in ("start_s", "duration_s"):
+                continue
+            compared += 1
+            if isinstance(default, bool):
+                assert text == ("on" if default else "off"), flag
+            else:
+                assert type(default)(text) == default, flag
+    assert compared > 10

@@ -265,7 +265,7 @@ def _run_settings(table: Table) -> RunSettings:
         if not isinstance(given.get(key, True), bool):
             raise InputError(f"{key} = {brief(given[key])}; allowed: true, false")
     for key in _WINDOWS:
-        value = given.get(key, "hann")
+        value = given.get(key, "")
         if not isinstance(value[0] if isinstance(value, list) and value else value, str):
             raise InputError(
                 f"{key} = {brief(value)}; it must be a name, or a list of a name and a number"

@@ -17,8 +17,9 @@ from rtradar.motion import Motion
 from rtradar.pipeline.pictures import busiest_frame, removed, thinned
 from rtradar.pipeline.run import Result, simulate
 from rtradar.pipeline.writer import files_of_runs
+from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, FieldUnit, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.pages.comparison import (
     draw_maps,
     draw_part_power,
@@ -247,11 +248,14 @@ def _draw(
         frame_title = f"{title}{cleaned}, window at {maps['time'][frame]:.2f} s"
         slow_title = title + removed(maps["spectrogram"])
     by_range = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
+    # One echo is spread over as many range bins.
+    windows = WindowFunctions(range=parameters["range_window"])
+    range_bins = noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     levels, spectrograms = {}, {}
     for name, result in results.items():
         with h5py.File(result.out / "maps.h5") as maps:
             levels[name] = by_range.level(maps["range_doppler"][frame] / radar.n_channels)
-            spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / HANN_BINS
+            spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / range_bins
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
     draw_maps(next(paths), levels, by_range.label("mean of channels"), across, up, frame_title)
     unit = unit_of(spectrograms.values())

@@ -43,6 +43,7 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
     """
     drawn: dict[str, Path] = {}
     radar, title, spreading = capture.radar, capture.title, capture.settings.spreading
+    options: Any = {"spreading": spreading, "window_functions": capture.processing.window_functions}
 
     def to(name: str, file: str) -> Path:
         drawn[name] = folder / file
@@ -58,7 +59,7 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
             velocity = maps["spectrogram_velocity"][:]
             heading = title + removed(maps["spectrogram"])
             file = to("Spectrogram", "spectrogram.png")
-            draw_spectrogram(file, power, times, velocity, radar, heading, spreading=spreading)
+            draw_spectrogram(file, power, times, velocity, radar, heading, **options)
         frame = busiest_frame(maps)
         cleaned = removed(maps["range_doppler"])
         heading = f"{title}, window at {float(maps['time'][frame]):.2f} s{cleaned}"
@@ -73,7 +74,7 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
         if angles:
             panels = " and ".join(f"range-{angle}" for angle in angles).capitalize()
             file = to(panels, "range_angle.png")
-            draw_range_angle(file, angles, radar, heading, spreading=spreading)
+            draw_range_angle(file, angles, radar, heading, **options)
         heading = title + cleaned
         draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, heading)
         if angles:
@@ -118,7 +119,10 @@ def _draw_room(folder: Path, capture: Capture, inside: Indoors, maps: Any) -> di
         drawn[name] = folder / "range_azimuth_walls.png"
         places = [(ghost.path, ghost.range_m, ghost.azimuth_rad) for ghost in found]
         power, azimuth = received("range_azimuth"), maps["azimuth"][:]
-        draw_range_azimuth_with_walls(drawn[name], power, azimuth, scene, radar, places, heading)
+        windows = capture.processing.window_functions
+        draw_range_azimuth_with_walls(
+            drawn[name], power, azimuth, scene, radar, places, heading, windows
+        )
     track = body.motion.at(np.linspace(0, body.duration_s, _TRACK_POINTS))[0][:, 0, :2]
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
     paths = {ghost.path: inside.model.course(ghost.path, middle) for ghost in found}

@@ -24,7 +24,7 @@ from rtradar.process import (
     measures_angle,
     power_map,
 )
-from rtradar.process.window_functions import HANN
+from rtradar.process.window_functions import DEFAULT_WINDOWS
 from rtradar.radar import Radar
 from rtradar.settings import RunSettings
 
@@ -64,7 +64,7 @@ class Processing:
     radar: Radar
     detect: Detector
     removal: ClutterRemoval
-    window_functions: WindowFunctions = HANN
+    window_functions: WindowFunctions = DEFAULT_WINDOWS
     seed: int = 0
     stages: Stages = field(default_factory=Stages)
 
@@ -185,7 +185,7 @@ def frame_angles(
     cube: NDArray[np.complexfloating],
     mask: NDArray[np.bool_],
     radar: Radar,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> AngleSpectra:
     """Return the angle spectra of the detected cells of one frame (cycle, tx, rx, range)."""
     rows, columns = np.nonzero(mask)

@@ -14,8 +14,10 @@ from numpy.typing import NDArray
 from rtradar.clouds.spatial import SpatialCloud
 from rtradar.errors import InputError
 from rtradar.pipeline.pictures import thinned
+from rtradar.process import WindowFunctions
+from rtradar.process.window_functions import noise_bandwidth_bins
 from rtradar.radar import Radar
-from rtradar.report.figures.canvas import HANN_BINS, FieldUnit, field_unit
+from rtradar.report.figures.canvas import FieldUnit, field_unit
 from rtradar.report.view.run_view import COLOURS, MOST_LEVEL, Levels, RunView, write_view
 from rtradar.report.view.snapshots import Snapshots, load_snapshots
 from rtradar.report.view.still import draw_still
@@ -126,7 +128,7 @@ def load_run_view(folder: Path) -> RunView:
             f"'{folder}' holds no run (there is no summary.json); give the folder that "
             "'rtradar run --out' named"
         )
-    summary, radar = _summary(folder / "summary.json")
+    summary, radar, windows = _summary(folder / "summary.json")
     parameters = summary["parameters"]
     spreading = parameters.get("spreading", True) is not False
     snapshots = load_snapshots(folder / "view.npz")
@@ -141,7 +143,7 @@ def load_run_view(folder: Path) -> RunView:
             if snapshots.window.min() < 0 or snapshots.window.max() >= len(maps["time"]):
                 raise InputError(f"'{folder}': view.npz and maps.h5 are not of one run; {_MEND}")
             range_doppler = _range_doppler(maps, snapshots, radar, spreading)
-            spectrogram = _spectrogram(maps, radar, spreading)
+            spectrogram = _spectrogram(maps, radar, spreading, windows)
             points = rdt["points"].reshape(-1, 3)
             rdt_power_db = _at_points(maps, points, radar, spreading)
     except InputError:
@@ -177,10 +179,13 @@ def load_run_view(folder: Path) -> RunView:
     )
 
 
-def _summary(path: Path) -> tuple[dict[str, Any], Radar]:
+def _summary(path: Path) -> tuple[dict[str, Any], Radar, WindowFunctions]:
     try:
         summary = read_json(path)
-        return summary, Radar(**summary["parameters"]["radar"])
+        parameters = summary["parameters"]
+        # Folders of older versions name none; theirs were Hann windows.
+        names = (parameters.get(f"{axis}_window", "hann") for axis in ("range", "doppler"))
+        return summary, Radar(**parameters["radar"]), WindowFunctions(*names)
     except InputError as error:
         raise InputError(f"'{path}': {error}; {_MEND}") from None
     except _DAMAGE:
@@ -283,7 +288,7 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
     )
 
 
-def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
+def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFunctions) -> Levels:
     """Velocity up, time across."""
     velocity = maps["spectrogram_velocity"][:]
     up = (float(velocity[0]), float(velocity[1] - velocity[0]))
@@ -291,7 +296,8 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool) -> Levels:
         none = np.zeros((1, len(velocity), 0), dtype=np.uint8)
         return Levels(level=none, low_db=0.0, step_db=1.0, label="", across=(0.0, 1.0), up=up)
     found, times = thinned(maps, "spectrogram", "spectrogram_time")
-    power = _powers(found.T) / HANN_BINS
+    # One echo is spread over as many range bins.
+    power = _powers(found.T) / noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
     level_db = unit.level(power)
     low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))

@@ -37,7 +37,7 @@ from rtradar.process.steering import (
     steering_everywhere,
     virtual_lines,
 )
-from rtradar.process.window_functions import HANN, WindowFunctions
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions
 from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
 
@@ -190,7 +190,7 @@ def angle(
     velocity: float,
     focus: bool = True,
     *,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> tuple[float, float]:
     """Direction of the strongest echo in one range-Doppler cell (:eq:`direction`).
 

@@ -38,7 +38,7 @@ from scipy.linalg import eig_banded
 from rtradar.errors import InputError
 from rtradar.process.cfar_thresholds import check_looks, check_pfa, multiplier
 from rtradar.process.clutter import check_time_constant
-from rtradar.process.window_functions import HANN, WindowFunctions, weights
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 
 _FORGOTTEN = 1e-4
@@ -82,7 +82,7 @@ class ClutterMap:
         pfa: float = 1e-6,
         looks: int = 1,
         scale: float | None = None,
-        window_functions: WindowFunctions = HANN,
+        window_functions: WindowFunctions = DEFAULT_WINDOWS,
     ) -> None:
         check_pfa(pfa)
         check_looks(looks)

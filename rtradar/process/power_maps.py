@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 from rtradar.errors import InputError
 from rtradar.kernels.prime_factor_dft import add_doppler_power, prime_factor_dft
 from rtradar.process.spectra import complex_kind
-from rtradar.process.window_functions import HANN, WindowFunctions, weights
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
 
@@ -39,7 +39,7 @@ def power_map(
     radar: Radar,
     *,
     channel: int | None = None,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> NDArray[np.floating]:
     """Range-Doppler power of one frame: squared magnitudes summed over channels, or of one channel.
 
@@ -129,7 +129,7 @@ def without_copies(
     band_power: NDArray[np.floating],
     radar: Radar,
     receivers: int,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> NDArray[np.floating]:
     """Power of all Tx together, each echo at its own Doppler only.
 

@@ -19,7 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
 from rtradar.process.steering import range_walk
-from rtradar.process.window_functions import HANN, WindowFunctions, weights
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 from rtradar.system.checks import array_to_fill
 from rtradar.system.threads import thread_map
@@ -53,7 +53,7 @@ class RangeDoppler:
 
 
 def range_doppler(
-    x: ArrayLike, radar: Radar, *, window_functions: WindowFunctions = HANN
+    x: ArrayLike, radar: Radar, *, window_functions: WindowFunctions = DEFAULT_WINDOWS
 ) -> RangeDoppler:
     """Range and Doppler spectra of IF samples (:eq:`range-doppler`), every channel by itself.
 
@@ -102,7 +102,7 @@ def range_spectrum(
     x: ArrayLike,
     radar: Radar,
     *,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
     out: NDArray[np.complex64] | None = None,
 ) -> NDArray[np.complex64]:
     """Range spectrum of each chirp, the part of the work that overlapping frames share.
@@ -171,7 +171,7 @@ def cell_spectra(
     range_bins: ArrayLike,
     velocity_bins: ArrayLike,
     *,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> NDArray[np.complexfloating]:
     """Complex values of chosen cells in every channel, with those of the range bins beside them.
 

@@ -26,7 +26,7 @@ from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.power_maps import without_copies
 from rtradar.process.spectra import complex_kind
-from rtradar.process.window_functions import HANN, WindowFunctions, weights
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 
 WINDOW_CYCLES, OVERLAP = 128, 0.95
@@ -78,7 +78,7 @@ def spectrogram(
     tx: int = 0,
     window: int = WINDOW_CYCLES,
     overlap: float = OVERLAP,
-    window_functions: WindowFunctions = HANN,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> Spectrogram:
     """Spectrogram of one virtual channel (:eq:`spectrogram`), summed over the given range bins.
 
@@ -171,7 +171,7 @@ class SlidingSpectrogram:
         window: int | None = None,
         overlap: float = OVERLAP,
         removal: ClutterRemoval | None = None,
-        window_functions: WindowFunctions = HANN,
+        window_functions: WindowFunctions = DEFAULT_WINDOWS,
     ) -> None:
         window = window_cycles(radar) if window is None else window
         if not 0 <= channel < radar.n_channels:

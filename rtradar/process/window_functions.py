@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
+from rtradar.settings import RunSettings
 
 WindowName = str | tuple[str, float]
 """Name of a window function, or its name and its parameter."""
@@ -48,8 +49,8 @@ class WindowFunctions:
         Where there is no such window function, or its parameter is missing or beyond its limits.
     """
 
-    range: WindowName = "hann"
-    doppler: WindowName = "hann"
+    range: WindowName = RunSettings.range_window
+    doppler: WindowName = RunSettings.doppler_window
 
     def __post_init__(self) -> None:
         for field in ("range", "doppler"):
@@ -76,10 +77,19 @@ def weights(window: WindowName, n: int) -> NDArray[np.float64]:
 
 
 def hann(n: int) -> NDArray[np.float64]:
-    """Periodic Hann window (sample,), the default, which needs no SciPy; one sample alone is 1."""
+    """Periodic Hann window (sample,), which needs no SciPy; one sample alone is 1."""
     if n == 1:
         return np.ones(1)
     return 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(n) / n)
+
+
+def noise_bandwidth_bins(window: WindowName, n: int) -> float:
+    """Compute the equivalent noise bandwidth of a window function of n samples [bins].
+
+    The power of a tone, summed over all bins of its spectrum, is so many times its power in the
+    bin that it is in the middle of: n sum(w^2) / sum(w)^2, which is 1.5 for ``hann``.
+    """
+    return n * float(np.sum(weights(window, n) ** 2))
 
 
 @lru_cache(maxsize=64)
@@ -105,5 +115,5 @@ def _checked(window: Any, name: str) -> WindowName:
     raise InputError(f"{name} {window!r} is unknown; allowed: {', '.join(NAMES)}, {with_parameter}")
 
 
-HANN = WindowFunctions()
-"""The default of everything that transforms."""
+DEFAULT_WINDOWS = WindowFunctions()
+"""The default of everything that transforms: the window functions of `RunSettings`."""

@@ -160,12 +160,31 @@ def test_the_command_writes_what_it_is_asked_for(
     assert opened == [(folder / "view.html").as_uri()]
 
 
+@pytest.mark.parametrize(("window", "wider_db"), [("hann", 0.0), ("flattop", 4.002)])
+def test_a_spectrogram_is_divided_by_the_bandwidth_of_the_runs_window(
+    made: Path, tmp_path: Path, window: str, wider_db: float
+) -> None:
+    """3.7702 bins of ``flattop``, 1.5 of ``hann``, which a folder that names none has."""
+    low_db = []
+    for named in ({}, {"range_window": window}):
+        folder = tmp_path / f"run{len(named)}"
+        shutil.copytree(made, folder, ignore=shutil.ignore_patterns("*.png", "*.html"))
+        summary = json.loads((folder / "summary.json").read_text())
+        del summary["parameters"]["range_window"]
+        # The level is absolute where there is no loss with distance.
+        summary["parameters"] |= {"spreading": False, **named}
+        (folder / "summary.json").write_text(json.dumps(summary))
+        low_db.append(load_run_view(folder).spectrogram.low_db)
+    assert low_db[0] - low_db[1] == pytest.approx(wider_db, abs=1e-3)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
         ("summary.json", None, "holds no run"),
         ("summary.json", "{", "is damaged"),
         ("summary.json", '{"parameters": {"radar": {"tx_y": -1}}}', "tx_y = -1"),
+        ("summary.json", '{"parameters": {"radar": {}, "range_window": 3}}', "range window 3"),
         ("view.npz", None, "is not there"),
         ("maps.h5", None, "No such file"),
         ("maps.h5", "text", "is damaged"),

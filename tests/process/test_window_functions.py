@@ -26,7 +26,7 @@ from rtradar.process import (
     spectrogram,
 )
 from rtradar.process.steering import range_walk
-from rtradar.process.window_functions import NAMES, WindowName, weights
+from rtradar.process.window_functions import NAMES, WindowName, noise_bandwidth_bins, weights
 from rtradar.radar import Radar
 
 CYCLES = 40
@@ -220,6 +220,14 @@ def test_half_width_of_the_main_lobe(name: WindowName, bins: int) -> None:
     """Sums of k cosines have their first null k bins from the middle."""
     assert WindowFunctions(doppler=name).main_lobe_bins == (bins, 2)
     assert WindowFunctions(range=name).main_lobe_bins == (2, bins)
+
+
+@pytest.mark.parametrize(
+    ("name", "bins"), [("boxcar", 1.0), ("hann", 1.5), ("blackman", 1.7268), ("flattop", 3.7702)]
+)
+def test_noise_bandwidth(name: WindowName, bins: float) -> None:
+    """Of a sum of cosines with coefficients a: 1 + sum(a_k^2, k > 0) / (2 a_0^2)."""
+    assert noise_bandwidth_bins(name, 64) == pytest.approx(bins, abs=5e-5)
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
-from rtradar.process.window_functions import HANN, WindowFunctions, weights
+from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 
 
@@ -109,7 +109,10 @@ def target_cells(power: ArrayLike, noise_power: float, margin_db: float) -> NDAr
 
 
 def cell_noise_power(
-    noise_power: float, radar: Radar, looks: int = 1, window_functions: WindowFunctions = HANN
+    noise_power: float,
+    radar: Radar,
+    looks: int = 1,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> float:
     """Mean noise power of a cell of `power_map`.
 

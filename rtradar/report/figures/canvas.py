@@ -36,9 +36,6 @@ from rtradar.radar import Radar
 VELOCITY_LABEL = "Velocity [m/s] (positive: receding)"
 """Label of every velocity axis."""
 
-HANN_BINS = 1.5
-"""Noise bandwidth of a Hann window [bins]; a sum over bins divided by it is the echo's power."""
-
 _QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power"}
 
 

@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.process import measured_angles
+from rtradar.process import WindowFunctions, measured_angles
+from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures import canvas
-from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, draw_levels, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, field_unit
 
 
 def draw_range_time(
@@ -100,6 +101,7 @@ def draw_spectrogram(
     title: str,
     *,
     spreading: bool = True,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> None:
     """Draw a spectrogram, time across and velocity up.
 
@@ -115,12 +117,15 @@ def draw_spectrogram(
         Radar that received the power, which decides its unit.
     path, title, spreading
         Output file, heading, and whether there is spreading loss: see `draw_range_time`.
+    window_functions : WindowFunctions
+        Window functions of the transforms that gave the power.
     """
     figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
-    unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()) / HANN_BINS)
-    values = unit.level(power / HANN_BINS)  # one echo is spread over as many range bins
-    image = draw_levels(axes, values.T, time, velocity)
+    # One echo is spread over as many range bins.
+    power = power / noise_bandwidth_bins(window_functions.range, radar.samples_per_chirp)
+    unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
+    image = draw_levels(axes, unit.level(power).T, time, velocity)
     axes.set(xlabel="Time [s]", ylabel=VELOCITY_LABEL, title=title)
     figure.colorbar(image, label=unit.label("one channel"))
     canvas.save_figure(figure, path)
@@ -133,6 +138,7 @@ def draw_range_angle(
     title: str,
     *,
     spreading: bool = True,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> None:
     """Draw power over range and angle, with a panel for each angle.
 
@@ -144,12 +150,16 @@ def draw_range_angle(
         Radar whose ranges are the axis.
     path, title, spreading
         Output file, heading, and whether there is spreading loss: see `draw_range_time`.
+    window_functions : WindowFunctions
+        Window functions of the transforms that gave the power.
     """
     figure = canvas.new_figure(1 + 5 * len(maps), 4.5)
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
     unit = field_unit(radar, spreading=spreading, range_m=radar.range_m[:, None])
+    # One echo is spread over as many velocities.
+    velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
     for axes, (name, (power, angles)) in zip(panels, maps.items(), strict=True):
-        values = unit.level(power / HANN_BINS)  # one echo is spread over as many velocities
+        values = unit.level(power / velocities)
         # Cells that were not detected are zero, which has no decibels.
         limits = canvas.colour_limits(values, 40)
         image = draw_levels(axes, values, np.degrees(angles), radar.range_m, limits)

@@ -12,9 +12,11 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from numpy.typing import NDArray
 
+from rtradar.process import WindowFunctions
+from rtradar.process.window_functions import DEFAULT_WINDOWS, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures import canvas
-from rtradar.report.figures.canvas import HANN_BINS, VELOCITY_LABEL, draw_levels, field_unit
+from rtradar.report.figures.canvas import VELOCITY_LABEL, draw_levels, field_unit
 from rtradar.report.figures.maps import angle_label
 from rtradar.scene import Scene
 
@@ -176,6 +178,7 @@ def draw_range_azimuth_with_walls(
     radar: Radar,
     ghosts: Sequence[tuple[str, float, float]],
     title: str,
+    window_functions: WindowFunctions = DEFAULT_WINDOWS,
 ) -> None:
     """Draw power over azimuth and range, with upright walls where they are.
 
@@ -193,11 +196,14 @@ def draw_range_azimuth_with_walls(
         Path over walls, range [m] and azimuth [rad] of each ghost.
     path, title
         Output file and heading: see `draw_range_time`.
+    window_functions : WindowFunctions
+        Window functions of the transforms that gave the power.
     """
     figure = canvas.new_figure(8, 5.5)
     axes = figure.subplots()
     unit = field_unit(radar, range_m=radar.range_m[:, None])
-    values = unit.level(power / HANN_BINS)
+    velocities = noise_bandwidth_bins(window_functions.doppler, radar.cycles_per_frame)
+    values = unit.level(power / velocities)  # one echo is spread over as many velocities
     limits = canvas.colour_limits(values, 50)  # cells that were not detected have no decibels
     left, right = canvas.bin_edges(np.degrees(azimuth))
     image = draw_levels(axes, values, np.degrees(azimuth), radar.range_m, limits)
