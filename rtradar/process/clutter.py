@@ -283,7 +283,7 @@ def clutter_removal(
         )
     if method != "none" and radar.multiplexing == "ddm":
         raise InputError(
-            f"clutter removal '{method}': under multiplexing = 'ddm' what stands still has a "
+            f"clutter removal '{method}': under multiplexing = 'ddm' what does not move has a "
             "Doppler of its own for each Tx, which this would leave in; choose 'none', or another "
             "multiplexing"
         )

@@ -166,7 +166,7 @@ def tables_at(key: str, table: Table) -> list[tuple[str, Table]]:
             f"{key} = {brief(value)}; it must be a list of tables: [[{key}]] once for each"
         )
     if len(value) > _MAX_TABLES:
-        raise InputError(f"[[{key}]] stands there {len(value)} times; {_MAX_TABLES} are allowed")
+        raise InputError(f"[[{key}]] is there {len(value)} times; {_MAX_TABLES} are allowed")
     return [(f"[[{key}]] number {number} ", piece) for number, piece in enumerate(value, start=1)]
 
 

@@ -178,10 +178,10 @@ def check_whole(folder: Path, listing: str = "summary.json") -> None:
     """Raise InputError if the list of a folder says that a killed run left files of two runs."""
     try:
         with _Directory.at(folder) as place:
-            told = _read_json(place, listing)
+            content = _read_json(place, listing)
     except OSError:
         return
-    if isinstance(told, dict) and isinstance(rest := told.get("unfinished"), str):
+    if isinstance(content, dict) and isinstance(rest := content.get("unfinished"), str):
         raise InputError(
             f"'{folder}' holds files of two runs, for the second was killed as it moved its files "
             f"there; run it again into that folder, or move what is left in '{rest[:40]}' by hand"
@@ -227,14 +227,14 @@ def _entries(names: Iterable[str]) -> list[str]:
 
 def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
     """Return ``files`` and perhaps ``unfinished`` of the list of a folder; empty if not ours."""
-    told = _read_json(directory, kind.listing)
+    content = _read_json(directory, kind.listing)
     if (
-        not isinstance(told, dict)
-        or not isinstance(files := told.get("files"), list)
+        not isinstance(content, dict)
+        or not isinstance(files := content.get("files"), list)
         or kind.listing not in files
     ):
         return {}
-    unfinished = told.get("unfinished")
+    unfinished = content.get("unfinished")
     found: dict[str, Any] = {"files": frozenset(name for name in files if isinstance(name, str))}
     return found | (
         {"unfinished": unfinished}
@@ -524,9 +524,9 @@ def _disk_error(error: BaseException) -> str:
     if (
         number is None
         and isinstance(error, OSError | RuntimeError)
-        and (told := _HDF5_ERRNO.search(str(error)))
+        and (match := _HDF5_ERRNO.search(str(error)))
     ):
-        number = int(told[1])
+        number = int(match[1])
     return os.strerror(number) if number is not None and number in DISK_ERRORS else ""
 
 

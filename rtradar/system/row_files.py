@@ -90,7 +90,7 @@ class FileBackedRows:
 
 
 def _close(file: IO[bytes]) -> None:
-    with suppress(OSError):  # on a full disk, which was told already
+    with suppress(OSError):  # on a full disk, which was reported already
         file.close()
 
 

@@ -49,7 +49,7 @@ class RoomTracer:
             self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
 
     def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
-        """Whether furniture stands between two points.
+        """Whether furniture is between two points.
 
         Parameters
         ----------

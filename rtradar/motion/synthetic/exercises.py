@@ -243,7 +243,7 @@ def jumping_jack(duration_s: float, subject: Subject) -> PosesAt:
 def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
     height, amplitude = subject.height_m, subject.amplitude
     hop_s = HOP_S / subject.tempo
-    # A jumper stands still before the first hop of a set and after the last: further sets do not
+    # A jumper does not move before the first hop of a set and after the last: further sets do not
     # matter.
     sets = [one for one in all_sets if one[0].begin - hop_s < t[-1] and one[-1].end + hop_s > t[0]]
     hops = [hop for hops in sets for hop in hops]

@@ -104,8 +104,8 @@ def _probe(variant: str, library: Library | None) -> tuple[ProbeResult, int]:
     for line in done.stdout.splitlines():
         if line.startswith("{"):
             said |= json.loads(line)
-    told = said.get("llvm_version", [-1])
-    version = ".".join(map(str, told)) if told[0] > 0 else (library.version if library else None)
+    found = said.get("llvm_version", [-1])
+    version = ".".join(map(str, found)) if found[0] > 0 else (library.version if library else None)
     if done.returncode == 0 and said.get("works"):
         return ProbeResult("good", version), 0
     return ProbeResult(_what_went_wrong(done, said), version), done.returncode
@@ -142,7 +142,7 @@ def cache_dir() -> Path:
 
 
 def _key(variant: str, library: Library | None) -> str | None:
-    """All that an answer depends on; None where that cannot be told."""
+    """All that an answer depends on; None where that is unknown."""
     try:
         versions = [f"{name} {importlib.metadata.version(name)}" for name in ("mitsuba", "drjit")]
         about = [] if library is None else [library.path, str(os.stat(library.path).st_mtime_ns)]
