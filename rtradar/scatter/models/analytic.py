@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Literal
 
 import numpy as np
@@ -14,12 +15,12 @@ from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.rcs import ellipsoid
 from rtradar.scatter.common.polarization import Surface
-from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, chirp_poses, one_echo_a_part
+from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
 from rtradar.scatter.target import sum_of_echoes, target_geometry
 
 
 def far_field_echo(
-    at: Geometry | ChirpPoses, *, spreading: bool = True
+    at: Geometry, *, spreading: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Echo of each ellipsoid by its far-field cross-section along the bisector of both antennas.
 
@@ -27,7 +28,7 @@ def far_field_echo(
 
     Parameters
     ----------
-    at : Geometry or ChirpPoses
+    at : Geometry
         Antennas and ellipsoids, chirp by chirp.
     spreading : bool
         Whether the amplitude is divided by R1 R2, normalised to 1 m.
@@ -52,7 +53,7 @@ def far_field_echo(
 
 
 def plane_wave_echo(
-    radar: Radar, at: Geometry | ChirpPoses, *, spreading: bool = True
+    radar: Radar, at: Geometry, *, spreading: bool = True
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Echo of each ellipsoid as the paper has it (eqs 8 to 11).
 
@@ -75,8 +76,11 @@ def plane_wave_echo(
     return 2 * distance[:, None] - lead, np.broadcast_to(amplitude[:, None], lead.shape)
 
 
-class Analytic(BuiltInModel):
-    """`analytic`: the specular range to each antenna, and the cross-section of each ellipsoid.
+class FormulaModel(BuiltInModel, ABC):
+    """An echo model that is one formula for a conductor, `conductor_echo`, without occlusion.
+
+    Its echoes in free space follow from the formula, and in rooms the direct echoes and those over
+    walls.
 
     Parameters
     ----------
@@ -92,21 +96,7 @@ class Analytic(BuiltInModel):
     traces = False
     supports_rooms = True
     relative_cost = 1.0
-
-    @staticmethod
-    def scattering(
-        target: Ellipsoids,
-        tx: NDArray[np.float64],
-        rx: NDArray[np.float64],
-        frequency: NDArray[np.float64],
-        polarization: Literal["v", "h"],
-    ) -> NDArray[np.complex128]:
-        """Scattering length of one target, alike in both polarisations."""
-        at = target_geometry(target, tx, rx)
-        return sum_of_echoes(*far_field_echo(at), at, frequency)
-
     tracer = None
-    image_echo = staticmethod(far_field_echo)
 
     def __init__(
         self,
@@ -120,28 +110,57 @@ class Analytic(BuiltInModel):
         self.surface = Surface(material, radar)
         self.variant: str | None = None
 
+    @abstractmethod
+    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
+
+        Parameters
+        ----------
+        at : Geometry
+            Antennas and ellipsoids, chirp by chirp. In rooms the antennas may be images of those of
+            the radar over walls, and the ellipsoids only some of the body's.
+
+        Returns
+        -------
+        length : (chirp, rx, part) float64
+            Length of the path from Tx to Rx [m].
+        amplitude : (chirp, rx, part) float64
+            Scattering length, over R1 R2 with ``spreading`` [m].
+        """
+
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        length, amplitude = self.conductor_echo(chirps, at)
+        length, amplitude = self.conductor_echo(Geometry.of(at))
         echo = self.surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
-    def conductor_echo(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes of a conductor; see `RoomReady`."""
+
+class Analytic(FormulaModel):
+    """`analytic`: the specular range to each antenna, and the cross-section of each ellipsoid."""
+
+    @staticmethod
+    def scattering(
+        target: Ellipsoids,
+        tx: NDArray[np.float64],
+        rx: NDArray[np.float64],
+        frequency: NDArray[np.float64],
+        polarization: Literal["v", "h"],
+    ) -> NDArray[np.complex128]:
+        """Scattering length of one target, alike in both polarisations."""
+        at = target_geometry(target, tx, rx)
+        return sum_of_echoes(*far_field_echo(at), at, frequency)
+
+    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Compute the echoes in the far field."""
         return far_field_echo(at, spreading=self.spreading)
 
 
-class AnalyticPaper(Analytic):
+class AnalyticPaper(FormulaModel):
     """`analytic-paper`: ranges of centres and plane waves over the array, as in the paper."""
 
     supports_rooms = False
-    scattering = None  # type: ignore[assignment]
 
-    def conductor_echo(
-        self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echoes as the paper has them."""
         return plane_wave_echo(self._radar, at, spreading=self.spreading)

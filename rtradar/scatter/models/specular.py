@@ -34,7 +34,6 @@ class Specular(BuiltInModel):
     """
 
     supports_rooms = True
-    image_echo = None
     relative_cost = 1.5
 
     @staticmethod
@@ -75,14 +74,14 @@ class Specular(BuiltInModel):
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
         """Echoes at these chirps."""
         at = chirp_poses(self._radar, self._body, chirps)
-        length, amplitude = self.conductor_echo(chirps, at)
+        length, amplitude = self.specular_echo(chirps, at)
         echo = self.surface.echo(at, amplitude)
         return one_echo_a_part(at.tx_index, length, echo, self._radar.centre_frequency_hz)
 
-    def conductor_echo(
+    def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: NDArray[np.float64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Compute the echoes of a conductor; see `RoomReady`."""
+        """Compute the echoes of a conductor; see `HasSpecularPoints`."""
         weight, known = self.visibility.at(chirps)
         length, amplitude, _ = solve_specular_points(
             at,

@@ -23,8 +23,8 @@ from rtradar.scatter.multipath.wall_interaction import Passage, Passages, WallRe
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-ImageEcho = Callable[[Geometry], tuple[Array, Array]]
-"""Lengths and amplitudes (chirp, rx, part) of conductors before given antennas."""
+ConductorEcho = Callable[[Geometry], tuple[Array, Array]]
+"""Lengths and amplitudes (chirp, rx, part) of conductors before given antennas [m]."""
 
 Met = tuple[Passages, Passages]
 """Delaying passages through slabs on the way out, and on the way back seen from Rx."""
@@ -57,19 +57,19 @@ class LegImages:
         part: Indices,
         poses: ChirpPoses,
         near: Nearby,
-        image_echo: ImageEcho | None,
+        formula: ConductorEcho | None,
     ) -> tuple[Array, Array]:
         """Compute lengths and amplitudes (chirp, rx, echo) of conductors over perfect mirrors [m].
 
         Each echo has its ``path (echo,)`` and its body part. ``near`` are expected specular points;
-        echoes that are not wanted return nothing. The echo model's own formula, ``image_echo``,
+        echoes that are not wanted return nothing. The echo model's ``formula``, if it has one,
         needs no specular points and computes all echoes. Amplitudes are without regard to
         polarisation.
         """
         shape = (*poses.rx.shape[:2], len(path))
         length, amplitude = np.empty(shape), np.empty(shape)
         (tx, rx), bodies = self.antennas, Ellipsoids(*poses[3:])
-        if image_echo is None:
+        if formula is None:
             legs = np.ascontiguousarray(self.of_path[path].T)
             antennas = Images(tx, self._in_lanes, self._middle, legs[0], legs[1], part)
             nearby_echoes(antennas, poses.tx_index, bodies, near, length, amplitude)
@@ -79,7 +79,7 @@ class LegImages:
             parts = part[own]
             ellipsoids = bodies.centres[:, parts], bodies.frames[:, parts], bodies.semi_axes[parts]
             at = Geometry(tx[out, poses.tx_index], rx[back, poses.tx_index], *ellipsoids)
-            length[..., own], amplitude[..., own] = image_echo(at)
+            length[..., own], amplitude[..., own] = formula(at)
         return length, amplitude
 
 

@@ -9,7 +9,7 @@ and what appears or vanishes fades smoothly.
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +20,7 @@ from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.nearby_points import Nearby
 from rtradar.kernels.scatter.rooms import Blend, path_amplitudes
+from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.keyframes import KeyframeCache, keyframe_step
@@ -27,7 +28,7 @@ from rtradar.scatter.common.polarization import Surface
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.multipath.image_paths import corners, wall_paths
 from rtradar.scatter.multipath.keyframes import PathKeyframes, Surroundings, path_keyframes
-from rtradar.scatter.multipath.path_echoes import EchoColumns, ImageEcho, LegImages
+from rtradar.scatter.multipath.path_echoes import EchoColumns, LegImages
 from rtradar.scatter.multipath.path_summary import MARGIN_DB, PathSummary, summarize
 from rtradar.scatter.multipath.slab_series import room_series
 from rtradar.scatter.multipath.wall_interaction import WallResponse
@@ -60,17 +61,31 @@ class RoomReady(EchoModel, Protocol):
     """What `RoomModel` asks of the model that it wraps, one whose ``supports_rooms`` is True.
 
     ``spreading`` says whether amplitudes hold 1 / (R1 R2); ``surface`` is that of the body;
-    ``tracer`` is that of the body, which occludes legs, or None if nothing occludes anything.
-    ``image_echo`` is a formula for the echoes of conductors before any antennas, which is used with
-    their images over walls, or None if specular points are followed.
+    ``tracer`` is that of the body, which occludes legs, or None if nothing occludes anything. The
+    model also has the method of `HasFormula` or that of `HasSpecularPoints`.
     """
 
     spreading: bool
     surface: Surface
     tracer: BodyTracer | None
-    image_echo: ImageEcho | None
 
-    def conductor_echo(
+
+@runtime_checkable
+class HasFormula(RoomReady, Protocol):
+    """A model with one formula for all echoes: direct ones, and with images those over walls."""
+
+    def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
+        """Compute the echoes of conductors before given antennas.
+
+        Returned are lengths and amplitudes (chirp, rx, part) [m].
+        """
+        ...
+
+
+class HasSpecularPoints(RoomReady, Protocol):
+    """A model of the specular points of ellipsoids, which the room follows over walls itself."""
+
+    def specular_echo(
         self, chirps: NDArray[np.int64], at: ChirpPoses, start: Array | None = None
     ) -> tuple[Array, Array]:
         """Compute direct echoes at some chirps as if the body were a conductor.
@@ -87,7 +102,7 @@ class RoomModel:
 
     Parameters
     ----------
-    model : RoomReady
+    model : HasFormula or HasSpecularPoints
         Echo model of the person alone, `person`.
     scene : Scene
         Walls and furniture.
@@ -109,7 +124,13 @@ class RoomModel:
     """
 
     def __init__(
-        self, model: RoomReady, scene: Scene, radar: Radar, body: Body, *, order: int = 1
+        self,
+        model: HasFormula | HasSpecularPoints,
+        scene: Scene,
+        radar: Radar,
+        body: Body,
+        *,
+        order: int = 1,
     ) -> None:
         if not model.spreading and (scene.walls or scene.furniture):
             raise InputError(
@@ -164,13 +185,17 @@ class RoomModel:
         near = Nearby(before.start, after.start, wanted, interval, line, fraction, tx_weight)
         # Lengths and bare amplitudes: direct echoes by the model, the others by images.
         n_direct, n_echoes = at.centres.shape[1], len(columns.part)
-        start = near.take(slice(n_direct)).places()
-        found = [self.person.conductor_echo(chirps, at, start)]
+        person, formula = self.person, None
+        if isinstance(person, HasFormula):
+            formula = person.conductor_echo
+            found = [formula(Geometry.of(at))]
+        else:
+            start = near.take(slice(n_direct)).places()
+            found = [person.specular_echo(chirps, at, start)]
         if n_echoes > n_direct:
             ghosts = slice(n_direct, n_echoes)
             own = columns.path[ghosts], columns.part[ghosts]
-            model = self.person.image_echo
-            found.append(self._legs.echoes(*own, at, near.take(ghosts), model))
+            found.append(self._legs.echoes(*own, at, near.take(ghosts), formula))
         length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
         factors = [before.factors(), after.factors()]
         if columns.delayed:

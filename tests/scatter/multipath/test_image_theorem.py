@@ -19,6 +19,7 @@ from rtradar.scatter.common.keyframes import keyframe_step
 from rtradar.scatter.common.polarization import copolar
 from rtradar.scatter.common.poses import chirp_poses
 from rtradar.scatter.echo_models import models_that
+from rtradar.scatter.models.analytic import Analytic
 from rtradar.scatter.models.specular import Specular
 from rtradar.scatter.multipath.image_paths import images, wall_paths
 from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
@@ -494,6 +495,23 @@ def test_what_has_no_meaning_is_refused(given: dict[str, object], message: str) 
     with pytest.raises(InputError, match=message) as error:
         build_model(radar=single(), body=one(), scene=scene, variant="scalar", **options)  # type: ignore[arg-type]
     assert "\n" not in str(error.value)
+
+
+def test_direct_echoes_and_ghosts_follow_from_one_formula() -> None:
+    class Double(Analytic):
+        def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
+            length, amplitude = super().conductor_echo(at)
+            return length + 1, 2 * amplitude
+
+    body, radar, chirps = one(), single(), np.arange(5)
+    for walls in ((), (wall("left"),)):
+        usual, double = (
+            RoomModel(kind(radar, body), Scene(walls=walls), radar, body).echoes(chirps)
+            for kind in (Analytic, Double)
+        )
+        assert double.length.shape[2] == 1 + 2 * len(walls)
+        np.testing.assert_allclose(double.length, usual.length + 1, rtol=1e-12)
+        np.testing.assert_allclose(double.amplitude, 2 * usual.amplitude, rtol=1e-6)
 
 
 def test_analytic_has_the_same_paths_with_its_own_returns() -> None:
