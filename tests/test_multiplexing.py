@@ -15,6 +15,7 @@ import rtradar as rt
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.exchange.recording import open_recording
 from rtradar.process import (
+    WindowFunctions,
     angle,
     build_detector,
     os_cfar,
@@ -27,6 +28,8 @@ from rtradar.process import (
 from rtradar.signal import Noise, receive, separate, synthesize
 
 ALL = ("tdm", "fdm", "ddm")
+HANN = WindowFunctions("hann", "hann")
+"""What the closed forms of these tests are of."""
 
 
 def radar(multiplexing: str, **changes: Any) -> rt.Radar:
@@ -205,8 +208,9 @@ def test_noise_of_one_receiver_and_its_false_alarms() -> None:
         assert (np.abs(received) ** 2).mean() == pytest.approx(
             2.0, rel=5 / math.sqrt(received.size)
         )
-        spectra = range_spectrum(separate(received, made, 0), made)
-        power = power_map(spectra.reshape(-1, made.n_tx, *spectra.shape[1:]), made)
+        spectra = range_spectrum(separate(received, made, 0), made, window_functions=HANN)
+        cube = spectra.reshape(-1, made.n_tx, *spectra.shape[1:])
+        power = power_map(cube, made, window_functions=HANN)
         mean.append(power.mean())
         alarms += int(os_cfar(power, pfa=pfa, looks=made.n_channels).sum())
         cells += power.size
@@ -222,8 +226,10 @@ def test_two_echoes_and_noise_are_detected_where_they_are_and_nowhere_else() -> 
     rows = point(made, (3.0, 0.0, 0.0), -30.0) + point(made, (5.0, 0.0, 0.0), 8.0, 0.1)
     received = receive(rows, made, 0).astype(np.complex64)
     Noise(1.0, 0).add(received, made, 0)
-    spectra = range_spectrum(separate(received, made, 0), made)
-    power = power_map(spectra.reshape(-1, made.n_tx, *spectra.shape[1:]), made)
+    spectra = range_spectrum(separate(received, made, 0), made, window_functions=HANN)
+    power = power_map(
+        spectra.reshape(-1, made.n_tx, *spectra.shape[1:]), made, window_functions=HANN
+    )
     mask = build_detector("os-cfar", pfa=1e-6, looks=made.n_channels)(power)
     velocity = made.velocity_mps(power.shape[1])
     rows_found, columns = np.nonzero(mask)

@@ -98,7 +98,15 @@ def test_measured_noise_power() -> None:
 def test_a_run_by_watts(tmp_path: Path) -> None:
     motion = rt.synthetic_motion("walk", seed=0, duration_s=0.2)
     results = [
-        rt.run(motion, radar, out=tmp_path / name, fidelity="analytic", snr_db="physical")
+        rt.run(
+            motion,
+            radar,
+            out=tmp_path / name,
+            fidelity="analytic",
+            snr_db="physical",
+            range_window="hann",
+            doppler_window="hann",
+        )
         for name, radar in (
             ("a", RADAR),
             ("b", dataclasses.replace(RADAR, transmit_power_dbm=22.0)),
