@@ -19,8 +19,6 @@ from collections.abc import Callable
 from multiprocessing import resource_tracker
 from pathlib import Path
 
-from rtradar.system.files import discard_unfinished
-
 _SIGNALS = {
     "SIGINT": "stopped by the user",
     "SIGTERM": "ended by SIGTERM",
@@ -62,7 +60,9 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     number = signal.Signals(os.read(reader, 1)[0])
     _ended.set()
     _end_children()
-    discard_unfinished()
+    # Not imported here: it takes a quarter of a second, in which a signal would show a traceback.
+    # Where nothing has imported it, there is no unfinished file.
+    getattr(sys.modules.get("rtradar.system.files"), "discard_unfinished", _nothing)()
     line = f"rtradar: {_SIGNALS.get(number.name, number.name)}; {' '.join(message().split())}\n"
     # In a thread, for the main thread may be writing.
     flushed = threading.Thread(target=sys.stdout.flush, daemon=True)
@@ -71,6 +71,10 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     with contextlib.suppress(OSError, ValueError):
         os.write(2, ("\n" if sys.stderr.isatty() else "").encode() + line.encode(errors="replace"))
     os._exit(1)
+
+
+def _nothing() -> None:
+    pass
 
 
 def _end_children() -> None:
