@@ -11,6 +11,7 @@ import pytest
 from rtradar.campaign.samples import SamplePlan, counts, plan_samples
 from rtradar.campaign.spec import read_spec
 from rtradar.errors import InputError
+from rtradar.settings import RunSettings
 
 HEAD = """
 [windows]
@@ -240,13 +241,15 @@ def test_settings_of_a_run_reach_the_sample_and_change_ids_where_they_are_not_th
     tmp_path: Path,
 ) -> None:
     text = HEAD + actors(1, "walk")
+    usual = RunSettings().range_window
     other = 'range_window = ["chebwin", 80]\ndetector = "ca-cfar"\nkeep_all = true\n'
     (plain,), (same,), (changed,) = (
-        planned(tmp_path, more + text) for more in ("", 'range_window = "hann"\norder = 1\n', other)
+        planned(tmp_path, more + text)
+        for more in ("", f'range_window = "{usual}"\norder = 1\n', other)
     )
     assert plain.identity == same.identity != changed.identity
     settings = changed.run_settings()
-    assert (settings.range_window, settings.doppler_window) == (["chebwin", 80.0], "hann")
+    assert (settings.range_window, settings.doppler_window) == (["chebwin", 80.0], usual)
     assert (settings.detector, settings.keep_all, settings.variant) == ("ca-cfar", True, "cpu")
     assert settings.snr_db == changed.parameters["snr_db"]
     assert settings.seed == changed.parameters["seed"]

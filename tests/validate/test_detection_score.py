@@ -83,7 +83,8 @@ def test_noise_power_of_a_cell_is_what_noise_leaves_there(channel: int | None) -
 
 def test_noise_power_of_hann_windows_in_closed_form() -> None:
     # sum(w^2) / sum(w)^2 of a periodic Hann window of n samples is (3n/8) / (n/2)^2 = 1.5 / n.
-    assert cell_noise_power(2.0, SMALL, looks=3) == pytest.approx(
+    hann = WindowFunctions("hann", "hann")
+    assert cell_noise_power(2.0, SMALL, looks=3, window_functions=hann) == pytest.approx(
         3 * 2.0 * 1.5 / 32 * 1.5 / SMALL.cycles_per_frame, rel=1e-12
     )
 
