@@ -72,16 +72,20 @@ def filled(
 
 
 def difference(found: Any, expected: Any) -> float:
-    """Largest difference over the largest magnitude expected, of the worst pair of arrays."""
+    """Largest difference over the largest magnitude expected, of the worst pair of arrays.
+
+    NaN where any of the arrays holds it, so that no tolerance lets it pass.
+    """
     pairs = [
         (np.asarray(one), np.asarray(other).reshape(np.shape(one)))
         for one, other in zip(_arrays(found), _arrays(expected), strict=True)
     ]
-    return max(
-        float(np.abs(one.astype(np.complex128) - other).max(initial=0))
+    found_by_pair = [
+        np.abs(one.astype(np.complex128) - other).max(initial=0)
         / max(float(np.abs(other).max(initial=0)), 1e-300)
         for one, other in pairs
-    )
+    ]
+    return float(np.max(found_by_pair))  # Python's max would lose a NaN that comes later
 
 
 def _arrays(values: Any) -> tuple[Any, ...]:
