@@ -90,8 +90,6 @@ def measure(plan: Plan) -> dict[str, Any]:
         Where a run fails.
     """
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
-    growth: dict[str, Any] = {"fidelity": plan.growing_fidelity}
-    growth |= {"chirps": [], "duration": []}
     found: dict[str, Any] = {
         "settings": asdict(plan) | {"motion": MOTION},
         "machine": {
@@ -102,7 +100,7 @@ def measure(plan: Plan) -> dict[str, Any]:
         "rates": {},
         "models": [],
         "paper": {"trouble": "", "radars": {}},
-        "growth": growth,
+        "growth": {"fidelity": plan.growing_fidelity, "chirps": [], "duration": []},
         "kernels": measure_kernels() if "kernels" in plan.parts else [],
     }
     with temporary_folder("rtradar-bench-") as folder:
@@ -110,7 +108,7 @@ def measure(plan: Plan) -> dict[str, Any]:
         if "models" in plan.parts:
             _measure_models(plan, runner, found)
         if "growth" in plan.parts:
-            growth["duration"] = with_duration(plan, runner)
+            found["growth"]["duration"] = with_duration(plan, runner)
     return found
 
 
@@ -126,7 +124,7 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     runs = runner.measure(model_cases(plan), plan.repeats, "models")
     cheapest = {case.radar: own for case, own in runs.items() if case.fidelity == CHEAPEST}
     for case, own in runs.items():
-        row = _model_row(case, own, rates[case.radar])
+        row = _model_row(case, own, radars[case.radar], rates[case.radar])
         first = case.radar == plan.radars[0]
         row["first_use"] = _first_use(runner.first[case.fidelity], own) if first else None
         reference = cheapest.get(case.radar)
@@ -143,9 +141,9 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
     found["growth"]["chirps"] = _chirp_rows(found["models"])
 
 
-def _model_row(case: Case, runs: list[Run], rates: Rates) -> Row:
+def _model_row(case: Case, runs: list[Run], radar: Radar, rates: Rates) -> Row:
     """What was measured of one model with one radar, without comparisons."""
-    radar, summary = Radar.load(case.radar), runs[0].summary
+    summary = runs[0].summary
     work = Work.of(
         radar,
         chirps=summary["chirps"],

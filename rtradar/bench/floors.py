@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rtradar.bench.runs import ELSEWHERE
 from rtradar.kernels.prime_factor_dft import prime_factor_dft
-from rtradar.process import SPECTROGRAM_CYCLES, angle_grid, measures_angle
+from rtradar.process import SPECTROGRAM_CYCLES, angle_grid, measured_angles, measures_angle
 from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
@@ -170,7 +170,7 @@ class Work:
             cycles=radar.cycles_per_frame,
             channels=radar.n_channels,
             detections=detections,
-            lines=(radar.tx_y * radar.rx_y > 1) + (radar.tx_z * radar.rx_z > 1),
+            lines=len(measured_angles(radar)),
         )
 
     @property
