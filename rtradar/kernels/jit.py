@@ -100,7 +100,7 @@ class _CodeOnDisk(NullCache):
         """Folder and format of this function's code; None where no folder can be written."""
         try:
             return CompileResultCacheImpl(self._dispatcher.py_func)  # type: ignore[no-untyped-call]
-        except Exception as error:
+        except Exception as error:  # also what another version of Numba may raise here
             no_folder = "no locator available" in str(error)
             self._warn("no folder for it can be written" if no_folder else error)
             return None
@@ -138,7 +138,7 @@ class _CodeOnDisk(NullCache):
             except Exception:  # a damaged index
                 file.flush()
                 file.save(self._key(sig), entry)
-        except Exception as error:
+        except Exception as error:  # the code is in memory: a run does not end for want of a file
             self._warn(error)
 
     def has_code(self) -> bool:
@@ -146,7 +146,7 @@ class _CodeOnDisk(NullCache):
         file = self._take_stamp()
         try:
             return file is not None and bool(file._load_index())
-        except Exception:
+        except Exception:  # a damaged index raises almost anything
             return False
 
     def _take_stamp(self) -> Any:
@@ -160,7 +160,7 @@ class _CodeOnDisk(NullCache):
                     filename_base=self._format.filename_base,
                     source_stamp=self._stamp,
                 )
-            except Exception as error:
+            except Exception as error:  # also what another version of Numba may raise here
                 self._warn(error)
         return self._file
 
