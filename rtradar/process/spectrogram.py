@@ -237,7 +237,7 @@ def _hop(radar: Radar, tx: int, window: int, overlap: float) -> int:
         raise InputError(f"spectrogram: window = {window} cycles; it must hold at least 2")
     if not 0 <= overlap < 1:
         raise InputError(
-            f"spectrogram: overlap = {overlap}; it is a share of the window, from 0 to below 1"
+            f"spectrogram: overlap = {overlap}; it is a fraction of the window, from 0 to below 1"
         )
     # 100 x (1 - 0.9) is a little less than 10, and means 10.
     return max(1, int(window * (1 - overlap) * (1 + 1e-12)))
