@@ -57,7 +57,7 @@ def normalize(vector):
 def fast_phasor(angle):
     """Cosine and sine of an angle [rad], to 3e-11: Taylor's series of its half, without branches.
 
-    Without quadrants it takes a fifth less time than `phasor`.
+    It has no quadrants to tell apart, and so fewer operations than `phasor`.
     """
     turns = angle * (0.5 / math.pi)
     half = math.pi * (turns - np.floor(turns + 0.5))

@@ -11,10 +11,10 @@ measures the cone about that line: along y azimuth is asin(u), the cone angle, w
 azimuth only at the height of the radar, and elevation is not measured; along z azimuth is not.
 
 Off the boresight an echo reaches the ends of the line up to several range bins before and behind
-its cell (12 GHz: 1 bin at 14 degrees, 2 at 30, 3.3 at the unambiguous 59). Each element is
+its cell (12 GHz: 1 bin at 14 degrees, 2 at 30, 3.4 at the unambiguous 59). Each element is
 therefore read in the bin where the echo from that direction lies. Read in the cell alone, a point
-at 30 degrees and 12 GHz would appear 5.2 dB weaker, in a beam of 3.4 degrees instead of 2.1, and at
-1 m/s half a degree beside its place, for the elements would receive it at different times.
+off the boresight would appear weaker and in a wider beam, and beside its direction if it moved, for
+the elements would receive it at different times.
 """
 
 from __future__ import annotations

@@ -28,7 +28,7 @@ SIDE_LOBE_DB = 25.0
 """Side lobes of the Taylor taper below the main lobe, in the far field [dB]."""
 
 _OVERSAMPLING = 4  # sines for each resolution cell of the longest line
-_MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.5 million
+_MOST_WEIGHTS = 2**29  # of one line for all ranges, 4 GB; the paper's have 2.4 million
 _TAYLOR_EQUAL_LOBES = 4
 
 
