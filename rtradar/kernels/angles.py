@@ -63,13 +63,13 @@ def beam_power(begin, end, values, still, place, channels, steering, power):
 def beam_power_reference(values, still, place, channels, steering):
     """Power (cell, sine) of `beam_power`, by NumPy."""
     weights, runs, starts = steering
-    beams = np.zeros((len(values), weights.shape[2]), dtype=np.complex128)
-    for cell, own in enumerate(place):
-        for element, offset, first, last in runs[starts[own] : starts[own + 1]]:
-            channel = channels[element]
-            value = values[cell, offset, channel] * still[cell, channel]
-            beams[cell, first:last] += value * weights[own, element, first:last]
-    return np.abs(beams) ** 2
+    offsets = np.zeros(weights.shape, dtype=np.int64)
+    whose = np.repeat(np.arange(len(weights)), np.diff(starts))
+    for own, (element, offset, first, last) in zip(whose, runs, strict=True):
+        offsets[own, element, first:last] = offset
+    cell, channel = np.arange(len(values))[:, None, None], channels[:, None]
+    read = (values * still[:, None])[cell, offsets[place], channel].astype(np.complex128)
+    return np.abs((read * weights[place]).sum(axis=1)) ** 2
 
 
 @compiled()
