@@ -17,9 +17,11 @@ from rtradar.errors import InputError
 from rtradar.kernels.cfar import ca_cfar_rows, os_cfar_rows
 from rtradar.process.cfar_thresholds import (
     ca_scale,
-    check_looks,
+    check_count,
     check_pfa,
     check_quantile,
+    check_scale,
+    checked_power,
     order_rank,
     os_scale,
 )
@@ -202,28 +204,12 @@ def _checked(
     power: ArrayLike, guard: int, train: int, pfa: float, looks: int, scale: float | None
 ) -> tuple[NDArray[np.floating], NDArray[np.int32]]:
     """The map as C-contiguous float32 or float64, and the number of training cells of each cell."""
-    cells = np.asarray(power)
-    if cells.ndim != 2 or cells.dtype.kind not in "fiu":
-        raise InputError(
-            f"CFAR: power has shape {cells.shape}, type {cells.dtype}; it must be a real "
-            "(range, velocity) map"
-        )
-    for name, value, least in (("guard", guard, 0), ("train", train, 1)):
-        if isinstance(value, bool) or value != int(value) or value < least:
-            raise InputError(
-                f"CFAR: {name} = {value!r}; it must be a whole number of cells, at least {least}"
-            )
+    cells = checked_power("CFAR", power)
+    check_count("guard", guard, least=0)
+    check_count("train", train)
+    check_count("looks", looks)
     check_pfa(pfa)
-    check_looks(looks)
-    if scale is not None and not 0 < scale < np.inf:
-        raise InputError(f"CFAR: scale = {scale!r}; a multiplier must be positive and finite")
-    cells = np.ascontiguousarray(
-        cells, dtype=np.float32 if cells.dtype == np.float32 else np.float64
-    )
-    if not (cells >= 0).all() or not np.isfinite(cells).all():
-        raise InputError(
-            "CFAR: power holds NaN, infinity or a negative value; give linear power, not decibels"
-        )
+    check_scale("CFAR", scale)
     counts = _training_counts(cells.shape[0], cells.shape[1], guard, guard + train)
     if counts.size and counts.min() == 0:
         raise InputError(

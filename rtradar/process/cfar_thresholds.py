@@ -22,7 +22,7 @@ from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 from scipy.special import betainccinv, betaincinv, gammainc, gammaincc, gammaln
 
@@ -119,17 +119,40 @@ def check_pfa(pfa: float) -> None:
         raise InputError(f"CFAR: pfa = {pfa!r}; a false-alarm rate must lie between 0 and 1")
 
 
-def check_looks(looks: int) -> None:
-    """Raise InputError unless the number of looks is a positive whole number."""
-    if isinstance(looks, bool) or looks != int(looks) or looks < 1:
-        raise InputError(f"CFAR: looks = {looks!r}; it must be a whole number, at least 1")
+def check_count(name: str, count: int, least: int = 1) -> None:
+    """Raise InputError unless a count is a whole number of at least so many."""
+    if isinstance(count, bool) or count != int(count) or count < least:
+        raise InputError(f"CFAR: {name} = {count!r}; it must be a whole number, at least {least}")
+
+
+def check_scale(where: str, scale: float | None) -> None:
+    """Raise InputError unless a given multiplier is positive and finite."""
+    if scale is not None and not 0 < scale < math.inf:
+        raise InputError(f"{where}: scale = {scale!r}; a multiplier must be positive and finite")
+
+
+def checked_power(where: str, power: ArrayLike) -> NDArray[np.floating]:
+    """Power (range, velocity), C-contiguous float32 or float64; InputError if it is no power."""
+    cells = np.asarray(power)
+    if cells.ndim != 2 or cells.dtype.kind not in "fiu":
+        raise InputError(
+            f"{where}: power has shape {cells.shape}, type {cells.dtype}; it must be a real "
+            "(range, velocity) map"
+        )
+    kind = np.float32 if cells.dtype == np.float32 else np.float64
+    cells = np.ascontiguousarray(cells, dtype=kind)
+    if not (cells >= 0).all() or not np.isfinite(cells).all():
+        raise InputError(
+            f"{where}: power holds NaN, infinity or a negative value; give linear power, not "
+            "decibels"
+        )
+    return cells
 
 
 def _check_law(n_train: int, pfa: float, looks: int) -> None:
-    if isinstance(n_train, bool) or n_train != int(n_train) or n_train < 1:
-        raise InputError(f"CFAR: n_train = {n_train!r}; it must be a whole number, at least 1")
+    check_count("n_train", n_train)
     check_pfa(pfa)
-    check_looks(looks)
+    check_count("looks", looks)
 
 
 @lru_cache(maxsize=4096)

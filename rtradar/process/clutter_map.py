@@ -36,7 +36,13 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig_banded
 
 from rtradar.errors import InputError
-from rtradar.process.cfar_thresholds import check_looks, check_pfa, multiplier
+from rtradar.process.cfar_thresholds import (
+    check_count,
+    check_pfa,
+    check_scale,
+    checked_power,
+    multiplier,
+)
 from rtradar.process.clutter import check_time_constant
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
@@ -85,11 +91,8 @@ class ClutterMap:
         window_functions: WindowFunctions = DEFAULT_WINDOWS,
     ) -> None:
         check_pfa(pfa)
-        check_looks(looks)
-        if scale is not None and not 0 < scale < math.inf:
-            raise InputError(
-                f"clutter map: scale = {scale!r}; a multiplier must be positive and finite"
-            )
+        check_count("looks", looks)
+        check_scale("clutter map", scale)
         self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
         self._window_functions = window_functions
         hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
@@ -121,23 +124,13 @@ class ClutterMap:
             Where the map is not two-dimensional, of another shape than the last, or holds NaN,
             infinity or a negative value.
         """
-        cells = np.asarray(power)
-        if cells.ndim != 2 or cells.dtype.kind not in "fiu":
-            raise InputError(
-                f"clutter map: power has shape {cells.shape}, type {cells.dtype}; it must be a "
-                "real (range, velocity) map"
-            )
+        cells = checked_power("clutter map", power)
         earlier = self._map if self._count else self._waiting[0] if self._waiting else cells
         known = earlier.shape
         if cells.shape != known:
             raise InputError(
                 f"clutter map: power has shape {cells.shape}, the windows before it {known}; all "
                 "must be alike"
-            )
-        if not (cells >= 0).all() or not np.isfinite(cells).all():
-            raise InputError(
-                "clutter map: power holds NaN, infinity or a negative value; give linear power, "
-                "not decibels"
             )
         found = np.zeros(cells.shape, dtype=np.bool_)
         if self._count:
@@ -195,7 +188,7 @@ def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
         Where an argument is out of its range.
     """
     check_pfa(pfa)
-    check_looks(looks)
+    check_count("looks", looks)
     spread = np.asarray(weights)
     real = spread.ndim == 1 and spread.dtype.kind in "fiu"
     if not real or not (np.isfinite(spread) & (spread >= 0)).all():
