@@ -202,7 +202,7 @@ class PathGroups:
         middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(self._origin - self._middle)
         number = np.rint((path - middle) / self._step).astype(np.int64)
         group = np.clip(number + self._half, 0, self.count - 1)
-        power = _power(footprints)
+        power = footprints.power()
         self._weight += np.bincount(group, weights=power, minlength=self.count)
         self._sum += np.stack(
             [np.bincount(group, weights=power * along, minlength=self.count) for along in places.T],
@@ -212,24 +212,13 @@ class PathGroups:
 
     def lengths(self, footprints: Footprints, group: Indices, tx: Array, rx: Array) -> Array:
         """Return the mean path of each group, (rx, echo) [m]; over the middle if it is empty."""
-        power = _power(footprints)
-        total = np.bincount(group, weights=power, minlength=self.count)
         over_middle = np.linalg.norm(tx - self._middle) + np.linalg.norm(rx - self._middle, axis=1)
-        lengths = np.repeat(over_middle[:, None], self.count, axis=1)
-        for receiver, antenna in enumerate(rx):
-            path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
-            sums = np.bincount(group, weights=power * path, minlength=self.count)
-            np.divide(sums, total, out=lengths[receiver], where=total > 0)
-        return lengths
+        return footprints.mean_paths(group, rx, np.repeat(over_middle[:, None], self.count, axis=1))
 
     def centres(self) -> Array:
         """Return the mean place of the last bounce of each group, (echo, 3) [m]."""
         weight, middle = self._weight[:, None], np.tile(self._middle, (self.count, 1))
         return np.divide(self._sum, weight, out=middle, where=weight > 0)
-
-
-def _power(footprints: Footprints) -> Array:
-    return np.asarray((footprints.field**2).sum(axis=1) * footprints.width())
 
 
 # -- returns ---------------------------------------------------------------------------------------

@@ -19,7 +19,7 @@ from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import interpolation_weights, sweep_nodes
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses
-from rtradar.scatter.ray_tubes.footprints import Footprints, radiate
+from rtradar.scatter.ray_tubes.footprints import radiate
 from rtradar.scatter.ray_tubes.shooting import Shooter, exits
 from rtradar.scatter.ray_tubes.target import RAYS_PER_WAVELENGTH, check_options, rays_scattering
 from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, PosedGrid
@@ -57,10 +57,10 @@ class Rays(BuiltInModel):
         The edge of a tube's facet is the wavelength at the sweep centre over this.
     bounces : int
         Largest number of reflections on the way. Two bounces on a body of ellipsoids go mostly
-        by the creases where two of them touch, which no real body has, and reach half the field
+        by the creases where two of them touch, which no real body has, and return half the field
         of one: one is the default.
     anchor_s : float
-        Time between anchors [s]; 0 shoots at every chirp.
+        Time between keyframes [s]; 0 shoots at every chirp.
 
     Raises
     ------
@@ -122,7 +122,7 @@ class Rays(BuiltInModel):
         )
 
     def _shot(self, chirp: int, tx: int) -> _Shot:
-        """What one Tx sends and every Rx hears in the pose of that chirp."""
+        """What every Rx receives of one Tx in the pose of that chirp."""
         key = (chirp, tx)
         return self._shots.get(key, partial(self._shoot, chirp, tx))
 
@@ -151,7 +151,8 @@ class Rays(BuiltInModel):
         frequency = self._nodes(self._bounces > 1)
         lengths, amplitudes = [], []
         for order, footprints in enumerate(shooter.shoot(place)):
-            lengths.append(_middle_length(footprints, rx, specular) if order else specular)
+            mean = footprints.mean_paths(footprints.surface, rx, specular) if order else specular
+            lengths.append(mean)
             nodes = self._nodes(order > 0)
             sums = radiate(
                 footprints,
@@ -187,21 +188,3 @@ def _cubic(fraction: float) -> tuple[float, float, float, float]:
     """Weights of keyframes -1, 0, 1, 2 at a fraction of the way from 0 to 1 (Catmull and Rom)."""
     h0, h1, g0, g1 = hermite_weights(fraction, 1)
     return -g0 / 2, h0 - g1 / 2, h1 + g0 / 2, g1 / 2
-
-
-def _middle_length(footprints: Footprints, rx: Array, otherwise: Array) -> Array:
-    """Mean path over each part (rx, part) [m], weighted by the power of its tubes.
-
-    ``otherwise (rx, part)`` is taken where there are none.
-    """
-    parts = otherwise.shape[1]
-    power = (footprints.field**2).sum(axis=1) * footprints.width()
-    total = np.bincount(footprints.surface, weights=power, minlength=parts)
-    lengths = otherwise.copy()
-    for receiver, antenna in enumerate(rx):
-        path = footprints.path[:, 3] + np.linalg.norm(antenna - footprints.places[:, 3], axis=1)
-        mean = np.bincount(footprints.surface, weights=power * path, minlength=parts)
-        lengths[receiver] = np.where(
-            total > 0, mean / np.where(total > 0, total, 1.0), otherwise[receiver]
-        )
-    return lengths

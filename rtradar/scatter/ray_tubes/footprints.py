@@ -77,6 +77,25 @@ class Footprints:
         area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 2
         return np.abs((area * self.directions[:, 3]).sum(axis=1))
 
+    def mean_paths(self, group: NDArray[np.int64], rx: Array, otherwise: Array) -> Array:
+        """Mean path from the Tx to each Rx over each group (rx, group) [m].
+
+        ``group (tube,)`` are the groups of the tubes, which count by their power. The mean is
+        ``otherwise (rx, group)`` for groups without power.
+        """
+        power, count = self.power(), otherwise.shape[1]
+        total = np.bincount(group, weights=power, minlength=count)
+        means = otherwise.copy()
+        for antenna, mean in zip(rx, means, strict=True):
+            path = self.path[:, 3] + np.linalg.norm(antenna - self.places[:, 3], axis=1)
+            weighted = np.bincount(group, weights=power * path, minlength=count)
+            np.divide(weighted, total, out=mean, where=total > 0)
+        return means
+
+    def power(self) -> Array:
+        """Power of each tube (tube,), for a Tx whose field is 1 at 1 m."""
+        return np.asarray((self.field**2).sum(axis=1) * self.width())
+
 
 def radiate(
     footprints: Footprints,
