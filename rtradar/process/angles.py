@@ -126,7 +126,7 @@ def angle_spectra(
     cells, lines = np.asarray(values), virtual_lines(radar)
     ranges, rates = np.asarray(range_m, dtype=np.float64), np.asarray(velocity, dtype=np.float64)
     bins = _checked_bins(cells, ranges, rates, radar)
-    # Phase that a moving echo gains between the Tx of one cycle, and phase of its way there and
+    # Phase that a moving echo gains between the Tx of one cycle, and phase of its path there and
     # back by its Tx's own carrier.
     turns = np.outer(rates * (2 / radar.wavelength_m), radar.tx_delay_s)
     turns += np.outer(bins * (2 * radar.range_bin_m / SPEED_OF_LIGHT_MPS), radar.tx_offset_hz)

@@ -13,7 +13,8 @@ what is constant there from cycle to cycle is removed. T is the cycle, f the Dop
     fraction sinc(d) counts as static. That is all of a person who does not move in that frame, and
     more than half of the highest peak below 0.6 bins (0.06 m/s for the paper's radar at 12 GHz,
     0.011 m/s at 77 GHz). A fast echo loses nothing, but leaves up to 1 / (pi d) of its amplitude in
-    the bins about zero, where nothing static made it: -23 dB at 5.5 bins, -34 dB at 20.5.
+    the bins about zero, where nothing static made it: 23 dB below its peak at 5.5 bins, 34 dB at
+    20.5 (validation/closed_forms/clutter.py).
 ``exponential``
     A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is
     subtracted from the next. It starts as the first chirp and is the mean of all of them until

@@ -222,7 +222,7 @@ def test_a_run_that_fails_is_one_line_and_status_1(
 
 
 def stand_in(folder: Path, script: str) -> str:
-    """A program in place of Python, which is told what `rtradar run` is told."""
+    """A program in place of Python, which is given the words of `rtradar run`."""
     program = folder / "python"
     program.write_text(f"#!/bin/sh\n{script}\n")
     program.chmod(program.stat().st_mode | stat.S_IXUSR)

@@ -71,8 +71,8 @@ def unused(number):
     return number * 7.0
 """,
 }
-"""Modules of a package: a compiled function, what it takes in from a second one, and what that
-takes in from a third."""
+"""Modules of a package: a compiled function, what a second one inlines into it, and what a third
+inlines into that."""
 
 
 class Estate:
@@ -131,7 +131,7 @@ def test_what_has_not_changed_comes_from_disk(estate: Estate) -> None:
     ("module", "old", "new", "result"),
     [
         pytest.param("caller", "table[1]", "table[0]", 1111.0, id="its own text"),
-        pytest.param("near", "beyond(number) *", "beyond(number) -", 21110.0, id="taken in"),
+        pytest.param("near", "beyond(number) *", "beyond(number) -", 21110.0, id="inlined"),
         pytest.param("near", "weight=1.0", "weight=3.0", 21131.0, id="default of an argument"),
         pytest.param(
             "near", "number * 100.0", "number * 200.0", 21211.0, id="another compiled function"
@@ -141,7 +141,7 @@ def test_what_has_not_changed_comes_from_disk(estate: Estate) -> None:
         ),
         pytest.param("near", "20000.0", "30000.0", 31111.0, id="array of another module"),
         pytest.param(
-            "far", "number * WEIGHT", "number - WEIGHT", 21092.0, id="taken in by what is taken in"
+            "far", "number * WEIGHT", "number - WEIGHT", 21092.0, id="inlined into what is inlined"
         ),
         pytest.param(
             "far", "WEIGHT = 10.0", "WEIGHT = 40.0", 21141.0, id="constant of a third module"
@@ -194,7 +194,7 @@ def test_an_edit_under_a_running_process(estate: Estate) -> None:
     estate.edit("far", "number * WEIGHT", "number - WEIGHT")
     assert (
         running.answer(1.0) == 21111.0
-    )  # compiled from what was imported, and not kept as what stands in the file
+    )  # compiled from what was imported, and not kept as what is in the file now
     assert estate.load().answer(1.0) == 21092.0
 
 

@@ -70,7 +70,7 @@ def test_trouble_with_the_disk_is_told_once(
 ) -> None:
     def full(*_: object) -> None:
         raise OSError(
-            errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a name of the moment")
+            errno.ENOSPC, os.strerror(errno.ENOSPC), str(tmp_path / "a name of this process")
         )
 
     monkeypatch.setattr(config, "CACHE_DIR", str(tmp_path))
@@ -79,9 +79,9 @@ def test_trouble_with_the_disk_is_told_once(
     with pytest.warns(
         CacheWarning,
         match=r"compiled code is not kept \(No space left on device\).* NUMBA_CACHE_DIR",
-    ) as told:
+    ) as warned:
         assert [compiled()(double)(2.0), compiled()(half)(2.0)] == [4.0, 1.0]
-    assert len(told) == 1
+    assert len(warned) == 1
 
 
 @pytest.mark.parametrize("part", ["CompileResultCacheImpl", "IndexDataCacheFile", "stamp_of"])

@@ -30,19 +30,19 @@ Array = NDArray[np.float64]
 
 C = 299_792_458.0
 LOW, HIGH = Radar.preset("paper-12ghz"), Radar.preset("paper-77ghz")
-# A tenth of the window: as good for what stands.
+# A tenth of the window: as good for what does not move.
 SHORT = dataclasses.replace(LOW, frame_duration_s=0.01)
 
 
 def place_of(range_m: float, azimuth_deg: float, elevation_deg: float) -> Array:
     """In the radar's frame [m]."""
     azimuth, elevation = np.radians([azimuth_deg, elevation_deg])
-    way = [
+    direction = [
         np.cos(elevation) * np.cos(azimuth),
         np.cos(elevation) * np.sin(azimuth),
         np.sin(elevation),
     ]
-    return range_m * np.array(way)
+    return range_m * np.array(direction)
 
 
 def echo(radar: Radar, place: Array, velocity: float = 0.0) -> NDArray[np.complex64]:
@@ -64,7 +64,7 @@ def echo(radar: Radar, place: Array, velocity: float = 0.0) -> NDArray[np.comple
 
 
 def spectra_of(radar: Radar, x: NDArray[np.complex64], range_m: float, **options: object):  # type: ignore[no-untyped-def]
-    """Angle spectra of the cell at this range that stands."""
+    """Angle spectra of the cell at this range that does not move."""
     cube = range_spectrum(x, radar).reshape(-1, radar.n_tx, radar.n_rx, radar.samples_per_chirp)
     row = round(range_m / radar.range_bin_m)
     values = cell_spectra(cube, radar, [row], [len(cube) // 2])
@@ -111,9 +111,9 @@ def test_any_point_in_view(azimuth: float, elevation: float, range_m: float, bin
 
 
 def test_motion_left_in_turns_the_azimuth_by_hand() -> None:
-    # Between two Tx, 4 wavelengths of the start (0.0999 m) apart, the way grows by 2 v T: as from
+    # Between two Tx, 4 wavelengths of the start (0.0999 m) apart, the path grows by 2 v T: as from
     # the sine -2 v T / 0.0999 = -0.003753. The Rx know nothing of it: a straight line through all
-    # phases has the share of the Tx in the spread of the virtual line, 46.67 / (46.67 + 1.31)
+    # phases has the fraction of the Tx in the spread of the virtual line, 46.67 / (46.67 + 1.31)
     # wavelengths squared. So a sign turned round shows as twice 0.2 degrees.
     x = echo(LOW, place_of(4.0, 0.0, 0.0), 3.0)
     cube = range_spectrum(x, LOW).reshape(-1, 12, 8, 256)
@@ -189,7 +189,7 @@ def test_excess_path_by_hand() -> None:
 
 
 def test_the_height_does_not_matter_to_the_y_line() -> None:
-    # The way to a Tx of the y-line has no z in it but through the range: the same u, any w.
+    # The path to a Tx of the y-line has no z in it but through the range: the same u, any w.
     line = virtual_lines(LOW)[0]
     assert line is not None
     for w in (-0.6, 0.0, 0.4):
@@ -351,7 +351,7 @@ def test_maps_put_a_point_where_it_is() -> None:
     grid = np.degrees(angle_grid(radar))
     assert across.shape == up.shape == (256, len(grid))
     step = grid[1] - grid[0]
-    # Without the cosine of 40 degrees it would stand at 18.9.
+    # Without the cosine of 40 degrees it would be at 18.9.
     assert abs(grid[across[107].argmax()] - 25) < step
     assert abs(grid[up[107].argmax()] - 40) < step
     assert across.sum() == pytest.approx(across[107].sum())

@@ -17,12 +17,12 @@ from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale
 def by_sorting(power, guard, train, quantile, scale_of):
     """Both detectors by the book: (order statistic, cell averaging)."""
     ordered, averaged = np.zeros(power.shape, bool), np.zeros(power.shape, bool)
-    reach = guard + train
+    outer = guard + train
     for i, j in np.ndindex(power.shape):
         ring = sorted(
             power[a, b]
-            for a in range(max(0, i - reach), min(power.shape[0], i + reach + 1))
-            for b in range(max(0, j - reach), min(power.shape[1], j + reach + 1))
+            for a in range(max(0, i - outer), min(power.shape[0], i + outer + 1))
+            for b in range(max(0, j - outer), min(power.shape[1], j + outer + 1))
             if max(abs(a - i), abs(b - j)) > guard
         )
         rank = math.ceil(quantile * len(ring) - 1e-9)
@@ -69,14 +69,14 @@ def test_given_multiplier(shape, scale, seed) -> None:
 
 
 @pytest.mark.parametrize("detect", [os_cfar, ca_cfar])
-@given(exponent=st.integers(-40, 40), turn=st.sampled_from(["lr", "ud", "transpose"]))
+@given(exponent=st.integers(-40, 40), flipped=st.sampled_from(["lr", "ud", "transpose"]))
 @settings(max_examples=20, deadline=None)
-def test_unit_and_orientation_do_not_matter(detect, exponent: int, turn: str) -> None:
+def test_unit_and_orientation_do_not_matter(detect, exponent: int, flipped: str) -> None:
     power = np.random.default_rng(5).gamma(3.0, size=(20, 31))
     mask = detect(power, pfa=0.05, looks=3)
     assert 0 < mask.sum() < mask.size / 2
     np.testing.assert_array_equal(detect(power * 2.0**exponent, pfa=0.05, looks=3), mask)
-    flip = {"lr": np.fliplr, "ud": np.flipud, "transpose": np.transpose}[turn]
+    flip = {"lr": np.fliplr, "ud": np.flipud, "transpose": np.transpose}[flipped]
     np.testing.assert_array_equal(detect(flip(power), pfa=0.05, looks=3), flip(mask))
 
 
@@ -110,7 +110,7 @@ def test_one_target_in_noise_is_found_and_noise_is_not() -> None:
 def test_masks_of_the_papers_code(name: str) -> None:
     mocap = os.environ.get("RTRADAR_MOCAP")
     if not mocap:
-        pytest.skip("RTRADAR_MOCAP is not set: the reference masks stand beside that folder")
+        pytest.skip("RTRADAR_MOCAP is not set: the reference masks are beside that folder")
     with np.load(Path(mocap).parent / "reference" / "cfar_crops_octave.npz") as crops:
         power, mask = 10 ** (crops[name] / 10), crops[f"os_{name}"].astype(bool)
     np.testing.assert_array_equal(os_cfar(power, scale=5.0003), mask)

@@ -122,9 +122,9 @@ def test_exponential_against_its_response(turns: float, cycles_of_time: float) -
     y = removed(
         "exponential", x[:, None, None], radar=radar, time_constant_s=cycles_of_time * 1e-3
     )[:, 0, 0, 0]
-    share = 1 - math.exp(-1 / cycles_of_time)
+    weight = 1 - math.exp(-1 / cycles_of_time)
     turn = np.exp(-2j * np.pi * turns)
-    steady = (1 - turn) / (1 - (1 - share) * turn)
+    steady = (1 - turn) / (1 - (1 - weight) * turn)
     # What the start leaves has died to exp(-500 / 20) = 1e-11 after 500 cycles.
     np.testing.assert_allclose(y[500:], steady * x[500:], rtol=0, atol=3e-11 * abs(x[0]))
 
@@ -132,7 +132,7 @@ def test_exponential_against_its_response(turns: float, cycles_of_time: float) -
 @pytest.mark.parametrize(
     ("time_constant_s", "expected"),
     [
-        (1e-3 / math.log(2), [0, 0, 8, -12]),  # the share is 1/2: the background goes 8, 8, 8, 12
+        (1e-3 / math.log(2), [0, 0, 8, -12]),  # the weight is 1/2: the background goes 8, 8, 8, 12
         (1.0, [0, 0, 8, -32 / 3]),  # the mean of all so far: 8, 8, 8, 32/3
     ],
 )
@@ -140,7 +140,7 @@ def test_exponential_by_hand(time_constant_s: float, expected: list[float]) -> N
     radar = Radar(tx_y=1, tx_z=0, rx_y=1, rx_z=0, samples_per_chirp=1, chirp_duration_s=1e-3)
     x = np.array([8.0, 8.0, 16.0, 0.0])[:, None, None]
     left = removed("exponential", x, radar=radar, time_constant_s=time_constant_s)
-    np.testing.assert_allclose(left.ravel(), expected, atol=1e-13)  # rounding of the share
+    np.testing.assert_allclose(left.ravel(), expected, atol=1e-13)  # rounding of the weight
 
 
 @pytest.mark.parametrize("turns", [2.0, 2.5, 5.3, 17.77, 31.5, -9.2])

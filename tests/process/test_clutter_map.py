@@ -47,12 +47,12 @@ def test_equal_weights_are_cell_averaging(n: int, looks: int, log_pfa: float) ->
     )
 
 
-@given(share=st.floats(0.01, 0.9), log_pfa=st.floats(math.log(1e-10), math.log(0.5)))
+@given(weight=st.floats(0.01, 0.9), log_pfa=st.floats(math.log(1e-10), math.log(0.5)))
 @settings(max_examples=40, deadline=None)
 def test_one_look_of_the_exponential_filter_is_nitzbergs_product(
-    share: float, log_pfa: float
+    weight: float, log_pfa: float
 ) -> None:
-    weights = share * (1 - share) ** np.arange(2000)
+    weights = weight * (1 - weight) ** np.arange(2000)
     alpha = clutter_map_scale(weights, math.exp(log_pfa))
     assert -np.log1p(alpha * weights).sum() == pytest.approx(
         log_pfa, abs=1e-8
@@ -112,7 +112,7 @@ def test_map_against_weights_by_hand(data: st.DataObject) -> None:
     )
     scale = 1.7
     clutter = ClutterMap(radar, time_constant_s=time_constant_s, scale=scale)
-    share = 1 - math.exp(-hop / time_constant_s)
+    weight = 1 - math.exp(-hop / time_constant_s)
     starts = radar.window_starts(10_000)
     for window in range(n):
         found = clutter.push(power[window])
@@ -126,7 +126,7 @@ def test_map_against_weights_by_hand(data: st.DataObject) -> None:
         assert starts[window] - starts[past - 1] >= 16
         weights = np.array([1.0])
         for count in range(2, past + 1):
-            step = max(share, 1 / count)
+            step = max(weight, 1 / count)
             weights = np.append(weights * (1 - step), step)
         level = np.tensordot(weights, power[:past], axes=1)
         clear = abs(power[window] - scale * level) > 1e-12  # ties go either way by rounding
@@ -177,8 +177,8 @@ def test_multipliers_fall_as_the_map_grows_and_then_stay(radar: Radar) -> None:
     # number of cycles.
     assert (steps <= 1e-9).all()
     assert scales[-1] == scales[-100]
-    share = 1 - math.exp(-1 / 20)
-    steady = clutter_map_scale(share * (1 - share) ** np.arange(400), 1e-3)
+    weight = 1 - math.exp(-1 / 20)
+    steady = clutter_map_scale(weight * (1 - weight) ** np.arange(400), 1e-3)
     if radar is APART:
         assert scales[-1] == pytest.approx(steady, rel=2e-3)  # a few windows less than all
     else:

@@ -262,7 +262,7 @@ def test_the_picture_shows_the_echo_where_it_is(tmp_path: Path) -> None:
         tmp_path / "s.png", found.power, found.time, found.velocity, LOW, "receding at 4 m/s"
     )
     shown = imread(tmp_path / "s.png")[:, :, :3]
-    # The brightest yellow of the colours, left of the colour bar, stands in the upper half:
+    # The brightest yellow of the colours, left of the colour bar, is in the upper half:
     # velocity rises upward.
     rows, columns = np.nonzero(np.abs(shown - [0.993, 0.906, 0.144]).max(axis=2) < 0.02)
     line = rows[columns < 0.8 * shown.shape[1]]

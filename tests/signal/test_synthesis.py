@@ -81,7 +81,7 @@ def synthesize_block(echoes: Echoes, radar: Radar) -> Complex:
 
 
 def plain_sum(echoes: Echoes, radar: Radar) -> Complex:
-    """x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) as it stands, the
+    """x[n] = sum_e A_e(f_n) exp(+j 2 pi (f_c tau + s tau t_n - s tau^2 / 2)) term by term, the
     turns in long double."""
     t = (
         np.arange(radar.samples_per_chirp, dtype=np.longdouble)
@@ -210,12 +210,12 @@ def test_conjugate_of_the_if_is_the_received_spectrum() -> None:
 
 
 def test_a_phase_over_frequency_is_a_way() -> None:
-    # A scattering length exp(-j 2 pi f delta) is a detour of c delta, told in amplitude instead of
+    # A scattering length exp(-j 2 pi f delta) is a detour of c delta, given in amplitude instead of
     # in length.
     delta = 1e-12
     frequency = np.array([12e9, 14e9, 16e9])
     scattering = np.exp(-2j * np.pi * frequency * delta)
-    told = make_echoes(
+    given_in_amplitude = make_echoes(
         np.full((1, 8, 1), 8.0),
         np.broadcast_to(np.conj(scattering)[:, None, None, None], (3, 1, 8, 1)),
         frequency,
@@ -226,7 +226,7 @@ def test_a_phase_over_frequency_is_a_way() -> None:
     # A detour in amplitude misses its part of s tau^2 / 2: 2 pi s tau delta = 1.1e-5 rad. A wrong
     # sign would give 0.2.
     np.testing.assert_allclose(
-        synthesize_block(told, LOW), synthesize_block(walked, LOW), rtol=0, atol=2e-5
+        synthesize_block(given_in_amplitude, LOW), synthesize_block(walked, LOW), rtol=0, atol=2e-5
     )
 
 

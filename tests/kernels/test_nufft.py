@@ -21,7 +21,7 @@ FEW, TWO, ONE = (
 ODD = Radar(tx_y=2, tx_z=1, rx_y=2, rx_z=2, samples_per_chirp=45, frame_duration_s=3.75e-3)
 
 
-def crowd(
+def many_echoes(
     radar: Radar, nodes: int, seed: int, *, count: int = MANY_ECHOES, chirps: int = 3
 ) -> Echoes:
     rng = np.random.default_rng(seed)
@@ -62,7 +62,7 @@ def plain(echoes: Echoes, radar: Radar) -> NDArray[np.complex128]:
     "radar", [LOW, ODD, FEW, TWO, ONE], ids=["12ghz", "45 samples", "16 samples", "2", "1"]
 )
 def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int) -> None:
-    echoes = crowd(radar, nodes, seed=nodes)
+    echoes = many_echoes(radar, nodes, seed=nodes)
     expected = plain(echoes, radar)
     found = synthesize(echoes, radar, radar.chirp_times(3), dtype=np.complex64)
     assert found.dtype == np.complex64
@@ -74,7 +74,7 @@ def test_many_echoes_are_the_plain_sum_to_float32(radar: Radar, nodes: int) -> N
 def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chirps(
     seed: int,
 ) -> None:
-    echoes = crowd(ODD, 3, seed, chirps=60)
+    echoes = many_echoes(ODD, 3, seed, chirps=60)
     order = np.random.default_rng(seed).permutation(MANY_ECHOES)
     times = ODD.chirp_times(60)
     shuffled = replace(
@@ -93,7 +93,7 @@ def test_the_sum_does_not_depend_on_the_order_of_echoes_nor_on_the_blocks_of_chi
 
 def test_one_echo_among_silent_ones_is_a_clean_tone() -> None:
     """What is left out of a tone lies far below it at every other beat frequency."""
-    echoes = crowd(LOW, 1, seed=0)
+    echoes = many_echoes(LOW, 1, seed=0)
     alone = np.zeros_like(echoes.amplitude)
     alone[..., 5] = 1.0
     length = np.full_like(echoes.length, 5.4321)
