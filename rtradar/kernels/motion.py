@@ -56,15 +56,14 @@ def pose(times, which, knots, root, rotation, offsets, parents, positions, quate
 
 
 def pose_reference(times, knots, root, rotation, offsets, parents):
-    """Positions (time, joint, 3) and quaternions (time, joint, 4) of `pose`, in plain NumPy."""
+    """Positions (time, joint, 3) and quaternions (time, joint, 4) of `pose`, by SciPy."""
     interval = np.clip(np.searchsorted(knots, times, side="right") - 1, 0, len(knots) - 2)
     powers = (times - knots[interval]) ** np.arange(3, -1, -1)[:, None]
     quaternions = np.einsum("pt,pti->ti", powers, rotation[:, interval])
     quaternions = quaternions.reshape(len(times), -1, 4)
     quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
-    axis, scalar = quaternions[..., :3], quaternions[..., 3:]
-    across = 2 * np.cross(axis, offsets)
-    positions = offsets + scalar * across + np.cross(axis, across)
+    rotations = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix()
+    positions = (rotations.reshape(len(times), -1, 3, 3) @ offsets[:, :, None])[..., 0]
     positions[:, 0] = np.einsum("pt,pti->ti", powers, root[:, interval])
     for joint in range(1, len(parents)):
         positions[:, joint] += positions[:, parents[joint]]
