@@ -35,7 +35,7 @@ models = {
     "analytic": ("analytic", {}),
     "specular": ("specular", {}),
     "fresnel, 16 rays": ("fresnel", {"shadow_rays": 16}),
-    "fresnel, 256 rays": ("fresnel", {"shadow_rays": 256}),
+    "fresnel, 400 rays": ("fresnel", {"shadow_rays": 400}),
     "physical-optics, 1280 facets": ("physical-optics", {"facets": 1280}),
     "physical-optics, 5120 facets": ("physical-optics", {"facets": 5120}),
 }

@@ -84,7 +84,8 @@ def _open_fractions() -> tuple[Call, Call]:
     from rtradar.kernels.scatter.zone_edges import open_fractions_reference as reference
 
     (maps, _), line = _zones(1), (np.cos(0.4), np.sin(0.4), 1.7)
-    given = maps, straight_edge(maps, line, 12)
+    bounds = np.arange(0, CELLS + 1, 4)
+    given = maps, straight_edge(maps, line, bounds), bounds
     call = filled(open_fractions, *given, out=(np.empty((1, 1, MERIDIANS, CELLS)),))
     return call, lambda: reference(maps.rim[0], line)
 

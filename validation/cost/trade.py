@@ -70,7 +70,7 @@ def for_both(values: Any) -> dict[str, Any]:
 
 
 OPTIONS = (
-    ModelOption("fresnel", "shadow_rays", for_both((16, 64, 256)), for_both(256), "-"),
+    ModelOption("fresnel", "shadow_rays", for_both((16, 64, 400)), for_both(400), "-"),
     ModelOption(
         "physical-optics", "anchor_s", for_both((40e-3, 20e-3, 10e-3, 5e-3)), for_both(10e-3), "--"
     ),

@@ -43,7 +43,7 @@ from rtradar.validate.rows import Row, judged, main, reported
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
-SHADOW_RAYS = (16, 64, 256)
+SHADOW_RAYS = (16, 64, 400)
 TARGETS = {
     "thigh": TARGET,
     "head": np.array([0.06, 0.06, 0.1]),
@@ -113,7 +113,9 @@ def scene(target: Array, occluder: Array, place: Array, turn: Array) -> rt.Ellip
     return rt.Ellipsoids([np.zeros(3), place], frames, [target, occluder])
 
 
-def ours(ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = 256) -> Complex:
+def ours(
+    ellipsoids: rt.Ellipsoids, frequency: Array, shadow_rays: int = SHADOW_RAYS[-1]
+) -> Complex:
     """Field by `fresnel` at each frequency."""
     antenna = np.broadcast_to(ANTENNA, (len(frequency), 3))
     return fresnel_scattering(ellipsoids, antenna, antenna, frequency, shadow_rays=shadow_rays)
@@ -162,7 +164,7 @@ def edge_rows(quick: bool) -> Iterator[Row]:
                                 (ours(ellipsoids, frequencies, rays) - before) / free - optics
                             )
                             everything[rays].append(wrong)
-                            if rays == 256:
+                            if rays == SHADOW_RAYS[-1]:
                                 errors.append(wrong[partly])
                                 rough.append(np.abs(np.round(np.abs(optics)) - optics)[partly])
             claim = f"{band.name}, edge of a {name}"

@@ -1,6 +1,7 @@
 """Open fractions of the cells of Fresnel zones, from the edges that rays have found.
 
-Rays are traced to the corners of wide cells, several cells along a meridian. Where some corners of
+Rays are traced to the corners of wide cells, each of which is one or several cells along a
+meridian: one near the specular point, more farther out. Where some corners of
 such a cell are blocked, the edge through it is the straight line in the plane of rho between the
 two places at which it crosses the sides of the cell; see `rtradar.kernels.scatter.fresnel_zones`.
 """
@@ -72,15 +73,15 @@ def _open_cell(line, j, here, after, cosine, sine):
 
 
 @compiled()
-def open_fractions(maps, edges, out):
+def open_fractions(maps, edges, bounds, out):
     """Fill in the fraction of each cell that is open, ``out (zone, antenna, meridian, cell)``.
 
-    The cells between a meridian and the next are counted with that meridian.
+    The cells between a meridian and the next are counted with that meridian. Wide cells go from
+    one of the ``bounds (band + 1,)`` int64 to the next, counted in cells.
     """
     angle = 2 * math.pi / MERIDIANS
     cosine, sine = math.cos(angle), math.sin(angle)
     zones, antennas, _, bands = edges.radial.shape[:4]
-    wide = CELLS // bands
     found = np.empty((4, 2))
     for zone in range(zones):
         for a in range(antennas):
@@ -91,7 +92,8 @@ def open_fractions(maps, edges, out):
                 here, there = maps.rim[zone, m] / CELLS, maps.rim[zone, after] / CELLS
                 east_x, east_y = math.cos(m * angle), math.sin(m * angle)
                 for band in range(bands):
-                    cells = out[zone, a, m, band * wide : (band + 1) * wide]
+                    begin, end = bounds[band], bounds[band + 1]
+                    cells = out[zone, a, m, begin:end]
                     b00, b01, b10, b11 = own[band], own[band + 1], its[band], its[band + 1]
                     if b00 == b01 and b00 == b10 and b00 == b11:
                         cells[:] = 0.0 if b00 else 1.0
@@ -112,18 +114,18 @@ def open_fractions(maps, edges, out):
                         found[n, 0] = east_x * place[0] + east_y * place[1]
                         found[n, 1] = east_x * place[1] - east_y * place[0]
                         n += 1
-                    inner = here * band * wide
-                    outer = there * (band + 1) * wide
+                    inner = here * begin
+                    outer = there * end
                     # Four crossings are two edges, each round a corner, opposite to one another.
                     second = found[1] if n == 2 else found[2]
                     line = _line(found[0], second, inner, 0.0, not b00)
-                    for j in range(wide):
-                        cells[j] = _open_cell(line, band * wide + j, here, there, cosine, sine)
+                    for j in range(end - begin):
+                        cells[j] = _open_cell(line, begin + j, here, there, cosine, sine)
                     if n == 4:
                         x, y = outer * cosine, outer * sine
                         line = _line(found[1], found[3], x, y, not b11)
-                        for j in range(wide):
-                            more = _open_cell(line, band * wide + j, here, there, cosine, sine)
+                        for j in range(end - begin):
+                            more = _open_cell(line, begin + j, here, there, cosine, sine)
                             both = cells[j] + more
                             cells[j] = max(both - 1, 0.0) if b00 else min(both, 1.0)
 
@@ -144,10 +146,10 @@ def open_fractions_reference(rim, line, samples=64):
     return out
 
 
-def straight_edge(maps, line, bands):
+def straight_edge(maps, line, bounds):
     """Make the `Edges` of one zone and antenna along a x + b y + c = 0, blocked where negative."""
     angle = 2j * np.pi * np.arange(MERIDIANS)[:, None] / MERIDIANS
-    corners = maps.rim[0, :, None] * np.arange(bands + 1) / bands * np.exp(angle)
+    corners = maps.rim[0, :, None] * bounds / CELLS * np.exp(angle)
     value = line[0] * corners.real + line[1] * corners.imag + line[2]
     found = [value < 0]
     # Sides along meridians, and from each meridian to the next.

@@ -42,10 +42,11 @@ _AT_ONCE = 64
 _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
 
-SHADOW_RAYS, LEAST_SHADOW_RAYS, MOST_SHADOW_RAYS = 256, 8, 4096
+SHADOW_RAYS, LEAST_SHADOW_RAYS, MOST_SHADOW_RAYS = 400, 8, 4096
 """Points on each part to which rays are traced from each antenna, before edges are bisected."""
 
 Array = NDArray[np.float64]
+Bounds = NDArray[np.int64]
 
 
 class Zones(NamedTuple):
@@ -103,24 +104,28 @@ def zone_fractions(
     InputError
         Where ``shadow_rays`` is out of range.
     """
-    bands = bands_of(shadow_rays)
+    bounds = bounds_of(shadow_rays)
     out = np.ones((len(zones.part), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
     for begin in range(0, len(out), _AT_ONCE):
         own = slice(begin, begin + _AT_ONCE)
         some = Zones._make(np.ascontiguousarray(field[own]) for field in zones)
         maps = _maps(some, poses)
-        edges = _edges(tracer, some, poses, maps, bands)
+        edges = _edges(tracer, some, poses, maps, bounds)
         cut = np.flatnonzero(edges.blocked.any(axis=(1, 2, 3)) & maps.exists)
         if not len(cut):
             continue
         maps, edges = ZoneMaps._make(a[cut] for a in maps), Edges._make(a[cut] for a in edges)
         given = (some.points[cut], some.antennas[cut], pairs, wavenumber[own][cut])
-        out[begin + cut] = _sums(maps, edges, *given)
+        out[begin + cut] = _sums(maps, edges, bounds, *given)
     return out
 
 
-def bands_of(shadow_rays: int) -> int:
-    """Return the number of traced corners along each meridian beyond the specular point.
+def bounds_of(shadow_rays: int) -> Bounds:
+    """Return where wide cells begin and end along a meridian, counted in cells.
+
+    Near the specular point each is one cell, and farther out as wide as a fixed fraction of the
+    distance from it, because what an edge does near that point counts most
+    (`validation/other_methods/fresnel.py`, power beside the Doppler line).
 
     Raises
     ------
@@ -133,8 +138,17 @@ def bands_of(shadow_rays: int) -> int:
             f"fresnel: shadow_rays = {shadow_rays!r}; it must be a whole number from "
             f"{LEAST_SHADOW_RAYS} to {MOST_SHADOW_RAYS}"
         )
-    divisors = (n for n in range(1, CELLS + 1) if CELLS % n == 0)
-    return min(divisors, key=lambda n: abs(n - shadow_rays / MERIDIANS))
+    growths = [*((1, n) for n in range(1, CELLS + 1)), *((n, 1) for n in (2, 4, 8, CELLS))]
+    graded = (_graded(*growth) for growth in growths)
+    return min(graded, key=lambda bounds: abs(len(bounds) - 1 - shadow_rays / MERIDIANS))
+
+
+def _graded(times: int, over: int) -> Bounds:
+    """Return bounds of wide cells, each ``times / over`` of its distance wide, and at least 1."""
+    bounds = [0]
+    while bounds[-1] < CELLS:
+        bounds.append(min(bounds[-1] + max(1, bounds[-1] * times // over), CELLS))
+    return np.array(bounds)
 
 
 def _maps(zones: Zones, poses: Poses) -> ZoneMaps:
@@ -145,10 +159,11 @@ def _maps(zones: Zones, poses: Poses) -> ZoneMaps:
     return maps
 
 
-def _edges(tracer: BodyTracer, zones: Zones, poses: Poses, maps: ZoneMaps, bands: int) -> Edges:
+def _edges(tracer: BodyTracer, zones: Zones, poses: Poses, maps: ZoneMaps, bounds: Bounds) -> Edges:
     """Trace rays to the corners of the wide cells, and find the edges on the sides between them."""
     n, antennas = zones.antennas.shape[:2]
-    rho = maps.rim[:, :, None] * np.arange(bands + 1) / bands
+    bands = len(bounds) - 1
+    rho = maps.rim[:, :, None] * bounds / CELLS
     angle = np.arange(MERIDIANS)[:, None] * 2 * np.pi / MERIDIANS
     # (zone, meridian, corner, x or y) in the plane of rho.
     corners = np.stack([rho * np.cos(angle), rho * np.sin(angle)], axis=-1)
@@ -212,6 +227,7 @@ def _points(maps: ZoneMaps, zone: NDArray[np.int64], places: Array) -> Array:
 def _sums(
     maps: ZoneMaps,
     edges: Edges,
+    bounds: Bounds,
     points: Array,
     antennas: Array,
     pairs: NDArray[np.int64],
@@ -225,7 +241,7 @@ def _sums(
         end = min(begin + _ZONES_A_THREAD, len(points))
         own = slice(begin, end)
         some = ZoneMaps._make(a[own] for a in maps), Edges._make(a[own] for a in edges)
-        open_fractions(*some, fractions[own])
+        open_fractions(*some, bounds, fractions[own])
         zone_sums(begin, end, maps, points, antennas, pairs, wavenumber, fractions, out)
 
     thread_map(add, range(0, len(points), _ZONES_A_THREAD))

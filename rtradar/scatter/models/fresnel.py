@@ -19,7 +19,7 @@ from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
 from rtradar.scatter.fresnel_zones.visible_fraction import (
     SHADOW_RAYS,
     Zones,
-    bands_of,
+    bounds_of,
     zone_fractions,
 )
 from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
@@ -134,7 +134,7 @@ class Fresnel(BuiltInModel):
         spreading: bool = True,
         shadow_rays: int = SHADOW_RAYS,
     ) -> None:
-        bands_of(shadow_rays)  # refuses what is out of range
+        bounds_of(shadow_rays)  # refuses what is out of range
         self._radar, self._body, self._spreading = radar, body, spreading
         backend = select(variant)
         self.variant: str | None = backend.kind
