@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rtradar.bench.runs import ELSEWHERE
 from rtradar.kernels.prime_factor_dft import prime_factor_dft
-from rtradar.process import SPECTROGRAM_CYCLES, angle_grid, measured_angles, measures_angle
+from rtradar.process import angle_grid, measured_angles, measures_angle, window_cycles
 from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
@@ -73,7 +73,7 @@ def measure_rates(radar: Radar) -> Rates:
             _ffts(radar.cycles_per_frame),
             multiply_adds / dft.multiply_adds if dft is not None else 0,
         ),
-        spectrogram_ffts=_ffts(SPECTROGRAM_CYCLES),
+        spectrogram_ffts=_ffts(window_cycles(radar)),
         angle_ffts=_ffts(max(1, direction_count(radar))),
     )
 
@@ -146,6 +146,8 @@ class Work:
         Cells that CFAR marked, in all frames.
     lines : int
         Lines of the array that measure an angle.
+    spectrogram_cycles : int
+        TDM cycles in a window of the spectrogram.
     """
 
     chirps: int
@@ -157,6 +159,7 @@ class Work:
     channels: int
     detections: int
     lines: int
+    spectrogram_cycles: int
 
     @classmethod
     def of(cls, radar: Radar, *, chirps: int, windows: int, echoes: int, detections: int) -> Work:
@@ -171,6 +174,7 @@ class Work:
             channels=radar.n_channels,
             detections=detections,
             lines=len(measured_angles(radar)),
+            spectrogram_cycles=window_cycles(radar),
         )
 
     @property
@@ -187,7 +191,8 @@ class Work:
     def spectrogram_columns(self) -> int:
         """Windows of one channel's spectrogram; one starts every twentieth of its length."""
         tdm_cycles = self.chirps * self.rx // self.channels
-        return max(0, (tdm_cycles - SPECTROGRAM_CYCLES) // max(1, SPECTROGRAM_CYCLES // 20) + 1)
+        window = self.spectrogram_cycles
+        return max(0, (tdm_cycles - window) // max(1, window // 20) + 1)
 
 
 @dataclass(frozen=True)

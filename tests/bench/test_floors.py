@@ -19,7 +19,16 @@ RATES = Rates(
     angle_ffts=5.0,
 )
 WORK = Work(
-    chirps=240, rx=2, samples=16, echoes=3, windows=5, cycles=10, channels=4, detections=30, lines=2
+    chirps=240,
+    rx=2,
+    samples=16,
+    echoes=3,
+    windows=5,
+    cycles=10,
+    channels=4,
+    detections=30,
+    lines=2,
+    spectrogram_cycles=128,
 )
 
 
@@ -55,3 +64,10 @@ def test_the_size_of_a_run_by_the_papers_radar() -> None:
     assert (work.channels, work.cycles, work.lines) == (96, 133, 2)
     assert work.if_samples == 48_000 * 8 * 256
     assert work.spectrogram_columns == 646  # starts at cycles 0, 6, ... 3870 of 4000
+
+
+def test_a_window_of_the_spectrogram_is_as_long_where_all_transmit_at_once() -> None:
+    radar = Radar(multiplexing="fdm")
+    work = Work.of(radar, chirps=48_000, windows=117, echoes=21, detections=20_000)
+    # 12 Tx at once: windows of 12 x 128 of 4000 cycles, which start at cycles 0, 76, ... 2432.
+    assert (work.spectrogram_cycles, work.spectrogram_columns) == (1536, 33)
