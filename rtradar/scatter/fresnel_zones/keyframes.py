@@ -10,8 +10,8 @@ parabola through neighbours, so that the result has no corners, whatever the spa
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Callable, Iterable
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,7 +87,7 @@ class ZoneFractions:
         self._keyframes: KeyframeCache[int, NDArray[np.complex128]] = KeyframeCache(
             _KEPT_KEYFRAMES, _PASSING
         )
-        self._intervals: OrderedDict[int, _Interval] = OrderedDict()
+        self._intervals: KeyframeCache[int, _Interval] = KeyframeCache(0, _PASSING)
 
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
@@ -114,10 +114,11 @@ class ZoneFractions:
         interval, chirp = np.divmod(chirps, self._step)
         where = chirp / self._step * self._fine
         numbers = np.unique(interval)
+        # At a keyframe alone neighbours do not matter.
+        between = np.isin(numbers, interval[where > 0])
         for begin in range(0, len(numbers), _AT_ONCE):
-            some = numbers[begin : begin + _AT_ONCE]
-            # At a keyframe alone neighbours do not matter.
-            whole = {int(number) for number in interval[where > 0] if number in some}
+            own = slice(begin, begin + _AT_ONCE)
+            some, whole = numbers[own], set(numbers[own][between[own]].tolist())
             self._look_up(whole, set(some.tolist()) - whole, parts)
             for number in some.tolist():
                 inside = np.flatnonzero(interval == number)
@@ -169,7 +170,7 @@ class ZoneFractions:
         number = max(number, 0)
         if number not in self._keyframes:
             self._find_keyframes([number])
-        return self._keyframes.get(number, lambda: self._keyframe(number))
+        return self._keyframes[number]
 
     def _find_keyframes(self, numbers: Iterable[int]) -> None:
         missing = sorted({n for n in (max(n, 0) for n in numbers) if n not in self._keyframes})
@@ -187,17 +188,14 @@ class ZoneFractions:
             self._keyframes.keep(number, found)
 
     def _interval(self, number: int) -> _Interval:
-        interval = self._intervals.get(number)
-        if interval is None:
-            around = np.stack([self._keyframe(number + i) for i in (-1, 0, 1, 2)])
-            bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
-            fine = (bend > _BEND) & (self._fine > 1 and number >= 0)
-            interval = _Interval(fine, around[1:3].copy(), self._fine - 1)
-            self._intervals[number] = interval
-            if len(self._intervals) > _PASSING:
-                self._intervals.popitem(last=False)
-        self._intervals.move_to_end(number)
-        return interval
+        return self._intervals.get(number, partial(self._begin_interval, number))
+
+    def _begin_interval(self, number: int) -> _Interval:
+        """Which parts bend in an interval, from the keyframes around it; no nodes in between."""
+        around = np.stack([self._keyframe(number + i) for i in (-1, 0, 1, 2)])
+        bend = np.abs(np.diff(around, 2, axis=0)).max(axis=(0, 1, 2))
+        fine = (bend > _BEND) & (self._fine > 1 and number >= 0)
+        return _Interval(fine, around[1:3].copy(), self._fine - 1)
 
     def _find_nodes(self, nodes: dict[int, set[int]], parts: NDArray[np.int64]) -> None:
         """Compute what is not known of these nodes of intervals, of these parts."""
