@@ -133,9 +133,8 @@ def use(backend: Backend) -> ModuleType:
     try:
         import mitsuba as mi
 
-        if (
-            first
-        ):  # whoever imported Dr.Jit before us may have computed with it, and rules its threads
+        # Whoever imported Dr.Jit before us may have computed with it, and sets its threads.
+        if first:
             begin_with_one()
         if mi.variant() != backend.variant:
             mi.set_variant(backend.variant)

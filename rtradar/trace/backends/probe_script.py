@@ -43,7 +43,6 @@ if __name__ == "__main__":
     if sys.platform != "win32":
         import resource
 
-        resource.setrlimit(
-            resource.RLIMIT_CORE, (0, 0)
-        )  # an abort may come and should leave no core file
+        # An abort may come, and should leave no core file.
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     main(sys.argv[1])
