@@ -159,7 +159,7 @@ def test_any_block_of_chirps_gets_the_same_echoes(backend: Backend) -> None:
     whole = model.echoes(np.arange(70, 150)).amplitude
     for block in (np.arange(131, 150), np.arange(70, 71), np.arange(71, 131)):
         afresh = Fresnel(radar, body, variant=backend.kind)  # type: ignore[arg-type]
-        # An anchor alone goes without its neighbours: the same but for the last digit.
+        # A keyframe alone goes without its neighbours: the same but for the last digit.
         np.testing.assert_allclose(afresh.echoes(block).amplitude, whole[:, block - 70], rtol=1e-13)
 
 
@@ -178,11 +178,11 @@ def test_shares_of_some_parts_are_as_among_all_and_no_others_are_found(
     monkeypatch.setattr(fresnel_keyframes, "zone_fractions", counted)
     shares = Fresnel(radar, body, variant=backend.kind).fractions  # type: ignore[arg-type]
     np.testing.assert_array_equal(shares.at(chirps, np.array([1])), whole[..., [1]])
-    anchors = len(found)
+    keyframes = len(found)
     np.testing.assert_array_equal(shares.at(chirps, np.array([1])), whole[..., [1]])
-    assert len(found) == anchors  # nothing twice
+    assert len(found) == keyframes  # nothing twice
     np.testing.assert_array_equal(shares.at(chirps, np.array([1, 0])), whole[..., [1, 0]])
-    between = np.concatenate(found[anchors:])
+    between = np.concatenate(found[keyframes:])
     assert (between == 0).all()
     # The edge passes part 0 in these intervals: all their nodes, and at most one on either side.
     inner = shares._fine - 1
@@ -219,7 +219,7 @@ def test_the_fade_is_smooth_and_meets_the_edge(backend: Backend) -> None:
             for t in (target, *alone)
         )
         exact.append((both - before) / free)
-    # What the cubics between anchors leave out.
+    # What the cubics between keyframes leave out.
     np.testing.assert_allclose(share[::20], exact, atol=0.01)
     # Within 3 cm, 2.2 Fresnel radii, exp(-j u^2) bends by 1e-3 a chirp; corners of straight pieces
     # 1.25 ms long, by 5e-3.

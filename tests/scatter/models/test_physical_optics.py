@@ -242,11 +242,11 @@ def envelope_of(
     return Envelope(sample, 2, tolerance, end), asked
 
 
-def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex128]:
-    """Ratio (time, part) at these shares of the way from an anchor to the next."""
+def between(envelope: Envelope, index: int, fraction: Array) -> NDArray[np.complex128]:
+    """Ratio (time, part) at these fractions of the way from a keyframe to the next."""
     ratio, slope, known = envelope.course(index)
-    out = np.empty((len(share), 2), dtype=np.complex128)
-    for row, place in enumerate(share * PLACES):
+    out = np.empty((len(fraction), 2), dtype=np.complex128)
+    for row, place in enumerate(fraction * PLACES):
         for part in range(2):
             left, right = stretch(known[:, part], place)
             values = ratio[left], ratio[right], slope[left], slope[right]
@@ -257,30 +257,32 @@ def between(envelope: Envelope, index: int, share: Array) -> NDArray[np.complex1
     return out
 
 
-def test_a_slow_envelope_is_interpolated_from_the_anchors_alone() -> None:
+def test_a_slow_envelope_is_interpolated_from_the_keyframes_alone() -> None:
     def law(t: float) -> complex:
         return complex(np.exp(0.3j * t))
 
     envelope, asked = envelope_of(law, tolerance=0.1)
-    share = np.linspace(0, 1, 50, endpoint=False)
-    got = between(envelope, 4, share)
+    fraction = np.linspace(0, 1, 50, endpoint=False)
+    got = between(envelope, 4, fraction)
     # A cubic through slopes by neighbours: (0.3)^3 / 6 / 4 at the most.
-    np.testing.assert_allclose(got[:, 0], [law(4 + s) for s in share], atol=1.5e-3)
+    np.testing.assert_allclose(got[:, 0], [law(4 + s) for s in fraction], atol=1.5e-3)
     np.testing.assert_allclose(got[:, 1], 1, rtol=1e-15)
     assert all(place == round(place) for place in asked)
 
 
-def test_where_it_bends_anchors_come_closer_and_the_error_falls() -> None:
+def test_where_it_bends_keyframes_come_closer_and_the_error_falls() -> None:
     def law(t: float) -> complex:
         return complex(
             1 / (1 + np.exp(-(t - 4.4) / 0.05))
         )  # from 0 to 1 within a fifth of an interval
 
-    share = np.linspace(0, 1, 200, endpoint=False)
+    fraction = np.linspace(0, 1, 200, endpoint=False)
     errors = []
     for tolerance in (10.0, 0.05):
         envelope, asked = envelope_of(law, tolerance)
-        errors.append(np.abs(between(envelope, 4, share)[:, 0] - [law(4 + s) for s in share]).max())
+        errors.append(
+            np.abs(between(envelope, 4, fraction)[:, 0] - [law(4 + s) for s in fraction]).max()
+        )
     assert {4 + 3 / PLACES, 4 + 4 / PLACES} <= set(asked)
     assert errors[0] > 0.3
     assert errors[1] < 0.05
@@ -290,11 +292,13 @@ def test_after_the_end_nothing_is_computed_again() -> None:
     def law(t: float) -> complex:
         return complex(np.exp(2j * min(t, 5.0)))
 
-    share = np.linspace(0, 1, 9, endpoint=False)
+    fraction = np.linspace(0, 1, 9, endpoint=False)
     ended, asked = envelope_of(law, end=5)
     plain, more_asked = envelope_of(law)
     for index in range(7):
-        np.testing.assert_array_equal(between(ended, index, share), between(plain, index, share))
+        np.testing.assert_array_equal(
+            between(ended, index, fraction), between(plain, index, fraction)
+        )
     assert max(asked) == 5 < max(more_asked)
     assert len(asked) == len(set(asked))
 
@@ -304,7 +308,7 @@ def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
     def law(t: float) -> complex:
         return complex(np.exp(3j * np.sin(t)))  # bends in every interval
 
-    share = np.linspace(0, 1, 9, endpoint=False)
+    fraction = np.linspace(0, 1, 9, endpoint=False)
     prepared, asked = envelope_of(law, end=20)
     plain, _ = envelope_of(law, end=20)
     for first in range(0, 32, TOGETHER):
@@ -312,7 +316,7 @@ def test_what_is_prepared_is_as_without_and_found_once(step: int) -> None:
         prepared.prepare_courses(courses)
         for index in courses:
             np.testing.assert_array_equal(
-                between(prepared, index, share), between(plain, index, share)
+                between(prepared, index, fraction), between(plain, index, fraction)
             )
     assert len(asked) == len(set(asked)) > 21
     assert any(place != round(place) for place in asked)
@@ -322,17 +326,19 @@ def test_courses_may_be_asked_for_backwards() -> None:
     def law(t: float) -> complex:
         return complex(np.exp(0.3j * t))
 
-    share = np.linspace(0, 1, 5, endpoint=False)
+    fraction = np.linspace(0, 1, 5, endpoint=False)
     envelope, _ = envelope_of(law, tolerance=0.1)
     for index in [*range(40, 0, -1), 40, 20, 1]:
         # As above: a cubic through slopes by neighbours.
         np.testing.assert_allclose(
-            between(envelope, index, share)[:, 0], [law(index + s) for s in share], atol=1.5e-3
+            between(envelope, index, fraction)[:, 0],
+            [law(index + s) for s in fraction],
+            atol=1.5e-3,
         )
 
 
 @given(st.integers(0, 2**32 - 1))
-def test_an_envelope_has_one_value_and_one_slope_at_an_anchor(seed: int) -> None:
+def test_an_envelope_has_one_value_and_one_slope_at_a_keyframe(seed: int) -> None:
     phases = np.random.default_rng(seed).uniform(0, 3, 40)
 
     def law(t: float) -> complex:

@@ -294,9 +294,9 @@ def test_one_bounce_is_what_specular_sees() -> None:
 
 
 @pytest.mark.slow
-def test_between_anchors_echoes_are_nearly_those_of_every_chirp() -> None:
+def test_between_keyframes_echoes_are_nearly_those_of_every_chirp() -> None:
     radar, body = walk()
-    chirps = np.array([16000, 16080, 16124])  # an anchor, half way to the next, and nearly there
+    chirps = np.array([16000, 16080, 16124])  # a keyframe, half way to the next, and nearly there
     plain, between = (
         Rays(radar, body, bounces=1, rays_per_wavelength=1.0, anchor_s=s).echoes(chirps)
         for s in (0.0, 10e-3)

@@ -81,17 +81,17 @@ def test_a_keyframe_knows_visibility_and_a_specular_point_of_each_part(backend: 
     radar, body = small_radar(), Curtain(0.0)
     poses = body.at(np.zeros(radar.n_tx))
     at = ChirpPoses(np.arange(2), radar.tx, radar.rx[radar.rx_of_tx], *poses)
-    anchor = trace_keyframe(BodyTracer(use(backend), body.semi_axes), at)
-    assert anchor.visible.shape == (2, 2, 2)
-    np.testing.assert_array_equal(anchor.visible[..., 0], False)
-    np.testing.assert_array_equal(anchor.visible[..., 1], True)
+    keyframe = trace_keyframe(BodyTracer(use(backend), body.semi_axes), at)
+    assert keyframe.visible.shape == (2, 2, 2)
+    np.testing.assert_array_equal(keyframe.visible[..., 0], False)
+    np.testing.assert_array_equal(keyframe.visible[..., 1], True)
     # On the side that faces the radar, whose antennas are 5 cm apart.
-    np.testing.assert_allclose(anchor.start[1], [-0.3, 0, 0], atol=0.01)
+    np.testing.assert_allclose(keyframe.start[1], [-0.3, 0, 0], atol=0.01)
 
 
 def test_a_fade_is_smooth_monotone_and_ends_at_the_keyframes(backend: Backend) -> None:
     # The curtain frees the line of sight once within the second; what changes there is one interval
-    # between anchors.
+    # between keyframes.
     radar, body = small_radar(), Curtain(3.0)
     step = keyframe_step(radar)
     assert step == 10
@@ -118,7 +118,7 @@ def test_the_fade_meets_the_instant_of_the_edge(backend: Backend) -> None:
     # Monostatic, the ray runs along x: free as soon as the curtain's centre is its radius away.
     free = 0.1 + 0.3 / 3.0
     half = radar.chirp_duration_s * (chirps[np.flatnonzero(weight >= 0.5)[0]] + 0.5)
-    # Between two anchors 10 ms apart the instant is not known better than to half of that.
+    # Between two keyframes 10 ms apart the instant is not known better than to half of that.
     assert abs(half - free) <= 5e-3 + radar.chirp_duration_s
 
 
@@ -171,10 +171,10 @@ def test_keyframes_are_the_same_where_only_a_few_are_remembered(
 
     monkeypatch.setattr(visibility, "trace_keyframe", counted)
     few = SpecularVisibility(radar, body, BodyTracer(use(backend), body.semi_axes))  # type: ignore[arg-type]
-    anchors = np.arange(150, 261, 10)
-    few.at(anchors)
+    keyframes = np.arange(150, 261, 10)
+    few.at(keyframes)
     assert len(traced) == len({*traced}) == 12
-    # Cut inside intervals: each needs the anchors on both sides of it, which must still be there.
+    # Cut inside intervals: each needs the keyframes on both sides of it, which must still be there.
     pieces = [few.at(block)[0] for block in np.split(np.arange(150, 260), [13, 14, 57, 88])]
     np.testing.assert_array_equal(np.concatenate(pieces), whole)
     # The first two stayed; each of the others is traced once more.
