@@ -1,0 +1,373 @@
+"""A model in a room: what occludes, transmits and is left out, and which models it takes."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from rtradar.conventions import SPEED_OF_LIGHT_MPS
+from rtradar.errors import InputError
+from rtradar.kernels.scatter.specular_point import Geometry
+from rtradar.radar import Radar
+from rtradar.scatter import build_model
+from rtradar.scatter.common.keyframes import keyframe_step
+from rtradar.scatter.common.poses import chirp_poses
+from rtradar.scatter.echo_models import models_that
+from rtradar.scatter.models.analytic import Analytic
+from rtradar.scatter.models.specular import Specular
+from rtradar.scatter.multipath.image_paths import images
+from rtradar.scatter.multipath.room_model import KEYFRAMES_S, RoomModel
+from rtradar.scatter.specular_point.solver import solve_specular_points
+from rtradar.scene import Furniture, Scene, Wall, material
+from rtradar.trace.backends.backend import Backend
+
+Array = NDArray[np.float64]
+Make = Callable[..., Any]
+
+
+def unit(vector: Array) -> Array:
+    return vector / np.linalg.norm(vector, axis=-1, keepdims=True)
+
+
+def by_name(model: RoomModel, name: str) -> int:
+    """Place of the echo of a one-part body over that path."""
+    return [path.name for path in model.paths].index(name)
+
+
+# -- what occludes and what transmits --------------------------------------------------------------
+
+
+def test_an_empty_scene_is_specular_itself(backend: Backend, one: Make) -> None:
+    body, radar, chirps = (
+        one(velocity=(-1.0, 0.0, 0.0)),
+        Radar.preset("paper-12ghz"),
+        np.arange(100),
+    )
+    alone = Specular(radar, body, variant=backend.kind)  # type: ignore[arg-type]
+    ours = RoomModel(alone, Scene(), radar, body).echoes(chirps)  # type: ignore[arg-type]
+    free = Specular(radar, body, variant=backend.kind).echoes(chirps)  # type: ignore[arg-type]
+    np.testing.assert_array_equal(ours.length, free.length)
+    np.testing.assert_array_equal(ours.amplitude, free.amplitude)
+
+
+def test_a_slab_before_the_radar_lets_its_square_through(
+    backend: Backend, one: Make, single: Make
+) -> None:
+    body = one((0.2, 0.2, 0.2), (0.0, 1.0, 1.0))
+    radar = single()
+    plasterboard = Wall(
+        name="partition",
+        corner_m=(-2.0, -2.0, 0.0),
+        edge_u_m=(0.0, 6.0, 0.0),
+        edge_v_m=(0.0, 0.0, 3.0),
+        material=material("plasterboard"),
+        thickness_m=0.003,
+    )
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(plasterboard,)), variant=backend.kind
+    )  # type: ignore[arg-type]
+    echoes, free = (
+        model.echoes(np.arange(2)),
+        Specular(radar, body, variant=backend.kind).echoes(np.arange(2)),
+    )  # type: ignore[arg-type]
+    # Straight on: two faces and all that goes to and fro between them, by hand, less as much air.
+    root = np.sqrt(material("plasterboard").eta(echoes.frequency))
+    wave = 2 * np.pi * echoes.frequency / SPEED_OF_LIGHT_MPS
+    face, inside = (1 - root) / (1 + root), np.exp(-1j * wave * root * 0.003)
+    through = (1 - face**2) * inside / (1 - face**2 * inside**2) * np.exp(1j * wave * 0.003)
+    ratio = echoes.amplitude[:, :, 0, 0] / free.amplitude[:, :, 0, 0]
+    # Factors are kept in complex64.
+    np.testing.assert_allclose(ratio, np.conj(through**2)[:, None] * np.ones(2), rtol=1e-6)
+    np.testing.assert_allclose(echoes.length[..., 0], free.length[..., 0], rtol=1e-14)
+    # Tx before it, body behind: no wave is reflected from one to the other.
+    np.testing.assert_array_equal(echoes.amplitude[..., 1:], 0)
+
+
+def test_behind_metal_there_is_nothing(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    sheet = replace(
+        wall("left", "metal"),
+        corner_m=(-2.0, -2.0, 0.0),
+        edge_u_m=(0.0, 6.0, 0.0),
+        edge_v_m=(0.0, 0.0, 3.0),
+    )
+    model = build_model(
+        "specular", single(), one(), scene=Scene(walls=(sheet,)), variant=backend.kind
+    )  # type: ignore[arg-type]
+    np.testing.assert_array_equal(model.echoes(np.arange(3)).amplitude, 0)
+
+
+def test_a_wall_reflects_only_where_it_is(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    # A mirror on the left, 1 m wide; by the law of reflection the way over it is at x = -1.9 as the
+    # body passes x = 0.2.
+    body = one((0.1, 0.1, 0.1), (-1.0, 1.0, 1.0), velocity=(4.0, 0.0, 0.0))
+    sheet = replace(
+        wall("left"), corner_m=(-1.4, 2.5, 0.0), edge_u_m=(-1.0, 0.0, 0.0), edge_v_m=(0.0, 0.0, 3.0)
+    )
+    radar = single()
+    model = build_model("specular", radar, body, scene=Scene(walls=(sheet,)), variant=backend.kind)  # type: ignore[arg-type]
+    chirps = np.arange(0, 1000, keyframe_step(radar, KEYFRAMES_S))
+    echoes = model.echoes(chirps)
+    at = chirp_poses(radar, body, chirps)  # type: ignore[arg-type]
+    _, _, point = solve_specular_points(
+        Geometry(images(model.paths[1].back, at.tx), at.rx, *at[3:]), points=True
+    )
+    # Both stand equally far from the wall but for the body's surface: the fraction of the way by
+    # similar triangles.
+    tx_gap, gap = 2.5 - 1.0, 2.5 - point[:, 0, 0, 1]
+    meets = -4.0 + (point[:, 0, 0, 0] + 4.0) * tx_gap / (tx_gap + gap)
+    np.testing.assert_array_equal(
+        np.abs(echoes.amplitude[0, :, 0, 1]) > 0, (meets >= -2.4) & (meets <= -1.4)
+    )
+    seen = np.abs(echoes.amplitude[0, :, 0, 1]) > 0
+    assert 0 < seen.sum() < len(seen)
+    # On its way in it fades: between two keyframes it is neither all nor nothing.
+    first = int(chirps[np.flatnonzero(seen)[0]])
+    fade = np.abs(
+        model.echoes(np.arange(first - keyframe_step(radar, KEYFRAMES_S), first + 1)).amplitude[
+            0, :, 0, 1
+        ]
+    )
+    assert fade[0] == 0
+    assert (np.diff(fade) > 0).all()
+
+
+@pytest.mark.parametrize("hides", [True, False])
+def test_furniture_occludes_both_legs_and_the_way_to_the_wall(
+    hides: bool, backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    # A wardrobe between radar and body; the floor before it is free, but what goes over it meets
+    # its side.
+    place = (-1.0, 1.0, 0.0) if hides else (-1.0, -6.0, 0.0)
+    wardrobe = Furniture(
+        name="wardrobe", mesh="wardrobe", material=material("chipboard"), position_m=place
+    )
+    scene = Scene(walls=(wall("floor"), wall("left")), furniture=(wardrobe,))
+    body = one(centre=(1.0, 1.0, 1.0))
+    model = build_model("specular", single(), body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    seen = np.abs(model.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
+    # The leg over the left wall passes beside it, but each echo over one wall has a straight leg as
+    # well.
+    np.testing.assert_array_equal(seen, not hides)
+    second = build_model("specular", single(), body, scene=scene, variant=backend.kind, order=2)  # type: ignore[arg-type]
+    seen = np.abs(second.echoes(np.arange(1)).amplitude[0, 0, 0]) > 0
+    number = by_name(second, "left > body > left")
+    assert seen[number]
+    assert seen[by_name(second, "floor > body > floor")] == (not hides)
+
+
+def test_another_part_hides_a_leg_over_a_wall(
+    backend: Backend, wall: Make, single: Make, still: Make
+) -> None:
+    # A large sphere on the way from the left wall to the small one; both are free before the radar.
+    small, radar = np.array([0.0, 1.0, 1.0]), single()
+    image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
+    large = small + 0.6 * unit(image - small)
+    body = still(
+        np.stack([small, large]), np.full((2, 3), [[0.05], [0.2]]), np.stack([np.eye(3)] * 2)
+    )
+    model = build_model(
+        "specular", radar, body, scene=Scene(walls=(wall("left"),)), variant=backend.kind
+    )  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(1))
+    seen = {
+        (name, part): bool(abs(echoes.amplitude[0, 0, 0, 2 * i + part]) > 0)
+        for i, name in enumerate(path.name for path in model.paths)
+        for part in (0, 1)
+    }
+    assert seen == {
+        ("body", 0): True,
+        ("body", 1): True,
+        ("left > body", 0): False,
+        ("body > left", 0): False,
+        ("left > body", 1): True,
+        ("body > left", 1): True,
+    }
+
+
+# -- leaving out -----------------------------------------------------------------------------------
+
+
+def test_what_stays_below_the_noise_is_left_out_and_told(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    body, radar = one(), single(frame_duration_s=0.1)
+    scene = Scene(walls=(wall("floor", "wood", 0.02), wall("left")))
+    model = build_model("specular", radar, body, scene=scene, variant=backend.kind)  # type: ignore[arg-type]
+    whole = model.echoes(np.arange(0, 100, 10))
+    power = (np.abs(whole.amplitude) ** 2).mean(axis=(0, 1, 2))
+    gain = 256 * 100
+    of_path = np.array(model.path_names)
+    floor, left = (power[of_path == f"{name} > body"].sum() for name in ("floor", "left"))
+    assert 0 < floor < left
+    # A noise that the floor's echo is below by 11 dB, and the left wall's is not.
+    summaries = model.prune(100, floor * gain * 10**1.1)
+    kept = model.echoes(np.arange(20))
+    names = {summary.path: summary for summary in summaries}
+    assert names["floor > body"].dropped == ["part 0"]
+    assert "10 dB below" in names["floor > body"].why
+    assert names["floor > body"].over_noise_db == pytest.approx(-11.0, abs=0.01)
+    assert names["left > body"].kept == ["part 0"]
+    assert names["left > body"].why == ""
+    assert names["body"].kept == ["part 0"]
+    assert kept.length.shape[2] == 3
+    again = build_model("specular", radar, body, scene=scene, variant=backend.kind).echoes(
+        np.arange(20)
+    )  # type: ignore[arg-type]
+    stay = [0, by_name(model, "body > left"), by_name(model, "left > body")]
+    np.testing.assert_array_equal(kept.amplitude, again.amplitude[..., stay])
+    np.testing.assert_array_equal(kept.length, again.length[..., stay])
+
+
+def test_without_noise_only_what_is_never_seen_is_left_out(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    aside = replace(
+        wall("floor"),
+        corner_m=(20.0, 20.0, 0.0),
+        edge_u_m=(1.0, 0.0, 0.0),
+        edge_v_m=(0.0, 1.0, 0.0),
+    )
+    model = build_model(
+        "specular", single(), one(), scene=Scene(walls=(aside, wall("left"))), variant=backend.kind
+    )  # type: ignore[arg-type]
+    summaries = {summary.path: summary for summary in model.prune(50, 0.0)}
+    assert summaries["floor > body"].dropped == ["part 0"]
+    assert summaries["floor > body"].power_m2 == 0
+    assert "never seen" in summaries["floor > body"].why
+    assert summaries["left > body"].kept == ["part 0"]
+    assert summaries["left > body"].over_noise_db is None
+
+
+# -- the models in a room --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"spreading": False}, "spreading may be off in free space only"),
+        ({"order": -1}, "order = -1"),
+        ({"order": True}, "order = True"),
+        ({"fidelity": "rays"}, f"allowed in a room: {', '.join(models_that('supports_rooms'))}$"),
+        ({"material": "wood"}, "allowed: perfect-conductor, skin"),
+    ],
+)
+def test_what_has_no_meaning_is_refused(
+    given: dict[str, object], message: str, one: Make, wall: Make, single: Make
+) -> None:
+    scene = Scene(walls=(wall("floor"),))
+    options = {"fidelity": "specular"} | given
+    with pytest.raises(InputError, match=message) as error:
+        build_model(radar=single(), body=one(), scene=scene, variant="scalar", **options)  # type: ignore[arg-type]
+    assert "\n" not in str(error.value)
+
+
+def test_direct_echoes_and_ghosts_follow_from_one_formula(
+    one: Make, wall: Make, single: Make
+) -> None:
+    class Double(Analytic):
+        def conductor_echo(self, at: Geometry) -> tuple[Array, Array]:
+            length, amplitude = super().conductor_echo(at)
+            return length + 1, 2 * amplitude
+
+    body, radar, chirps = one(), single(), np.arange(5)
+    for walls in ((), (wall("left"),)):
+        usual, double = (
+            RoomModel(kind(radar, body), Scene(walls=walls), radar, body).echoes(chirps)
+            for kind in (Analytic, Double)
+        )
+        assert double.length.shape[2] == 1 + 2 * len(walls)
+        np.testing.assert_allclose(double.length, usual.length + 1, rtol=1e-12)
+        np.testing.assert_allclose(double.amplitude, 2 * usual.amplitude, rtol=1e-6)
+
+
+def test_analytic_has_the_same_paths_with_its_own_returns(
+    one: Make, wall: Make, single: Make
+) -> None:
+    body, radar = one((0.1, 0.1, 0.1)), single()
+    scene = Scene(walls=(wall("left"),))
+    model = build_model("analytic", radar, body, scene=scene)  # type: ignore[arg-type]
+    echoes = model.echoes(np.arange(5))
+    assert model.variant is None
+    # A sphere's cross-section is pi a^2 from everywhere; at equal azimuths of mirror image and wall
+    # the field stays vertical.
+    point = np.linalg.norm(np.array(radar.position_m) - np.array([0.0, 0.3, 1.2]))
+    assert abs(echoes.amplitude[0, 0, 0, 0]) == pytest.approx(
+        np.sqrt(np.pi) * 0.1 / (point - 0.1) ** 2, rel=1e-6
+    )
+    image = np.array(radar.position_m) * [1, -1, 1] + [0, 5, 0]
+    assert echoes.length[0, 0, 1] == pytest.approx(
+        point + np.linalg.norm(image - [0.0, 0.3, 1.2]) - 0.2, abs=0.05
+    )
+    assert (np.abs(echoes.amplitude[0, 0, 0, 1:]) > 0).all()
+
+
+def test_an_echo_is_one_tone_where_its_wall_is_the_same_over_the_sweep(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    # Two faces of thin plasterboard ripple over a sweep of 4 GHz; the far face of thick concrete is
+    # not seen.
+    walls = (wall("floor", "concrete", 0.2), wall("left", "plasterboard", 0.005))
+    model = build_model("specular", single(), one(), scene=Scene(walls=walls), variant=backend.kind)  # type: ignore[arg-type]
+    amplitude = model.echoes(np.arange(3)).amplitude
+    assert len(amplitude) == 3
+    for name in ("body", "floor > body", "body > floor"):
+        number = by_name(model, name)
+        np.testing.assert_array_equal(
+            amplitude[..., number], np.broadcast_to(amplitude[1, ..., number], amplitude.shape[:3])
+        )
+    number = by_name(model, "left > body")
+    assert np.ptp(np.abs(amplitude[:, 0, 0, number])) > 0.1 * np.abs(amplitude[1, 0, 0, number])
+
+
+@pytest.mark.parametrize("name", ["perfect-conductor", "skin"])
+def test_the_person_alone_is_specular_in_free_space(
+    name: str, backend: Backend, one: Make, wall: Make
+) -> None:
+    body, radar, chirps = (
+        one(velocity=(-1.0, 0.0, 0.0)),
+        Radar.preset("paper-12ghz"),
+        np.arange(100),
+    )
+    scene = Scene(walls=(wall("floor", "concrete"),))
+    room = build_model("specular", radar, body, scene=scene, variant=backend.kind, material=name)  # type: ignore[arg-type]
+    free = Specular(radar, body, variant=backend.kind, material=name).echoes(chirps)  # type: ignore[arg-type]
+    alone = room.person.echoes(chirps)
+    np.testing.assert_array_equal(alone.length, free.length)
+    np.testing.assert_array_equal(alone.amplitude, free.amplitude)
+    # Its direct echo in the room is the same, for the floor is beside it.
+    direct = room.echoes(chirps).amplitude[1, ..., 0]
+    # In the room the reflection of skin follows the sweep and the ends of the lines, here it is
+    # that of the middle.
+    np.testing.assert_allclose(direct, free.amplitude[0, ..., 0], rtol=2e-3)
+
+
+def test_skin_over_a_wall_is_weaker_by_its_reflection(
+    backend: Backend, one: Make, wall: Make, single: Make
+) -> None:
+    scene, chirps = Scene(walls=(wall("left"),)), np.arange(2)
+    body = one((0.2, 0.2, 0.2))
+    metal, skin = (
+        build_model(
+            "specular", single(), body, scene=scene, variant=backend.kind, material=name
+        ).echoes(chirps)  # type: ignore[arg-type]
+        for name in ("perfect-conductor", "skin")
+    )
+    # The specular point is met at 20 degrees by a field across the plane of incidence: TE by hand,
+    # and nearly alike.
+    eta = material("skin").eta(metal.frequency)[0]
+    ratio = skin.amplitude[0, 0, 0, 1] / metal.amplitude[0, 0, 0, 1]
+    image = np.array([-4.0, 4.0, 1.0])
+    ways = [
+        unit(place - np.array([0.0, 0.3, 1.2])) for place in (image, np.array([-4.0, 1.0, 1.0]))
+    ]
+    cosine = np.sqrt((1 + ways[0] @ ways[1]) / 2)
+    root = np.sqrt(eta - 1 + cosine**2)
+    # The sphere's radius moves the angle by a degree, and the field is a little out of the plane.
+    assert ratio == pytest.approx(np.conj((root - cosine) / (root + cosine)), rel=0.01)
