@@ -11,7 +11,6 @@ from rtradar.body import Body, Ellipsoids
 from rtradar.body.body import Poses
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.echoes import Echoes
-from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import sweep_nodes
 from rtradar.scatter.common.poses import BuiltInModel, chirp_poses, one_echo_a_part
@@ -23,6 +22,7 @@ from rtradar.scatter.fresnel_zones.visible_fraction import (
     zone_fractions,
 )
 from rtradar.scatter.specular_point.solver import StartPoints, solve_specular_points
+from rtradar.scatter.target import sum_of_echoes, target_geometry
 from rtradar.trace.backends.backend import select, use
 from rtradar.trace.body_tracer import BodyTracer
 
@@ -81,25 +81,19 @@ def fresnel_scattering(
     Equation :eq:`fresnel` of the theory page.
     """
     pairs, parts = len(tx), len(target.semi_axes)
-    poses = Poses(target.centres[None], target.frames[None], target.semi_axes)
-    centres, frames = (np.repeat(a, pairs, axis=0) for a in poses[:2])
-    length, amplitude, points = solve_specular_points(
-        Geometry(tx, rx[:, None], centres, frames, target.semi_axes),
-        polarization=polarization,
-        points=True,
-    )
-    wavenumber = 2 * np.pi * np.asarray(frequency, dtype=np.float64) / SPEED_OF_LIGHT_MPS
+    at = target_geometry(target, tx, rx)
+    length, amplitude, points = solve_specular_points(at, polarization=polarization, points=True)
+    wavenumber = 2 * np.pi * frequency / SPEED_OF_LIGHT_MPS
     # One zone for each pair and part, pairs outermost.
     part = np.tile(np.arange(parts), pairs)
     zone_tx, zone_rx, k = (np.repeat(a, parts, axis=0) for a in (tx, rx, wavenumber))
     pose, antennas = np.zeros(len(part), dtype=np.int64), np.stack([zone_tx, zone_rx], axis=1)
     zones = Zones(zone_tx, zone_rx, points.reshape(-1, 3), part, pose, antennas, k)
     tracer = BodyTracer(use(select(variant)), target.semi_axes)
+    poses = Poses(target.centres[None], target.frames[None], target.semi_axes)
     fractions = zone_fractions(tracer, zones, poses, np.array([[0, 1]]), k[:, None], shadow_rays)
-    ranges = np.linalg.norm(tx, axis=1), np.linalg.norm(rx, axis=1)
-    phase = np.exp(-1j * wavenumber[:, None] * (length[:, 0] - (ranges[0] + ranges[1])[:, None]))
-    field = (amplitude[:, 0] * fractions.reshape(pairs, parts) * phase).sum(axis=1)
-    return np.asarray(field * ranges[0] * ranges[1])
+    left = fractions.reshape(pairs, 1, parts)
+    return sum_of_echoes(length, amplitude * left, at, frequency)
 
 
 class Fresnel(BuiltInModel):
