@@ -45,7 +45,7 @@ _OF_PIECE = 0.125
 """Largest facet over the longest extent of a piece, where nothing else asks for smaller ones.
 
 What corners and other pieces occlude is occluded by whole facets. A trihedral is then within 0.1 dB
-of the closed form.
+of the closed form (`validation/closed_forms/room_clutter.py`).
 """
 _PATIENCE_S = 2.0
 """Time after which a progress bar is shown [s]."""
@@ -304,8 +304,9 @@ def _reflected(
 ) -> tuple[complex, Footprints]:
     """Footprints and a factor that, for a conductor, give what the material reflects.
 
-    The factor is the phase at normal incidence; how it changes with the angle, 1 % of the field in
-    wood, is left out.
+    The factor is the phase at normal incidence. How it changes with the angle is left out: by
+    `reflection`, in wood at 14 GHz, that is 1 % of the incident field at 60 degrees and 7 % at
+    grazing incidence.
     """
     if material.conducts or len(footprints) == 0:
         return 1.0, footprints

@@ -15,7 +15,7 @@ from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
 """Frequencies over the sweep. What is left of a part whose specular point is hidden comes from
-beside it, and turns over the sweep: three frequencies leave 1 to 3 % at 12 GHz."""
+beside it, and its phase changes over the sweep: three frequencies would not follow it."""
 
 
 class Reference(BuiltInModel):
