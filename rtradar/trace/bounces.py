@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rtradar.body.meshes import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene, triangle_mesh
-from rtradar.trace.rays import first_met, into_ball
+from rtradar.trace.rays import ball_around, first_met, into_ball
 
 SUBDIVISIONS = 4
 """5120 triangles: middles up to 0.03 % inside the unit sphere, corners 0.07 % outside it."""
@@ -92,9 +92,7 @@ class BodySurfaces:
     def pose(self, centres: Array, frames: Array) -> None:
         """Pose the body: ``centres (part, 3)`` [m], ``frames (part, 3, 3)``."""
         self._centres, self._frames = centres, frames
-        self._centre = (centres.max(axis=0) + centres.min(axis=0)) / 2
-        reach = np.linalg.norm(centres - self._centre, axis=1) + self._axes.max(axis=1)
-        self._ball = float(reach.max()) * 1.01
+        self._centre, self._ball = ball_around(centres, self._axes.max(axis=1))
         matrices = np.zeros((len(centres), 4, 4))
         matrices[:, :3, :3] = frames * self._axes[:, None, :]
         matrices[:, :3, 3] = centres - self._centre
@@ -163,10 +161,8 @@ class MeshSurfaces:
     ) -> None:
         corners = np.asarray(vertices, dtype=np.float64)[faces]
         self._same = same
-        used = corners.reshape(-1, 3)
         self._mi = mi
-        self._centre = (used.max(axis=0) + used.min(axis=0)) / 2
-        self._ball = float(np.linalg.norm(used - self._centre, axis=1).max()) * 1.01
+        self._centre, self._ball = ball_around(corners.reshape(-1, 3))
         across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         # A face without area has no normal and is never met: any unit vector serves.
         size = np.linalg.norm(across, axis=1, keepdims=True)

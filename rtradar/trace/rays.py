@@ -89,6 +89,14 @@ def first_met(
     return np.where(np.isfinite(distance), number, -1), distance
 
 
+def ball_around(
+    places: NDArray[np.float64], radii: NDArray[np.float64] | float = 0.0
+) -> tuple[NDArray[np.float64], float]:
+    """Centre and radius of a ball that holds balls about ``places (n, 3)``, with 1 % to spare."""
+    centre = (places.max(axis=0) + places.min(axis=0)) / 2
+    return centre, float((np.linalg.norm(places - centre, axis=1) + radii).max()) * 1.01
+
+
 def into_ball(
     starts: NDArray[np.float64], directions: NDArray[np.float64], radius: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

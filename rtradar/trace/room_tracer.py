@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.scene import Scene
 from rtradar.scene.mitsuba_scene import triangle_mesh
-from rtradar.trace.rays import any_met
+from rtradar.trace.rays import any_met, ball_around
 
 CLEAR_M = 1e-3
 """Length by which both ends of a leg are drawn in [m], so that a surface does not occlude its own
@@ -43,8 +43,7 @@ class RoomTracer:
             faces = np.concatenate(
                 [piece.faces + count for piece, count in zip(pieces, counts[:-1], strict=True)]
             )
-            self._centre = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
-            self._ball = float(np.linalg.norm(vertices - self._centre, axis=1).max()) * 1.01
+            self._centre, self._ball = ball_around(vertices)
             mesh = triangle_mesh(mi, vertices - self._centre, faces)
             self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
 
