@@ -14,21 +14,20 @@ Commands that only read change nothing.
 
 from __future__ import annotations
 
-import errno
 import json
 import os
 import re
 import secrets
-import shutil
 import stat
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 from rtradar.errors import InputError
+from rtradar.system.directory import Directory
 from rtradar.system.files import DISK_ERRORS, cleanup_on_exit, uninterruptible
 
 _WORK = re.compile(r"\.rtradar-[0-9a-f]{16}")
@@ -69,7 +68,7 @@ class OutputFiles:
 
     def list_of(self, folder: Path) -> list[str]:
         """Return the entry ``files`` of a folder that holds all files but, perhaps, the listing."""
-        with _Directory.at(folder) as directory:
+        with Directory.at(folder) as directory:
             return _entries([self.listing, *_all_files(directory)])
 
 
@@ -102,7 +101,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
         try:
             made = [folder for folder in (out, *out.parents) if not folder.exists()]
             out.mkdir(parents=True, exist_ok=True)
-            place = stack.enter_context(_Directory.at(out))
+            place = stack.enter_context(Directory.at(out))
             _refuse_foreign(place, kind, overwrite)
             _remove_leftovers(place, but=_read_list(place, kind).get("unfinished"))
             work = stack.enter_context(_new_work_folder(place))
@@ -159,7 +158,7 @@ def atomic_folder(out: Path, kind: OutputFiles, *, overwrite: bool = False) -> I
 def exclusive_lock(folder: Path) -> Iterator[None]:
     """Lock an existing folder until the process ends; InputError if another process has it."""
     try:
-        place = _Directory.at(folder)
+        place = Directory.at(folder)
     except OSError as error:
         raise InputError(
             f"cannot write to '{folder}': {error.strerror}; "
@@ -177,7 +176,7 @@ def exclusive_lock(folder: Path) -> Iterator[None]:
 def check_whole(folder: Path, listing: str = "summary.json") -> None:
     """Raise InputError if the list of a folder says that a killed run left files of two runs."""
     try:
-        with _Directory.at(folder) as place:
+        with Directory.at(folder) as place:
             content = _read_json(place, listing)
     except OSError:
         return
@@ -191,7 +190,7 @@ def check_whole(folder: Path, listing: str = "summary.json") -> None:
 # -- what a folder holds ---------------------------------------------------------------------------
 
 
-def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dict[str, int]:
+def _existing(directory: Directory, kind: OutputFiles, prefix: str = "") -> dict[str, int]:
     """Return the mode of each entry under a name of the command's files and folders."""
     found: dict[str, int] = {}
     names = directory.names()
@@ -210,7 +209,7 @@ def _existing(directory: _Directory, kind: OutputFiles, prefix: str = "") -> dic
     return found
 
 
-def _all_files(directory: _Directory, prefix: str = "") -> Iterator[str]:
+def _all_files(directory: Directory, prefix: str = "") -> Iterator[str]:
     """Yield the relative names of all files of a work folder, but its marker and its list."""
     for name in sorted(directory.names()):
         if stat.S_ISDIR(directory.mode(name)):
@@ -225,7 +224,7 @@ def _entries(names: Iterable[str]) -> list[str]:
     return sorted({store[1] if (store := _STORE.match(name)) else name for name in names})
 
 
-def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
+def _read_list(directory: Directory, kind: OutputFiles) -> dict[str, Any]:
     """Return ``files`` and perhaps ``unfinished`` of the list of a folder; empty if not ours."""
     content = _read_json(directory, kind.listing)
     if (
@@ -243,7 +242,7 @@ def _read_list(directory: _Directory, kind: OutputFiles) -> dict[str, Any]:
     )
 
 
-def _read_json(directory: _Directory, name: str) -> Any:
+def _read_json(directory: Directory, name: str) -> Any:
     """Return the content of a regular JSON file of bounded size; None for anything else."""
     with suppress(OSError, ValueError, RecursionError), directory.open_file(name) as file:
         return json.loads(file.read(_MOST_LIST_BYTES))
@@ -262,7 +261,7 @@ def _owned(found: dict[str, int], listed: Iterable[str]) -> set[str]:
     }
 
 
-def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> None:
+def _refuse_foreign(place: Directory, kind: OutputFiles, overwrite: bool) -> None:
     found = _existing(place, kind)
     foreign = sorted(found.keys() - _owned(found, _read_list(place, kind).get("files", ())))
     odd = [
@@ -285,7 +284,7 @@ def _refuse_foreign(place: _Directory, kind: OutputFiles, overwrite: bool) -> No
         )
 
 
-def _check_made(work: _Directory, kind: OutputFiles) -> None:
+def _check_made(work: Directory, kind: OutputFiles) -> None:
     """Raise if a file is not foreseen: the next command would take it for somebody else's."""
     made = list(_all_files(work))
     unforeseen = [name for name in made if not kind.is_file(name)]
@@ -298,7 +297,7 @@ def _check_made(work: _Directory, kind: OutputFiles) -> None:
 # -- moving ----------------------------------------------------------------------------------------
 
 
-def _move(work: _Directory, place: _Directory, kind: OutputFiles) -> None:
+def _move(work: Directory, place: Directory, kind: OutputFiles) -> None:
     """Move all files to their place; the list comes last, and says ``unfinished`` until then."""
     made, there = list(_all_files(work)), _existing(place, kind)
     owned = _owned(there, _read_list(place, kind).get("files", ()))
@@ -335,7 +334,7 @@ def _while_moving(out: Path, work: Path, error: BaseException) -> BaseException:
     )
 
 
-def _new_work_folder(place: _Directory) -> _Directory:
+def _new_work_folder(place: Directory) -> Directory:
     """Make a work folder, locked as long as its command lives, with a marker of its owner."""
     while True:
         name = f".rtradar-{secrets.token_hex(8)}"
@@ -348,7 +347,7 @@ def _new_work_folder(place: _Directory) -> _Directory:
             return work
 
 
-def _remove_leftovers(place: _Directory, but: str | None) -> None:
+def _remove_leftovers(place: Directory, but: str | None) -> None:
     """Remove work folders of killed commands: those whose marker holds their own inode number.
 
     A folder that came from elsewhere, or that the user made, has no such marker, and stays.
@@ -365,157 +364,6 @@ def _remove_leftovers(place: _Directory, but: str | None) -> None:
                 marked = file.read(100)
             if marked == str(folder.number).encode() and folder.lock():
                 place.remove_tree(name)
-
-
-# -- one directory ---------------------------------------------------------------------------------
-
-
-class _Directory:
-    """An open directory; its entries are opened relative to it, so that no link is followed.
-
-    Where the system cannot do that (Windows), entries are opened by their paths.
-    """
-
-    def __init__(self, path: Path, descriptor: int | None) -> None:
-        self.path, self._descriptor = path, descriptor
-
-    @classmethod
-    def at(cls, path: Path) -> _Directory:
-        """Open the directory of a path, which may be a link to one."""
-        if not _BY_DESCRIPTOR:
-            os.listdir(path)  # raises as opening it would
-            return cls(path, None)
-        return cls(path, os.open(path, os.O_RDONLY | os.O_DIRECTORY))
-
-    def __enter__(self) -> _Directory:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        if self._descriptor is not None:
-            os.close(self._descriptor)
-
-    def names(self) -> list[str]:
-        """Return the names of the entries."""
-        return os.listdir(self.path if self._descriptor is None else self._descriptor)
-
-    def mode(self, name: str) -> int:
-        """Return type and permissions of an entry, not following a link; 0 if there is none."""
-        try:
-            return os.stat(self._name(name), dir_fd=self._descriptor, follow_symlinks=False).st_mode
-        except FileNotFoundError:
-            return 0
-
-    def open(self, name: str) -> _Directory:
-        """Open a directory in this one; OSError if the entry is no directory, or a link."""
-        if self._descriptor is None:
-            if not stat.S_ISDIR(self.mode(name)):
-                raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), name)
-            return _Directory(self.path / name, None)
-        flags = os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW
-        return _Directory(self.path / name, os.open(name, flags, dir_fd=self._descriptor))
-
-    @contextmanager
-    def parent_of(self, name: str, *, make: bool = False) -> Iterator[_Directory]:
-        """Open the directory that holds a file of a relative name; make it if asked."""
-        with ExitStack() as stack:
-            here = self
-            for part in name.split("/")[:-1]:
-                if make and not here.mode(part):
-                    os.mkdir(here._name(part), dir_fd=here._descriptor)
-                here = stack.enter_context(here.open(part))
-            yield here
-
-    def open_file(self, name: str, *, write: bool = False) -> IO[bytes]:
-        """Open a regular file to read, or a new one to write; OSError for anything else."""
-        flags = (os.O_WRONLY | os.O_CREAT | os.O_EXCL if write else os.O_RDONLY) | getattr(
-            os, "O_BINARY", 0
-        )
-        flags |= getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)
-        descriptor = os.open(self._name(name), flags, 0o666, dir_fd=self._descriptor)
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            os.close(descriptor)
-            raise OSError(errno.EINVAL, "not a regular file", name)
-        return os.fdopen(descriptor, "wb" if write else "rb")
-
-    def make(self, name: str) -> None:
-        """Make a directory that nobody else may enter."""
-        os.mkdir(self._name(name), 0o700, dir_fd=self._descriptor)
-
-    def move(self, name: str, target: _Directory, new: str) -> None:
-        """Move an entry to another directory, under another name, in one step."""
-        places = self._name(name), target._name(new)
-        os.replace(*places, src_dir_fd=self._descriptor, dst_dir_fd=target._descriptor)
-
-    def remove(self, name: str) -> None:
-        """Remove a file."""
-        os.unlink(self._name(name), dir_fd=self._descriptor)
-
-    def remove_folder(self, name: str) -> None:
-        """Remove an empty directory."""
-        os.rmdir(self._name(name), dir_fd=self._descriptor)
-
-    def remove_tree(self, name: str) -> None:
-        """Remove a directory with all in it, as far as that goes; no link is followed."""
-        shutil.rmtree(self._name(name), ignore_errors=True, dir_fd=self._descriptor)
-
-    @property
-    def number(self) -> int:
-        """Inode number."""
-        return (
-            os.stat(self.path).st_ino
-            if self._descriptor is None
-            else os.fstat(self._descriptor).st_ino
-        )
-
-    def is_own(self) -> bool:
-        """Tell whether it belongs to the user of this process."""
-        return self._descriptor is not None and os.fstat(self._descriptor).st_uid == os.geteuid()
-
-    def is_in_place(self) -> bool:
-        """Tell whether its path still leads to it."""
-        try:
-            return self._descriptor is None or os.path.samestat(
-                os.stat(self.path), os.fstat(self._descriptor)
-            )
-        except OSError:
-            return False
-
-    def lock(self, *, wait: bool = False) -> bool:
-        """Lock it until it is closed; False if another process has it. Windows has no such lock."""
-        if sys.platform == "win32" or self._descriptor is None:
-            return True
-        import fcntl
-
-        try:
-            fcntl.flock(self._descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        except BlockingIOError:
-            return False
-        return True
-
-    @contextmanager
-    def locked(self) -> Iterator[None]:
-        """Wait for other commands that move files there, and keep them out."""
-        if self._descriptor is None:
-            yield
-            return
-        with _Directory(
-            self.path, os.open(".", os.O_RDONLY | os.O_DIRECTORY, dir_fd=self._descriptor)
-        ) as again:
-            again.lock(wait=True)
-            yield
-
-    def _name(self, name: str) -> str:
-        return str(self.path / name) if self._descriptor is None else name
-
-
-_BY_DESCRIPTOR = {
-    os.open,
-    os.stat,
-    os.mkdir,
-    os.rename,
-    os.unlink,
-    os.rmdir,
-} <= os.supports_dir_fd and hasattr(os, "O_DIRECTORY")
 
 
 def _disk_error(error: BaseException) -> str:

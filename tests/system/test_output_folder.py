@@ -17,7 +17,7 @@ from typing import Any
 import pytest
 
 from rtradar.errors import InputError
-from rtradar.system import output_folder
+from rtradar.system.directory import Directory
 from rtradar.system.output_folder import OutputFiles, atomic_folder, check_whole
 
 KIND = OutputFiles(
@@ -288,12 +288,12 @@ def test_a_twin_is_refused_where_capitals_do_not_tell(
 ) -> None:
     """As on macOS and Windows: there ``maps`` leads to a file that is listed as ``Maps``."""
     (tmp_path / "Maps").write_text("mine")
-    real = output_folder._Directory.mode
+    real = Directory.mode
 
-    def mode(self: output_folder._Directory, name: str) -> int:
+    def mode(self: Directory, name: str) -> int:
         return real(self, next((own for own in self.names() if own.lower() == name.lower()), name))
 
-    monkeypatch.setattr(output_folder._Directory, "mode", mode)
+    monkeypatch.setattr(Directory, "mode", mode)
     with pytest.raises(InputError, match="Maps"):
         make(tmp_path, "first")
     assert contents(tmp_path) == {"Maps": "mine"}
@@ -313,11 +313,9 @@ def test_a_folder_that_becomes_a_link_is_not_followed(
     (elsewhere / "c").mkdir(parents=True)
     for name in ("zarr.json", "c/1", "c/2"):
         (elsewhere / name).write_text("mine")
-    real = output_folder._Directory.move
+    real = Directory.move
 
-    def move(
-        self: output_folder._Directory, name: str, target: output_folder._Directory, new: str
-    ) -> None:
+    def move(self: Directory, name: str, target: Directory, new: str) -> None:
         if (
             new == ("list.json" if when == "before the moves" else "maps")
             and not (out / "store.zarr").is_symlink()
@@ -326,7 +324,7 @@ def test_a_folder_that_becomes_a_link_is_not_followed(
             (out / "store.zarr").symlink_to(elsewhere)
         real(self, name, target, new)
 
-    monkeypatch.setattr(output_folder._Directory, "move", move)
+    monkeypatch.setattr(Directory, "move", move)
     with pytest.raises(InputError, match="cannot move the files"):
         make(out, "second")
     assert contents(elsewhere) == dict.fromkeys(("zarr.json", "c/1", "c/2"), "mine")
@@ -449,16 +447,17 @@ def test_a_command_whose_files_are_not_foreseen_is_a_mistake_of_ours(
 
 SLOW = """
 import json, pathlib, sys, time
-from rtradar.system import output_folder
+from rtradar.system.directory import Directory
+from rtradar.system.output_folder import atomic_folder
 from tests_kind import KIND
 out = pathlib.Path(sys.argv[1])
-real = output_folder._Directory.move
+real = Directory.move
 def slowly(*places):
     real(*places)
     print("moved", flush=True)
     time.sleep(0.3)
-output_folder._Directory.move = slowly
-with output_folder.atomic_folder(out, KIND) as folder:
+Directory.move = slowly
+with atomic_folder(out, KIND) as folder:
     for name in ("clouds", "maps", "plan.png"):
         (folder / name).write_text("first")
     (folder / "list.json").write_text(json.dumps({"files": KIND.list_of(folder)}))
@@ -494,7 +493,7 @@ def test_two_processes_that_end_at_once_leave_what_is_of_one(tmp_path: Path) -> 
 
 KILLED = """
 import json, os, pathlib, sys
-from rtradar.system import output_folder
+from rtradar.system.output_folder import atomic_folder
 from tests_kind import KIND
 out, last = pathlib.Path(sys.argv[1]), int(sys.argv[2])
 calls = 0
@@ -508,7 +507,7 @@ def killed_at(real):
     return call
 for name in ("rename", "replace", "rmdir", "unlink", "mkdir"):
     setattr(os, name, killed_at(getattr(os, name)))
-with output_folder.atomic_folder(out, KIND) as folder:
+with atomic_folder(out, KIND) as folder:
     for name in ("clouds", "maps"):
         (folder / name).write_text("second")
     (folder / "store.zarr" / "c").mkdir(parents=True)
