@@ -35,9 +35,7 @@ _HEAP_BYTES = 1 << 24
 def reuse_freed_memory() -> None:
     """Make the GNU C library reuse freed arrays of up to 16 MB, in one heap, for the whole process.
 
-    By default it returns them to the system, which has to clear the pages for the next block: 10.5
-    instead of 10.2 s of CPU time for `analytic` over 6 s at 12 GHz (means of 6 runs, 2 cores). The
-    peak memory is 390 MB instead of 388 MB.
+    By default it returns them to the system, which has to clear the pages for the next block.
     """
     if platform.libc_ver()[0] == "glibc":
         library = ctypes.CDLL(None)
