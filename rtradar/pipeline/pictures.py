@@ -84,19 +84,23 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
             file = to("Spatial cloud", "cloud_xyz.png")
             draw_spatial_cloud(file, points, velocity, radar, heading)
         if capture.inside:
-            drawn |= _draw_room(folder, capture, capture.inside, maps)
+            drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
     return drawn
 
 
-def _draw_room(folder: Path, capture: Capture, inside: Indoors, maps: Any) -> dict[str, Path]:
-    """Draw the plan of a room, its walls over range and azimuth, and clutter before and after."""
+def _draw_room(
+    folder: Path, capture: Capture, inside: Indoors, maps: Any, frame: int
+) -> dict[str, Path]:
+    """Draw the plan of a room, its walls over range and azimuth, and clutter before and after.
+
+    What was received is shown of the frame kept before clutter removal, or else of this ``frame``.
+    """
     radar, body, scene = capture.radar, capture.body, capture.scene
     suffix = "_received" if "range_doppler_received" in maps else ""
     if suffix:
         time_s = float(maps["range_doppler_received"].attrs["time_s"])
         frame = int(np.abs(maps["time"][:] - time_s).argmin())
     else:
-        frame = busiest_frame(maps)
         time_s = float(maps["time"][frame])
 
     def received(name: str) -> NDArray[Any]:
