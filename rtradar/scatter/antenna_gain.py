@@ -12,6 +12,7 @@ from rtradar.antenna import Antenna
 from rtradar.body import Body
 from rtradar.echoes import Echoes
 from rtradar.radar import Radar
+from rtradar.scatter.common.polarization import unit
 from rtradar.scatter.common.poses import ChirpPoses, EchoModel, account_of, chirp_poses
 
 
@@ -22,12 +23,11 @@ def specular_points(at: ChirpPoses) -> NDArray[np.float64]:
     part lies about it.
     """
     tx, rx = (
-        _unit(antenna - at.centres[:, None])
-        for antenna in (at.tx[:, None, None], at.rx[:, :, None])
+        unit(antenna - at.centres[:, None]) for antenna in (at.tx[:, None, None], at.rx[:, :, None])
     )
     normal = np.einsum("tpji,trpj->trpi", at.frames, tx + rx) * at.semi_axes
     # A normal of a unit sphere that is stretched to the ellipsoid.
-    local = at.semi_axes * _unit(normal)
+    local = at.semi_axes * unit(normal)
     return np.asarray(at.centres[:, None] + np.einsum("tpij,trpj->trpi", at.frames, local))
 
 
@@ -75,11 +75,3 @@ class _ThroughAntennas:
         echoes = self._model.echoes(chirps)
         gain = leg_gain(self._radar, chirp_poses(self._radar, self._body, chirps))
         return dataclasses.replace(echoes, amplitude=echoes.amplitude * gain[..., echoes.part])
-
-
-def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit vectors; 0 for no direction, of a part straight between Tx and Rx, without echo."""
-    return np.asarray(
-        vectors
-        / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), np.finfo(np.float64).tiny)
-    )
