@@ -79,13 +79,15 @@ def _add_train(train: OneLineParser) -> None:
         type=path,
         required=True,
     )
-    train.add_argument("--recipe", default="lean", help="lean, our own, or paper (default: lean)")
+    train.add_argument(
+        "--recipe", default="lean", help="lean, our own, or paper (default: %(default)s)"
+    )
     train.option(
         "--split",
         "HOW",
         "folds (the paper's, over clouds), recording, subject, recorded (learn from "
         "synthetic motion), or across:COLUMN, which learns from one value of a column, such as "
-        "fidelity, and asks about all (default: folds)",
+        "fidelity, and asks about all (default: %(default)s)",
         default="folds",
     )
     train.option(
@@ -118,9 +120,11 @@ def _add_train(train: OneLineParser) -> None:
         "--device",
         choices=("auto", "cpu", "cuda"),
         default="auto",
-        help="where to compute (default: auto)",
+        help="where to compute (default: %(default)s)",
     )
-    train.option("--seed", "N", "seed of splits and trainings (default: 0)", type=whole, default=0)
+    train.option(
+        "--seed", "N", "seed of splits and trainings (default: %(default)s)", type=whole, default=0
+    )
     train.set_defaults(
         command=_train, stopped="the same command goes on where the last checkpoint in '{out}' is"
     )

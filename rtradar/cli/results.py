@@ -32,7 +32,7 @@ def add(commands: Subcommands) -> None:
         "--colour",
         choices=("part", "power", "velocity"),
         default="part",
-        help="quantity that colours show at first (default: part)",
+        help="quantity that colours show at first (default: %(default)s)",
     )
     view.option(
         "--still", "FILE.png", "draw one snapshot; without --out there is no page then", type=path
