@@ -65,7 +65,7 @@ def metadata_features(clouds: Collection) -> NDArray[np.float64]:
 def _metadata(clouds: Collection, name: str) -> list[NDArray[np.float64]]:
     try:
         column = clouds.column(name).tolist()
-    except (KeyError, InputError):
+    except InputError:  # no sample has this entry
         return []
     try:
         numbers = np.array(

@@ -107,7 +107,7 @@ def values_of(clouds: Collection, scheme: str) -> NDArray[np.str_]:
     if not scheme.startswith(_ACROSS):
         return np.full(len(clouds), "")
     names = [name.strip() for name in scheme.removeprefix(_ACROSS).split(",")]
-    columns = [_column(clouds, name) for name in names]
+    columns = [clouds.column(name) for name in names]
     return np.array([" / ".join(str(value) for value in row) for row in zip(*columns, strict=True)])
 
 
@@ -135,7 +135,7 @@ def recordings_of(clouds: Collection) -> NDArray[np.int64]:
     names = _numbered(clouds.column("recording"))
     try:
         contents = clouds.column("recording_digest").astype(str)
-    except (KeyError, InputError):
+    except InputError:  # no sample has a digest
         return names
     # Clouds belong together if a chain of equal names or equal contents connects them.
     known = np.flatnonzero((contents != "") & (contents != "None"))
@@ -168,7 +168,7 @@ def check(split: Split, intervals: NDArray[np.int64], labels: NDArray[np.str_]) 
 
 
 def _synthetic_to_recorded(clouds: Collection) -> Split:
-    source = _column(clouds, "source").astype(str)
+    source = clouds.column("source").astype(str)
     known = {name: np.flatnonzero(source == name) for name in ("synthetic", "recorded")}
     if lacking := [name for name, those in known.items() if not len(those)]:
         raise InputError(
@@ -216,15 +216,6 @@ def _folds(
 def _numbered(column: NDArray[Any]) -> NDArray[np.int64]:
     """Number the groups of equal values of a column."""
     return np.unique(column.astype(str), return_inverse=True)[1].astype(np.int64)
-
-
-def _column(clouds: Collection, name: str) -> NDArray[Any]:
-    try:
-        return np.asarray(clouds.column(name))
-    except KeyError:
-        raise InputError(
-            f"the clouds have no column '{name}' in their provenance; see index of the data set"
-        ) from None
 
 
 def chosen(splits: Sequence[Split], numbers: Sequence[int] | None) -> list[int]:

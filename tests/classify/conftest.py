@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rtradar.clouds.dataset_store import Collection, Sample, write_index, write_sample
+
 LABELS = ("kick", "punch", "walk")
 
 
-class MadeUpClouds:
+class MadeUpClouds(Collection):
     """Each motion is seen ``views`` times, by the models in turn; a recording shows one motion."""
 
     def __init__(
@@ -46,6 +48,8 @@ class MadeUpClouds:
             for motion in range(per_class)
             for view in range(views)
         ]
+        self._name = "made up"
+        self._about = [{"label": row["label"], "provenance": row} for row in self.rows]
 
     folders: tuple[Path, ...] = ()
 
@@ -64,13 +68,6 @@ class MadeUpClouds:
     def spatial(self, index: int) -> NDArray[np.float64]:
         return np.random.default_rng([self._seed, index, 1]).normal(size=(index % 4 * 5, 3))
 
-    @property
-    def labels(self) -> NDArray[np.str_]:
-        return np.array([row["label"] for row in self.rows])
-
-    def column(self, name: str) -> NDArray[Any]:
-        return np.array([row[name] for row in self.rows])
-
 
 @pytest.fixture(scope="session")
 def made_up() -> Callable[..., MadeUpClouds]:
@@ -80,8 +77,6 @@ def made_up() -> Callable[..., MadeUpClouds]:
 @pytest.fixture(scope="session")
 def collection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The made-up clouds in a folder, as a data set leaves them."""
-    from rtradar.clouds.dataset_store import Sample, write_index, write_sample
-
     folder, clouds = tmp_path_factory.mktemp("clouds"), MadeUpClouds(views=2)
     names = [f"{index:03d}" for index in range(len(clouds))]
     for index, (name, row) in enumerate(zip(names, clouds.rows, strict=True)):

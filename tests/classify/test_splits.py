@@ -19,24 +19,19 @@ from rtradar.classify.splits import (
     recordings_of,
     values_of,
 )
+from rtradar.clouds.dataset_store import Collection
 from rtradar.errors import InputError
 
 
-class Table:
+class Table(Collection):
     """Labels and provenance alone."""
 
     def __init__(self, rows: list[dict[str, Any]]) -> None:
-        self._rows = rows
+        self._name = "of rows"
+        self._about = [{"label": row["label"], "provenance": row} for row in rows]
 
     def __len__(self) -> int:
-        return len(self._rows)
-
-    @property
-    def labels(self) -> NDArray[np.str_]:
-        return np.array([row["label"] for row in self._rows])
-
-    def column(self, name: str) -> NDArray[Any]:
-        return np.array([row[name] for row in self._rows])
+        return len(self._about)
 
     def points(self, index: int) -> NDArray[np.float64]:
         raise AssertionError("a split reads no clouds")
@@ -214,7 +209,7 @@ def test_a_leak_is_never_handed_out() -> None:
     [
         ("folds", 1, "--folds 1"), ("folds", 999, "--folds 999"),
         ("people", None, "split 'people' is unknown"),
-        ("across:colour", None, "no column 'colour'"),
+        ("across:colour", None, "no sample has 'colour'"),
     ],
 )  # fmt: skip
 def test_splits_that_cannot_be_are_refused(

@@ -30,6 +30,7 @@ from sklearn.model_selection import StratifiedKFold, cross_val_score
 from rtradar.campaign.samples import plan_samples
 from rtradar.campaign.spec import Spec, read_spec
 from rtradar.classify.baselines import metadata_features
+from rtradar.clouds.dataset_store import Collection
 
 DATA_SETS = Path(__file__).resolve().parents[1]
 SIZES = (500, 1000, 2000, 3000)
@@ -114,21 +115,17 @@ def commands(out: Path) -> dict[str, list[str]]:
     return steps
 
 
-class Planned:
+class Planned(Collection):
     """Clouds that do not exist yet, of which only the provenance is known."""
 
     def __init__(self, spec: Spec) -> None:
-        self._recipes = plan_samples(spec)
-        self.labels = np.array([recipe.label for recipe in self._recipes])
+        self._name = "of plans"
+        self._about = [
+            {"label": plan.label, "provenance": plan.parameters} for plan in plan_samples(spec)
+        ]
 
     def __len__(self) -> int:
-        return len(self._recipes)
-
-    def column(self, name: str) -> np.ndarray:
-        values = [recipe.parameters[name] for recipe in self._recipes]
-        column = np.empty(len(values), dtype=object)
-        column[:] = values
-        return column
+        return len(self._about)
 
 
 def by_metadata() -> list[str]:
