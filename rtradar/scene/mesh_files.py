@@ -13,7 +13,6 @@ import re
 import struct
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +21,7 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.system.checks import brief
-from rtradar.system.files import open_regular, read_bytes
+from rtradar.system.files import open_regular, read_bytes, shipped_folder
 
 MESH_ENDINGS = (".ply", ".obj", ".stl", ".glb")
 MOST_FACES = 2_000_000
@@ -108,9 +107,8 @@ class Triangles:
 
 
 def meshes_folder() -> Path:
-    """Find the meshes of rtradar: inside the installed package, or at the top of a checkout."""
-    installed = Path(str(resources.files("rtradar"))) / "meshes"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "meshes"
+    """Find the meshes of rtradar."""
+    return shipped_folder("meshes")
 
 
 def mesh_names() -> tuple[str, ...]:

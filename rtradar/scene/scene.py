@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from importlib import resources
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -31,6 +30,7 @@ from rtradar.system.checks import (
     table_at,
     tables_at,
 )
+from rtradar.system.files import shipped_folder
 
 Piece = TypeVar("Piece", Wall, Furniture)
 
@@ -198,9 +198,8 @@ class Scene:
 
 
 def scenes_folder() -> Path:
-    """Find the scenes of rtradar: inside the installed package, or at the top of a checkout."""
-    installed = Path(str(resources.files("rtradar"))) / "scenes"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "scenes"
+    """Find the scenes of rtradar."""
+    return shipped_folder("scenes")
 
 
 def load_scene(source: str | Path) -> Scene:

@@ -17,6 +17,7 @@ import threading
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
+from importlib import resources
 from pathlib import Path
 from typing import Any, BinaryIO, TextIO, TypeVar, cast
 
@@ -151,6 +152,12 @@ class LastingFile:
             except OSError as error:
                 self._error = error
         return otherwise
+
+
+def shipped_folder(name: str) -> Path:
+    """Find a folder of rtradar: in the installed package, or at the top of a checkout."""
+    installed = Path(str(resources.files("rtradar"))) / name
+    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / name
 
 
 def remove_parts(folder: Path, names: str) -> int:

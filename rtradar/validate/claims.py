@@ -16,11 +16,10 @@ import time
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass
-from importlib import resources
 from pathlib import Path
 
 from rtradar.errors import InputError
-from rtradar.system.files import temporary_folder
+from rtradar.system.files import shipped_folder, temporary_folder
 from rtradar.validate.rows import Row
 
 _MEASURE = re.compile(r"^def measure\(", re.MULTILINE)
@@ -65,9 +64,8 @@ class Outcome:
 
 
 def validation_folder() -> Path:
-    """Folder of the scripts: inside the installed package, or at the top of a checkout."""
-    installed = Path(str(resources.files("rtradar"))) / "validation"
-    return installed if installed.is_dir() else Path(__file__).resolve().parents[2] / "validation"
+    """Find the scripts of claims."""
+    return shipped_folder("validation")
 
 
 def claims(folder: Path) -> list[Claim]:
