@@ -15,7 +15,7 @@ import torch
 
 from rtradar.classify import study
 from rtradar.classify.prepare import stack_clouds
-from rtradar.classify.recipes import RECIPES
+from rtradar.classify.recipes import LEAN, PAPER, RECIPES
 from rtradar.classify.study import load_network, train_study
 from rtradar.classify.training import Examples, predict
 from rtradar.cli import main
@@ -264,3 +264,19 @@ def test_a_missing_extra_is_named(
         assert error.count("\n") == 1
         assert "in a checkout: pip install -e '.[learn]'" in error
     assert not (tmp_path / "out").exists()
+
+
+def test_the_help_of_train_has_the_defaults_of_the_recipes(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert rtradar("train", "--help") == 0
+    words = " ".join(capsys.readouterr().out.split())
+    for text in (
+        f"number of epochs (default: lean {LEAN.epochs}, paper {PAPER.epochs})",
+        f"learning rate (default: lean {LEAN.rate:.0e}, paper {PAPER.rate:.0e})",
+        f"the paper's (default: lean {LEAN.augmentation}, paper {PAPER.augmentation})",
+    ):
+        assert text.replace("e-0", "e-") in words
+    for recipe in RECIPES.values():
+        assert f"points of each cloud (default: {recipe.points})" in words
+        assert f"all by one (default: {recipe.scaling})" in words

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+
 import pytest
 
 from rtradar.cli import captures
@@ -29,3 +31,5 @@ def test_the_help_of_run_names_every_model(capsys: pytest.CaptureFixture[str]) -
     words = " ".join(capsys.readouterr().out.split()).replace("- ", "-")
     listed = words.partition("--fidelity NAME ")[2].partition(", or of a package")[0]
     assert listed.split(", ") == list(MODELS.built_in)
+    own = inspect.signature(MODELS["auto"]).parameters["tolerance_db"].default
+    assert f"that will do [dB] (default: {own:g})" in words
