@@ -36,7 +36,7 @@ _MEASURES = (
     # key, heading, digits
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
-    ("hidden_share", "Hidden share of part, time and channel", 3),
+    ("hidden_share", "Hidden fraction of parts, times and channels", 3),
     ("range_doppler_correlation", "Range-Doppler correlation [dB maps]", 3),
     ("range_doppler_mean_db", "Range-Doppler, mean difference [dB]", 2),
     ("range_doppler_rms_db", "Range-Doppler, rms difference [dB]", 2),
