@@ -285,10 +285,19 @@ def scene_digest(scene: Scene) -> str:
     """Hash of a scene, including the content of its mesh files."""
 
     def content(value: object) -> str:
-        return digest([value]) if isinstance(value, Path) else str(value)
+        if not isinstance(value, Path):
+            return str(value)
+        status = value.stat()
+        return _mesh_digest(value, status.st_mtime_ns, status.st_size)
 
     text = json.dumps(asdict(scene), sort_keys=True, default=content)
     return hashlib.sha256(text.encode()).hexdigest()[:_ID_DIGITS]
+
+
+@lru_cache(maxsize=32)
+def _mesh_digest(path: Path, changed_ns: int, size: int) -> str:
+    """Hash a mesh file, which many samples share; it is read again only if it has changed."""
+    return digest([path])
 
 
 def digest(paths: list[Path]) -> str:
