@@ -29,8 +29,7 @@ def brief(value: object) -> str:
         text = repr(value)
     except (ValueError, RecursionError):  # an integer of very many digits, a table nested very deep
         text = f"a {type(value).__name__}"
-    text = " ".join(text.split())
-    text = printable(text)
+    text = printable(" ".join(text.split()))
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 

@@ -178,9 +178,8 @@ def check_place(path: Path | None, option: str = "--json") -> None:
     """Raise InputError, which names the ``option``, before the work if no file can be written."""
     if path is None:
         return
-    folder = Path(
-        os.path.realpath(path)
-    ).parent  # links that lead in a circle stay as they are, and are replaced
+    # Links that lead in a circle stay as they are, and are replaced.
+    folder = Path(os.path.realpath(path)).parent
     try:
         if not folder.is_dir():
             raise InputError(f"{option} {path}: there is no folder '{folder}'; make it first")
@@ -214,9 +213,8 @@ def write_json(path: str | os.PathLike[str], content: Mapping[str, Any]) -> None
 def _standard_stream(path: str | os.PathLike[str]) -> TextIO | None:
     """Return the stream that a path such as /dev/stdout names; a file behind it has to stay."""
     for stream in (sys.stdout, sys.stderr):
-        with suppress(
-            OSError, ValueError, AttributeError
-        ):  # no such path; closed; none, or no file at all
+        # No such path; a closed stream; no stream, or one that is no file.
+        with suppress(OSError, ValueError, AttributeError):
             if os.path.samestat(os.stat(path), os.fstat(stream.fileno())):
                 return stream
     return None

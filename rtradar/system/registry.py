@@ -178,9 +178,8 @@ def _readable_entries(group: str) -> list[EntryPoint]:
         name = "of unknown name"
         try:
             name = package.name
-            found.setdefault(
-                name, list(package.entry_points.select(group=group))
-            )  # of two of one name the first is imported
+            # Of two packages of one name the first is imported.
+            found.setdefault(name, list(package.entry_points.select(group=group)))
         except Exception as error:
             warnings.warn(
                 f"package {name}: its entry points cannot be read ({_first_line(error)}); "

@@ -70,9 +70,8 @@ class FileBackedRows:
                 f"{tempfile.tempdir or 'any folder'} for temporary files ({error.strerror}); "
                 "let the environment variable TMPDIR name one that has some"
             ) from None
-        self._waiting = [
-            np.empty((0, *rows.shape[1:]))
-        ]  # which keeps the shape of a row, and none of the memory
+        # It keeps the shape of a row, and none of the memory.
+        self._waiting = [np.empty((0, *rows.shape[1:]))]
 
     def rows(self) -> NDArray[np.float64]:
         """Return all rows, at least one block of them; can be called once."""
