@@ -50,7 +50,7 @@ DRAWN: Mapping[str, tuple[tuple[float, float], float, float]] = {
 """Quantities drawn at random: default range, smallest and largest allowed value."""
 
 MOST_SAMPLES = 1_000_000
-"""Largest number of samples of a data set, whose plan takes 2 GB of memory and half an hour."""
+"""Largest number of samples of a data set; the plan of each takes some 2 kB of memory."""
 
 INTERVAL_KEYS = ("start_s", "duration_s", "hop_s", "end_s")
 """Keys of the intervals in files."""
