@@ -40,7 +40,9 @@ _FLAGS: dict[str, tuple[str, dict[str, Any]]] = {
 }
 """Option of each setting; `RunSettings` has the texts, choices and defaults."""
 
-_ONLY_RUN = tuple(_FLAGS)[:7]
+_ONLY_RUN = (
+    "fidelity", "clutter_removal", "body_material", "detector", "order", "keep_all", "save_if",
+)  # fmt: skip
 _DEFAULTS = {field.name: field.default for field in dataclasses.fields(RunSettings)}
 
 
