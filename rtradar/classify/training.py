@@ -212,11 +212,7 @@ def predict(network: PointNet, examples: Examples, recipe: Recipe) -> NDArray[np
 
 
 def _train_epoch(
-    network: PointNet,
-    optimiser: torch.optim.Optimizer,
-    train: Examples,
-    recipe: Recipe,
-    epoch: int,
+    network: PointNet, optimiser: torch.optim.Optimizer, train: Examples, recipe: Recipe, epoch: int
 ) -> Row:
     device = next(network.parameters()).device
     network.train()

@@ -71,11 +71,8 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
     ``spatial`` (m, 3) is the spatial cloud of the same capture [m]. Equal samples give equal bytes.
     InputError if the file cannot be written; the folder is then unchanged.
     """
-    about = json.dumps(
-        {"format": FORMAT, "label": sample.label, "provenance": sample.provenance},
-        sort_keys=True,
-        allow_nan=False,
-    )
+    content = {"format": FORMAT, "label": sample.label, "provenance": sample.provenance}
+    about = json.dumps(content, sort_keys=True, allow_nan=False)
     arrays = {
         "points": np.asarray(sample.points, dtype="<f8").reshape(-1, 3),
         "spatial": np.asarray(spatial, dtype="<f8").reshape(-1, 3),
@@ -89,9 +86,9 @@ def write_sample(folder: Path, identity: str, sample: Sample, spatial: ArrayLike
             archive.writestr(zipfile.ZipInfo(f"{name}.npy"), entry.getvalue())  # always dated 1980
         archive.comment = b"0" * _DIGEST
     body = buffer.getvalue()[:-_DIGEST]
-    content = body + hashlib.sha256(body).hexdigest().encode()
-    _write_durably(sample_path(folder, identity), content)
-    return len(content)
+    whole = body + hashlib.sha256(body).hexdigest().encode()
+    _write_durably(sample_path(folder, identity), whole)
+    return len(whole)
 
 
 def is_whole(path: Path) -> bool:
@@ -208,11 +205,8 @@ def _is_index(path: Path) -> bool:
 
 
 def _has_index_keys(content: Any) -> bool:
-    return (
-        isinstance(content, dict)
-        and isinstance(content.get("samples"), list)
-        and "format" in content
-    )
+    found = content if isinstance(content, dict) else {}
+    return "format" in found and isinstance(found.get("samples"), list)
 
 
 def _write_durably(path: Path, content: bytes) -> None:
@@ -236,11 +230,14 @@ class Collection:
     ----------
     folders : tuple of path
         Folders of the samples.
+    ids : tuple of str
+        Id of each sample.
 
     Raises
     ------
     InputError
-        If no folder is given, samples are missing or damaged, or a sample is in two folders.
+        If no folder is given, samples are missing or damaged, or a sample is in two folders; also
+        where a cloud of a damaged file is read.
     """
 
     def __init__(self, *folders: str | Path) -> None:
@@ -252,7 +249,7 @@ class Collection:
         self._paths = [
             sample_path(folder, identity) for folder, ids in found.items() for identity in ids
         ]
-        self._ids = tuple(path.stem for path in self._paths)
+        self.ids = tuple(path.stem for path in self._paths)
         for folder, ids in found.items():
             missing = sum(not sample_path(folder, identity).is_file() for identity in ids)
             if missing:
@@ -260,24 +257,18 @@ class Collection:
                     f"collection '{folder}': {missing} of {len(ids)} samples are missing; "
                     "finish it with: rtradar dataset build"
                 )
-        if len(once := set(self._ids)) < len(self._ids):
+        if repeated := len(self.ids) - len(set(self.ids)):
             raise InputError(
-                f"{len(self._ids) - len(once)} samples are in more than one of {self._name}; "
-                "leave one out"
+                f"{repeated} samples are in more than one of {self._name}; leave one out"
             )
         self._about = [read_sample(path, "about") for path in self._paths]
 
     def __len__(self) -> int:
-        return len(self._ids)
+        return len(self.ids)
 
     def __getitem__(self, index: int) -> Sample:
         about = self._about[index]
         return Sample(self.points(index), about["label"], about["provenance"])
-
-    @property
-    def ids(self) -> tuple[str, ...]:
-        """Id of each sample."""
-        return self._ids
 
     @property
     def labels(self) -> NDArray[np.str_]:
@@ -343,10 +334,5 @@ class Collection:
         (m, 3) float64
             World coordinates x, y and z [m] in the order of time; m may be 0. A coordinate that the
             radar does not measure is NaN in every point (`SpatialCloud`).
-
-        Raises
-        ------
-        InputError
-            If its file is damaged.
         """
         return np.asarray(read_sample(self._paths[index], "spatial"))

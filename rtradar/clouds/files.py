@@ -120,14 +120,9 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
     Parameters
     ----------
     path : path
-        Output file, which is replaced if it exists.
+        Output file: see `save_cloud_npz`.
     cloud : SpatialCloud
         Cloud to write, which may be empty.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be written.
     """
     columns = [cloud.points, *(getattr(cloud, name)[:, None] for name in _EXTRA_UNITS)]
     names, units = (*SPATIAL_AXES, *_EXTRA_UNITS), (*SPATIAL_UNITS, *_EXTRA_UNITS.values())
@@ -227,10 +222,8 @@ def read_pcd(path: Path) -> CloudTable:
 def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) -> CloudTable:
     kind = np.dtype(fields)
     if count < 0 or len(body) < count * kind.itemsize:
-        raise ValueError(
-            f"{len(body)} bytes where its header tells of {count} points of {kind.itemsize}; "
-            "it is cut off"
-        )
+        told = f"its header tells of {count} points of {kind.itemsize}"
+        raise ValueError(f"{len(body)} bytes where {told}; it is cut off")
     rows = np.frombuffer(body, dtype=kind, count=count)
     order = ["x", "y", "z", *(name for name, _ in fields if name not in ("x", "y", "z"))]
     meant = {field: (name, unit) for field, name, unit in _MEANING.findall(head.decode("ascii"))}
@@ -243,9 +236,7 @@ def _table(head: bytes, fields: list[tuple[str, str]], count: int, body: bytes) 
 def checked(cloud: CloudTable, path: Path) -> CloudTable:
     """Return a cloud; InputError if a value is not finite, but for a coordinate not measured."""
     places, rest = cloud.values[:, :3], cloud.values[:, 3:]
-    whole = np.isfinite(places).all() or (
-        cloud.names[:3] == SPATIAL_AXES and measured_alone(places)
-    )
-    if not (whole and np.isfinite(rest).all()):
+    own = measured_alone(places) if cloud.names[:3] == SPATIAL_AXES else np.isfinite(places).all()
+    if not (own and np.isfinite(rest).all()):
         raise InputError(f"'{path}' holds NaN or infinity; every value of a cloud must be finite")
     return cloud

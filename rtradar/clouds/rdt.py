@@ -27,30 +27,12 @@ _WITH_REPLACEMENT = 1  # selects a random stream apart from that of the keys
 
 
 class UniformSample:
-    """Reservoir sample: a uniform random subset of the rows of a stream too long to keep.
+    """Reservoir sample: a uniform random subset of ``n_rows`` rows of a stream too long to keep.
 
     Each row gets a random key, and the rows with the smallest keys are kept, so that every subset
-    is equally likely. All memory is allocated at the start.
-
-    Parameters
-    ----------
-    n_rows : int
-        Number of rows to keep, at least 1.
-    seed : int
-        Seed of the random keys. The same stream and seed give the same sample, however the stream
-        is divided into calls of `add`.
-    columns : int
-        Number of columns of a row.
-
-    Attributes
-    ----------
-    n_seen : int
-        Number of rows added so far.
-
-    Raises
-    ------
-    InputError
-        If ``n_rows`` or ``seed`` is out of its range.
+    is equally likely. All memory is allocated at the start. The same stream and seed give the same
+    sample, however the stream is divided into calls of `add`; ``n_seen`` is the number of its rows.
+    InputError if ``n_rows`` or ``seed`` is out of its range.
     """
 
     def __init__(self, n_rows: int, seed: int, columns: int = 3) -> None:
@@ -64,13 +46,7 @@ class UniformSample:
         self.n_seen = 0
 
     def add(self, rows: NDArray[np.float64]) -> None:
-        """Add the next rows of the stream.
-
-        Parameters
-        ----------
-        rows : (row, column) float64
-            Rows in the order of the stream.
-        """
+        """Add the next rows (row, column) of the stream."""
         keys = np.concatenate([self._keys, self._random.random(len(rows))])
         least = np.argpartition(keys, self._n_rows - 1)[: self._n_rows]
         is_new = least >= self._n_rows
@@ -158,7 +134,12 @@ class RdtCloud:
             time does not advance.
         """
         # A copy, as the caller may reuse the array before the next slab.
-        cells = _checked(np.array(mask), "cloud: mask", ("range", "velocity"))
+        cells: NDArray[np.bool_] = np.array(mask)
+        if cells.ndim != 2 or cells.dtype != np.bool_ or 0 in cells.shape:
+            raise InputError(
+                f"RDT cloud: mask has shape {cells.shape}, type {cells.dtype}; "
+                "it must be (range, velocity) bool"
+            )
         if not np.isfinite(time_s):
             raise InputError(f"RDT cloud: time_s = {time_s!r}; it must be finite")
         if self._last is None:
@@ -192,54 +173,6 @@ class RdtCloud:
         vertices, faces = _surface(np.stack([first, second]), times, self._radar)
         if len(faces):
             self._sample.add(vertices[faces].mean(axis=1))
-
-
-def rdt_isosurface(
-    volume: ArrayLike, times: ArrayLike, radar: Radar
-) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
-    """Return the closed isosurface of a whole volume of detections.
-
-    Parameters
-    ----------
-    volume : (time, range, velocity) bool
-        Detections of successive frames.
-    times : (time,) float
-        Centres of the frames [s], ascending.
-    radar : Radar
-        Radar that defines the range and velocity axes and the hop.
-
-    Returns
-    -------
-    vertices : (vertex, 3) float64
-        Time [s], range [m], velocity [m/s].
-    faces : (triangle, 3) int64
-        Indices into ``vertices``. Both arrays are empty if there are no detections.
-
-    Raises
-    ------
-    InputError
-        If the volume is not a three-dimensional Boolean array or the times do not fit it.
-    """
-    cells = _checked(np.asarray(volume), "volume", ("time", "range", "velocity"))
-    centres = np.asarray(times, dtype=np.float64)
-    fits = centres.shape == cells.shape[:1] and np.isfinite(centres).all()
-    if not fits or (np.diff(centres) <= 0).any():
-        raise InputError(
-            f"RDT volume of {cells.shape[0]} frames: "
-            "times must be as many finite, ascending numbers"
-        )
-    empty, hop = np.zeros_like(cells[:1]), radar.frame_hop_s
-    padded = np.concatenate([[centres[0] - hop], centres, [centres[-1] + hop]])
-    return _surface(np.concatenate([empty, cells, empty]), padded, radar)
-
-
-def _checked(cells: NDArray[np.bool_], name: str, axes: tuple[str, ...]) -> NDArray[np.bool_]:
-    if cells.ndim != len(axes) or cells.dtype != np.bool_ or 0 in cells.shape:
-        raise InputError(
-            f"RDT {name} has shape {cells.shape}, type {cells.dtype}; "
-            f"it must be ({', '.join(axes)}) bool"
-        )
-    return cells
 
 
 def _surface(

@@ -77,9 +77,7 @@ class SpatialCloud:
     def strongest(self) -> SpatialCloud:
         """Return the points at most `SHOWN_DB` below the strongest one, for pictures."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
-        return SpatialCloud(
-            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept]
-        )
+        return SpatialCloud(*(values[kept] for values in vars(self).values()))
 
 
 def measured_alone(points: NDArray[np.float64]) -> bool:
@@ -133,10 +131,8 @@ def spatial_points(spectra: AngleSpectra, radar: Radar, time_s: float) -> Spatia
 
 def _peaks(spectra: AngleSpectra) -> tuple[Peaks, Peaks]:
     """Peaks of both arrays; an array that is absent has sine 0 and the power of the other."""
-    y, z = (
-        None if power is None else find_peaks(spectra.sines, power)
-        for power in (spectra.y, spectra.z)
-    )
+    powers = spectra.y, spectra.z
+    y, z = (None if power is None else find_peaks(spectra.sines, power) for power in powers)
     known = y or z
     if known is None:
         raise InputError(

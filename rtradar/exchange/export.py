@@ -14,7 +14,7 @@ from rtradar.clouds import files as cloud_files
 from rtradar.clouds.files import CloudTable
 from rtradar.errors import InputError
 from rtradar.exchange import if_formats
-from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, open_recording
+from rtradar.exchange.recording import IF_AXES, IfCube, IfRecording, in_short, open_recording
 from rtradar.system.output_folder import check_whole
 
 _T = TypeVar("_T")
@@ -146,8 +146,7 @@ def _read(path: Path, formats: Mapping[str, tuple[Any, Callable[[Path], _T]]], w
     try:
         return formats[path.suffix.lower()][1](path)
     except _DAMAGE as error:
-        reason = " ".join(str(error).split())[:100] or type(error).__name__
-        why = getattr(error, "strerror", None) or reason
+        why = getattr(error, "strerror", None) or in_short(error)
         raise InputError(
             f"cannot read {what} from '{path}': {why}; give a file that rtradar wrote"
         ) from None

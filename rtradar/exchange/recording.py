@@ -131,7 +131,7 @@ class IfRecording:
             ) from None
         except Exception as error:  # zarr and its codecs fail in many ways on damaged chunks
             raise InputError(
-                f"{self.name}: IF samples {first} to {last} cannot be read ({_short(error)}); "
+                f"{self.name}: IF samples {first} to {last} cannot be read ({in_short(error)}); "
                 "run it again"
             ) from None
 
@@ -150,7 +150,7 @@ def open_recording(folder: Path) -> IfRecording:
         radar = Radar(**summary["parameters"]["radar"])
     except (OSError, ValueError, KeyError, TypeError) as error:  # an InputError is a ValueError
         raise InputError(
-            f"'{folder / 'summary.json'}' tells of no radar ({_short(error)}); run it again"
+            f"'{folder / 'summary.json'}' tells of no radar ({in_short(error)}); run it again"
         ) from None
     if not summary["parameters"].get("save_if", True):
         raise InputError(
@@ -168,7 +168,7 @@ def open_recording(folder: Path) -> IfRecording:
         shape, kind = stored.shape, np.dtype(stored.dtype)
     except Exception as error:  # zarr fails in many ways on a damaged folder
         raise InputError(
-            f"'{folder / 'if.zarr'}' cannot be read ({_short(error)}); run it again"
+            f"'{folder / 'if.zarr'}' cannot be read ({in_short(error)}); run it again"
         ) from None
     expected = (radar.n_rx, radar.samples_per_chirp)
     fits = len(shape) == 3 and shape[1:] == expected and shape[0] >= radar.n_tx
@@ -212,5 +212,6 @@ def radar_of(text: str) -> Radar:
     return Radar(**json.loads(text))
 
 
-def _short(error: BaseException) -> str:
+def in_short(error: BaseException) -> str:
+    """Return the text of an error in one short line."""
     return " ".join(str(error).split())[:100] or type(error).__name__

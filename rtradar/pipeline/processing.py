@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, UniformSample, spatial_points
+from rtradar.clouds import RdtCloud, RdtCloudResult, SpatialCloud, spatial_points
+from rtradar.clouds.rdt import UniformSample
 from rtradar.pipeline.timing import Stages
 from rtradar.process import (
     AngleSpectra,

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from rtradar.clouds import UniformSample
+from rtradar.clouds.rdt import UniformSample
 from rtradar.errors import InputError
 
 

@@ -65,10 +65,7 @@ def semi_axis_poses(body: Body, times: NDArray[np.float64]) -> NDArray[np.float6
 
 
 def posed_figure(
-    part_names: Sequence[str],
-    times: NDArray[np.float64],
-    poses: NDArray[np.floating],
-    radar: Radar,
+    part_names: Sequence[str], times: NDArray[np.float64], poses: NDArray[np.floating], radar: Radar
 ) -> dict[str, Any]:
     """Return what pages draw of a moving body before a radar, as plain values for JSON.
 
