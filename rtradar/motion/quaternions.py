@@ -82,9 +82,7 @@ def _with_signs(quaternions: Array) -> Iterator[Array]:
         yield frames * signs[..., None]
 
 
-def _sides(
-    quaternions: Array,
-) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
+def _sides(quaternions: Array) -> Iterator[tuple[Array, NDArray[np.bool_]]]:
     """Yield blocks of frames, and whether each is in the half-space of the frame before it."""
     before = quaternions[:1]
     for (frames,) in in_blocks(quaternions):

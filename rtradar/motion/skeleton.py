@@ -1,9 +1,9 @@
 """The 22 nodes of the paper's body, and the retargeting of any skeleton to them, a rigid tree.
 
-HDM05 and CMU have 31 joints. The 24-joint chain (`CHAIN_24`, that of SMPL) leaves out the thumbs,
-and the joints inside what moves as one: upper neck, ball of the foot, radius, hand. Its neck and
-collars are not separated in HDM05, they are all at the thorax; without the three and with the top
-of the head added, 22 nodes and 21 bones remain, one a body part.
+HDM05 and CMU have 31 joints. The chain of 24 joints (that of SMPL) leaves out the thumbs, and the
+joints inside what moves as one: upper neck, ball of the foot, radius, hand. Its neck and collars
+are not separated in HDM05, they are all at the thorax; without the three and with the top of the
+head added, 22 nodes and 21 bones remain, one a body part.
 
 Where one bone of the recording joins two nodes, that bone is taken as it is. Where a chain joins
 them (ankle to toe tip over the ball of the foot, elbow to wrist over the twist joint, wrist to
@@ -58,36 +58,6 @@ NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PA
 """Index of the parent of each node, -1 for the root."""
 
 
-def _pairs(text: str) -> dict[str, str]:
-    """Names and values of a text such as ``hip=upleg toe=toebase``."""
-    return dict(entry.split("=") for entry in text.split())
-
-
-CHAIN_24: Mapping[str, str] = _pairs(
-    "pelvis=root l_hip=lhipjoint r_hip=rhipjoint spine1=lowerback l_knee=lfemur r_knee=rfemur "
-    "spine2=upperback l_ankle=ltibia r_ankle=rtibia spine3=thorax l_foot=ltoes r_foot=rtoes "
-    "neck=thorax l_collar=thorax r_collar=thorax head=lowerneck l_shoulder=lclavicle "
-    "r_shoulder=rclavicle l_elbow=lhumerus r_elbow=rhumerus l_wrist=lwrist r_wrist=rwrist "
-    "l_hand=lfingers r_hand=rfingers"
-)
-"""The 24-joint chain and the HDM05 joint (end of the ASF bone of this name) of each."""
-
-_NODE_OF_24 = _pairs(
-    "pelvis=root spine1=lowerback spine2=upperback spine3=thorax head=neck l_foot=l_toe "
-    "r_foot=r_toe"
-)
-
-ASF_JOINTS: Mapping[str, str] = {
-    **{
-        _NODE_OF_24.get(name, name): joint
-        for name, joint in CHAIN_24.items()
-        if name not in ("neck", "l_collar", "r_collar")
-    },
-    "head": "head",
-}
-"""HDM05 joint of each of the 22 nodes."""
-
-
 @dataclass(frozen=True)
 class Convention:
     """Joint names of one kind of skeleton by node, as `plain` gives them.
@@ -102,18 +72,24 @@ class Convention:
     open_ended: bool
 
 
-def _convention(name: str, left: str, right: str, middle: str, sided: str) -> Convention:
+def _convention(
+    name: str, left: str, right: str, middle: str, sided: str, *, open_ended: bool = True
+) -> Convention:
     """Make a convention from texts such as ``hip=upleg toe=toeend,toebase``; ``@`` is the side."""
     texts = {"": middle, "l_": sided.replace("@", left), "r_": sided.replace("@", right)}
     entries = [(side, *entry.split("=")) for side in texts for entry in texts[side].split()]
     joints = {f"{side}{node}": tuple(names.split(",")) for side, node, names in entries}
-    return Convention(name, joints, open_ended=True)
+    return Convention(name, joints, open_ended)
 
 
 CONVENTIONS: tuple[Convention, ...] = (
-    Convention(
+    _convention(
         "ASF (HDM05, CMU)",
-        {node: (ASF_JOINTS[node],) for node in ASF_JOINTS if not node.endswith("back")},
+        "l",
+        "r",
+        "root=root thorax=thorax neck=lowerneck head=head",
+        "hip=@hipjoint knee=@femur ankle=@tibia toe=@toes "
+        "shoulder=@clavicle elbow=@humerus wrist=@wrist hand=@fingers",
         open_ended=False,
     ),
     _convention(
@@ -143,6 +119,9 @@ CONVENTIONS: tuple[Convention, ...] = (
     ),
 )
 """Every kind of skeleton that is understood."""
+
+ASF_JOINTS = ("lowerback", "upperback", *itertools.chain(*CONVENTIONS[0].joints.values()))
+"""HDM05 joints of the 22 nodes."""
 
 
 def plain(name: str) -> str:

@@ -56,6 +56,8 @@ noise alone exceeds it in 2 of 100 spectra."""
 
 _CELLS_A_THREAD = 64
 
+_Reals = NDArray[np.float64]
+
 
 @dataclass(frozen=True)
 class AngleSpectra:
@@ -157,10 +159,7 @@ def angle_spectra(
 
 
 def _checked_bins(
-    cells: NDArray[np.generic],
-    ranges: NDArray[np.float64],
-    rates: NDArray[np.float64],
-    radar: Radar,
+    cells: NDArray[np.generic], ranges: _Reals, rates: _Reals, radar: Radar
 ) -> NDArray[np.int64]:
     """Range bins (cell,) of cells whose arrays fit each other and the radar."""
     needed = (2 * range_walk(radar) + 1, radar.n_channels)
@@ -250,10 +249,7 @@ def angle(
     found = angle_spectra(values, radar, *at, focus=focus, taper="uniform")
     u, w = (_peak(found.sines, power) for power in (found.y, found.z))
     azimuth = math.asin(max(-1.0, min(1.0, u / math.sqrt(1 - w * w))))
-    return (
-        math.nan if found.y is None else azimuth,
-        math.nan if found.z is None else math.asin(w),
-    )
+    return (math.nan if found.y is None else azimuth, math.nan if found.z is None else math.asin(w))
 
 
 def _nearest(bins: float, least: float, largest: float) -> int | None:
@@ -271,15 +267,10 @@ def _peak(sines: NDArray[np.float64], power: NDArray[np.float32] | None) -> floa
 
 @dataclass(frozen=True)
 class Peaks:
-    """Highest maxima of a number of spectra, the strongest first.
+    """Highest maxima (cell, peak) of spectra, the strongest first, refined between grid points.
 
-    Parameters
-    ----------
-    sine, power : (cell, peak) float64
-        Refined between the points of the grid.
-    real : (cell, peak) bool
-        False where a cell has fewer peaks; sine and power are then those of its strongest. A cell
-        with any power has a peak.
+    ``real`` is False where a cell has fewer peaks; sine and power are then those of its strongest.
+    A cell with any power has a peak.
     """
 
     sine: NDArray[np.float64]
@@ -288,18 +279,7 @@ class Peaks:
 
 
 def find_peaks(sines: NDArray[np.float64], power: NDArray[np.float32]) -> Peaks:
-    """Up to `MOST_PEAKS` maxima of each spectrum that are neither side lobes nor noise.
-
-    Parameters
-    ----------
-    sines : (sine,) float64
-        Uniform grid.
-    power : (cell, sine) float32
-
-    Returns
-    -------
-    Peaks
-    """
+    """Up to `MOST_PEAKS` maxima of each spectrum (cell, sine), neither side lobes nor noise."""
     index = np.empty((len(power), MOST_PEAKS), dtype=np.int64)
     count = np.empty(len(power), dtype=np.int64)
     below, above = (np.float32(10 ** (db / 10)) for db in (-BELOW_HIGHEST_DB, ABOVE_MEDIAN_DB))
@@ -318,12 +298,9 @@ def _refine(
     """
     last = len(sines) - 1
     around = (np.clip(index + step, 0, last) for step in (-1, 0, 1))
+    least = np.finfo(np.float32).tiny
     left, middle, right = (
-        np.log(
-            np.maximum(
-                np.take_along_axis(power, at, axis=1), np.finfo(np.float32).tiny, dtype=np.float64
-            )
-        )
+        np.log(np.maximum(np.take_along_axis(power, at, axis=1), least, dtype=np.float64))
         for at in around
     )
     bend = left - 2 * middle + right

@@ -140,16 +140,8 @@ def ca_cfar(
 
     Parameters
     ----------
-    power : (range, velocity) float
-        Power, linear, in any unit: only ratios count. Not decibels, not magnitudes.
-    guard, train : int
-        Width of the guard and of the training band [cells].
-    pfa : float
-        False-alarm rate for independent cells, in (0, 1); `ca_scale` turns it into the multiplier.
-    looks : int
-        Channels summed in ``power``.
-    scale : float, optional
-        The multiplier itself, instead of the one solved for ``pfa``.
+    power, guard, train, pfa, looks, scale
+        What they mean for `os_cfar`; `ca_scale` turns the rate into the multiplier.
 
     Returns
     -------

@@ -1,18 +1,9 @@
 """Multipliers of CFAR detectors: by how much a detected cell exceeds its neighbours.
 
-The power of one channel of complex Gaussian noise is exponential; the sum over L channels ("looks")
-follows the Gamma law of shape L. The training cells follow the same law, independent of the cell
-under test and of each other. Then:
-
-- cell averaging: the ratio to the mean of N training cells follows the F law with 2L and 2NL
-  degrees of freedom;
-- order statistic: the k-th smallest of N training cells is at the quantile U of the Gamma law,
-  U ~ Beta(k, N-k+1), so Pfa(alpha) = E[Q(L, alpha z)], z = P^-1(L, U), Q and P the regularised
-  incomplete Gamma functions. For one look this is Rohling's product of (N - i) / (N - i + alpha),
-  i = 0 .. k-1 (H. Rohling, IEEE Trans. AES 19(4), 1983, eq. 22).
-
-In windowed maps neighbouring cells are correlated: the training cells count for fewer, and the rate
-is higher than asked; validation/closed_forms/cfar.py measures by how much.
+The sections on detection of the theory page have the laws, :eq:`os-cfar-looks` and :eq:`ca-cfar`.
+They hold for training cells that are independent of each other. In windowed maps neighbouring cells
+are correlated, and the rate is higher than asked; validation/closed_forms/cfar.py measures by how
+much.
 """
 
 from __future__ import annotations

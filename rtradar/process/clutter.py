@@ -1,7 +1,8 @@
 """Removal of static clutter from range spectra, before Doppler.
 
 A static echo has the same range spectrum in every TDM cycle, each Tx, Rx and range bin by itself;
-what is constant there from cycle to cycle is removed. T is the cycle, f the Doppler frequency:
+what is constant there from cycle to cycle is removed. T is the cycle, f the Doppler frequency, and
+:eq:`clutter-gain` has the gains:
 
 ``none``
     Nothing is removed.
@@ -19,16 +20,14 @@ what is constant there from cycle to cycle is removed. T is the cycle, f the Dop
     A background that follows each chirp, b += a (x - b), a = 1 - exp(-T / time constant), is
     subtracted from the next. It starts as the first chirp and is the mean of all of them until
     1 / a cycles are there: one chirp alone would leave its noise in every range bin at zero Doppler
-    for as long. Gain |2 sin(pi f T)| / |1 - (1 - a) exp(-j 2 pi f T)|: half the power at
-    f = 1 / (2 pi time constant), all of it well above; white noise becomes 2 / (2 - a) as strong. A
-    person who does not move fades with the time constant, and leaves a hole that fades likewise, at
-    zero Doppler.
+    for as long. Half the power is left at f = 1 / (2 pi time constant), all of it well above; white
+    noise becomes 2 / (2 - a) as strong. A person who does not move fades with the time constant,
+    and leaves a hole that fades likewise, at zero Doppler.
 ``mti``
     A canceller of two or three pulses of the same Tx: x[n] - x[n-1], or x[n] - 2 x[n-1] + x[n-2],
-    over sqrt(2) or sqrt(6), so that white noise keeps its mean power. Gain
-    |2 sin(pi f T)| / sqrt(2), or |2 sin(pi f T)|^2 / sqrt(6): blind at zero and at multiples of
-    1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar at 12 GHz).
-    Noise takes on the same colour. The first one or two cycles come out as zeros.
+    over sqrt(2) or sqrt(6), so that white noise keeps its mean power: blind at zero and at
+    multiples of 1 / T, and weak for all that is slow (-10 and -22 dB at 1 m/s for the paper's radar
+    at 12 GHz). Noise takes on the same colour. The first one or two cycles come out as zeros.
 
 ``mean`` works frame by frame, the other two on the stream. All of them are linear, and treat all
 channels alike, so that directions stay.
@@ -248,8 +247,7 @@ def clutter_removal(
 ) -> ClutterRemoval:
     """Remove static clutter from a stream of range spectra and from its frames.
 
-    :eq:`clutter-gain` of the theory page has the gains of ``exponential`` and ``mti``. Memory does
-    not grow with the stream. A stream passes both steps, whatever the method::
+    Memory does not grow with the stream. A stream passes both steps, whatever the method::
 
         removal = clutter_removal("mean", radar)
         for first_chirp, spectra in blocks:

@@ -129,30 +129,13 @@ def without_copies(
     band_power: NDArray[np.floating],
     radar: Radar,
     receivers: int,
-    window_functions: WindowFunctions = DEFAULT_WINDOWS,
+    window_functions: WindowFunctions,
 ) -> NDArray[np.floating]:
-    """Power of all Tx together, each echo at its own Doppler only.
+    """Power (doppler, range) of all Tx together, each echo at its own Doppler only.
 
-    Parameters
-    ----------
-    band_power : (doppler, range) float
-        Power of the sum over slow time, in the order of the DFT; of one or more Rx together.
-    radar : Radar
-        Radar with Doppler division.
-    receivers : int
-        Number of Rx whose power is summed.
-    window_functions : WindowFunctions
-        Window functions of the power. Their main lobes tell how far an echo spreads over cells.
-
-    Returns
-    -------
-    (doppler, range) float
-        Power in the same order: of one echo, what all Tx give together.
-
-    Raises
-    ------
-    InputError
-        Where the Doppler axis does not divide into the bands.
+    ``band_power (doppler, range)`` is that of the sum over slow time, in the order of the DFT, of
+    so many ``receivers`` together. An `InputError` is raised where the Doppler axis does not divide
+    into the bands.
     """
     bands, n_tx = radar.n_doppler_bands, radar.n_tx
     if len(band_power) % bands:

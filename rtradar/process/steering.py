@@ -34,16 +34,10 @@ _TAYLOR_EQUAL_LOBES = 4
 
 @dataclass(frozen=True)
 class Line:
-    """One virtual line: the channels whose Tx and Rx both lie on it.
+    """One virtual line: the channels whose Tx and Rx both lie on it, along world axis 1 or 2.
 
-    Parameters
-    ----------
-    axis : {1, 2}
-        World axis of the line, y or z.
-    channels : (element,) int64
-        Channel of each element, tx * n_rx + rx.
-    tx_m, rx_m : (element,) float64
-        Positions of its Tx and of its Rx along the line, about the radar [m].
+    ``channels (element,)`` are tx * n_rx + rx, ``tx_m`` and ``rx_m (element,)`` the positions of
+    each element's Tx and Rx along the line, about the radar [m].
     """
 
     axis: int
@@ -54,12 +48,7 @@ class Line:
     def excess_m(self, sines: ArrayLike, range_m: float | None) -> NDArray[np.float64]:
         """Path over each element less twice the range, :eq:`near-field` (..., element) [m].
 
-        Parameters
-        ----------
-        sines : (...) float
-            Sine of the direction along the line.
-        range_m : float or None
-            Range of the point [m]; None for a plane wave.
+        The direction has the ``sines (...)`` along the line; without a range it is a plane wave.
         """
         u = np.asarray(sines, dtype=np.float64)[..., None]
         if range_m is None:
@@ -73,15 +62,10 @@ class Line:
 
 @lru_cache(maxsize=16)
 def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
-    """The y-line and the z-line; None where a line has fewer than two elements.
+    """The y-line and the z-line; None where one has fewer than two elements, InputError for both.
 
     Channels of a Tx on one line and an Rx on the other, which ``channels = "all"`` has, belong to
     neither.
-
-    Raises
-    ------
-    InputError
-        Where the radar has no such line at all.
     """
     lines = _line(radar, 1), _line(radar, 2)
     if not measures_angle(radar):
@@ -143,10 +127,7 @@ def _line(radar: Radar, axis: int) -> Line | None:
 def sine_grid(radar: Radar) -> NDArray[np.float64]:
     """Uniform sines (sine,) within the unambiguous angle, fine enough for a parabola through three.
 
-    Raises
-    ------
-    InputError
-        Where the radar has no line at all, or one so long that there would be too many sines.
+    An `InputError` is raised where there is no line, or one so long that they would be too many.
     """
     largest = np.sin(np.radians(radar.max_angle_deg))
     lines = [line for line in virtual_lines(radar) if line is not None]
@@ -177,13 +158,6 @@ def taper_weights(line: Line, taper: Taper) -> NDArray[np.float64]:
 
 
 @lru_cache(maxsize=16)
-def _taper(radar: Radar, axis: int, taper: Taper) -> NDArray[np.float64]:
-    line = virtual_lines(radar)[axis - 1]
-    assert line is not None
-    return taper_weights(line, taper)
-
-
-@lru_cache(maxsize=16)
 def range_walk(radar: Radar) -> int:
     """Range bins on either side of a cell in which some elements receive its echo from the side."""
     lines = [line for line in virtual_lines(radar) if line is not None]
@@ -196,17 +170,9 @@ def steering(
 ) -> Steering:
     """Phases and range bins of a line for points at some ranges, for every sine of `sine_grid`.
 
-    Parameters
-    ----------
-    radar : Radar
-    axis : {1, 2}
-        Axis of the line.
-    range_bins : (bin,) int64 or None
-        Ranges of the points, whose echoes are read in the bin nearest to half their path over each
-        element; None for a plane wave, read in the bin of the cell alone (the far-field FFT): one
-        entry, for all bins.
-    taper : {"uniform", "taylor"}
-        Weights along the line, see `taper_weights`.
+    Echoes are read in the bin nearest to half their path over each element. Without ``range_bins
+    (bin,)`` the wave is plane and read in the bin of the cell alone (the far-field FFT): one entry,
+    for all bins.
     """
     line = virtual_lines(radar)[axis - 1]
     if line is None:
@@ -214,7 +180,7 @@ def steering(
             f"angle: radar '{radar.name}' has no line of at least 2 channels along "
             f"{'xyz'[axis]}; give it one"
         )
-    walk, sines, own = range_walk(radar), sine_grid(radar), _taper(radar, axis, taper)
+    walk, sines, own = range_walk(radar), sine_grid(radar), taper_weights(line, taper)
     count = 1 if range_bins is None else len(range_bins)
     weights = np.empty((count, len(line.channels), len(sines)), dtype=np.complex64)
     carrier = radar.centre_frequency_hz + radar.tx_offset_hz[line.channels // radar.n_rx]

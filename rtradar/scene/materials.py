@@ -213,9 +213,7 @@ _SKIN = ColeCole(1e9, 100e9, 4.0, ((32.0, 7.234e-12, 0.0), (1100.0, 32.481e-9, 0
 _OTHERS = (
     Material(name="skin", source="dry skin of Gabriel et al. 1996", bands=(_SKIN,)),
     Material(
-        name="perfect-conductor",
-        source="the limit of infinite conductivity",
-        bands=(Conductor(),),
+        name="perfect-conductor", source="the limit of infinite conductivity", bands=(Conductor(),)
     ),
 )
 

@@ -159,7 +159,7 @@ def _bone_line(
 def _check_bone(bone: _Bone, text: TextFile) -> None:
     if not bone.name:
         raise text.fail("a bone without a name ends here")
-    if bone.name in ASF_JOINTS.values() and not bone.length * np.abs(bone.direction).max() > 0:
+    if bone.name in ASF_JOINTS and not bone.length * np.abs(bone.direction).max() > 0:
         raise text.fail(
             f"bone {bone.name!r} has no length; a body part hangs on it, give its length and "
             "direction",

@@ -121,15 +121,8 @@ def kick(subject: Subject, t: Array) -> Pose:
             outward=np.radians(14 + 8 * strike),
             elbow=np.radians(105 - 25 * strike * (side == kicker)),
         )
-    return Pose(
-        root=root,
-        pelvis=pelvis,
-        thorax=thorax,
-        head=about(y=math.radians(3) * (1 - strike)),
-        ankles=ankles,
-        feet=feet,
-        arms=arms,
-    )
+    head = about(y=math.radians(3) * (1 - strike))
+    return Pose(root, pelvis, thorax, head, ankles, feet, arms)
 
 
 def punch(subject: Subject, t: Array) -> Pose:
@@ -171,17 +164,9 @@ def punch(subject: Subject, t: Array) -> Pose:
         else:
             wrist = guard - 0.06 * length * chest[:, None] * np.array([1.0, 0.0, 0.0])
         arms[side] = reach_arm(thorax, side, wrist, height, math.radians(25))
-    return Pose(
-        root=root,
-        pelvis=pelvis,
-        thorax=thorax,
-        head=about(z=back * np.radians(4 - 6 * chest), y=math.radians(5)),
-        ankles=ankles,
-        feet=feet,
-        left=pelvis.apply(LEFT),
-        arms=arms,
-        shrug=np.radians(2 + 5 * chest),
-    )
+    head, left = about(z=back * np.radians(4 - 6 * chest), y=math.radians(5)), pelvis.apply(LEFT)
+    shrug = np.radians(2 + 5 * chest)
+    return Pose(root, pelvis, thorax, head, ankles, feet, arms, left, shrug)
 
 
 class _Flight(NamedTuple):
@@ -300,13 +285,6 @@ def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
             elbow=np.radians(14 + 44 * moving),
             wrist=0.05,
         )
-    return Pose(
-        root=xyz(0.03 * height * roll, 0.0, z),
-        pelvis=about(y=math.radians(3)),
-        thorax=thorax,
-        head=about(y=math.radians(3)),
-        ankles=ankles,
-        feet=feet,
-        arms=arms,
-        shrug=math.radians(22) * apart,
-    )
+    root, upright = xyz(0.03 * height * roll, 0.0, z), about(y=math.radians(3))
+    shrug = math.radians(22) * apart
+    return Pose(root, upright, thorax, upright, ankles, feet, arms, shrug=shrug)

@@ -106,7 +106,7 @@ class Arm(NamedTuple):
     hand: Rotation
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Pose:
     """Pose of the figure at n times, facing +x.
 

@@ -167,15 +167,8 @@ def walk(duration_s: float, subject: Subject) -> PosesAt:
                 outward=math.radians(9),
                 elbow=math.radians(22) + math.radians(12) * vigour * (1 + beat) / 2,
             )
-        return Pose(
-            root=xyz(path[:, 0], path[:, 1], z),
-            pelvis=pelvis,
-            thorax=thorax,
-            head=about(z=heading, y=math.radians(4)),
-            ankles=ankles,
-            feet=feet,
-            left=about(z=heading).apply(LEFT),
-            arms=arms,
-        )
+        root, head = xyz(path[:, 0], path[:, 1], z), about(z=heading, y=math.radians(4))
+        left = about(z=heading).apply(LEFT)
+        return Pose(root, pelvis, thorax, head, ankles, feet, arms, left)
 
     return poses
