@@ -17,7 +17,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import rtradar as rt
 from rtradar.body import Body, Ellipsoids
-from rtradar.body.meshes import ellipsoid_meshes
+from rtradar.body.body import ellipsoid_meshes
 from rtradar.motion import place
 from rtradar.report.figures.canvas import VELOCITY_LABEL, field_unit
 

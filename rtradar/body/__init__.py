@@ -1,6 +1,5 @@
 """A person as 21 posed ellipsoids, and their meshes."""
 
-from rtradar.body.body import PART_NAMES, Body, Ellipsoids, Poses
-from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
+from rtradar.body.body import PART_NAMES, Body, Ellipsoids, Poses, ellipsoid_meshes, unit_sphere
 
 __all__ = ["PART_NAMES", "Body", "Ellipsoids", "Poses", "ellipsoid_meshes", "unit_sphere"]

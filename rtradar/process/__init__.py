@@ -1,16 +1,23 @@
 """From IF samples to range-Doppler maps, their detections, directions and spectrograms."""
 
-from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
-from rtradar.process.angles import AngleSpectra, angle, angle_spectra
+from rtradar.process.angles import (
+    AngleSpectra,
+    angle,
+    angle_grid,
+    angle_spectra,
+    range_azimuth,
+    range_elevation,
+)
 from rtradar.process.cfar import (
     DETECTORS,
     Detector,
     build_detector,
     ca_cfar,
+    ca_scale,
     os_cfar,
+    os_scale,
     register_detector,
 )
-from rtradar.process.cfar_thresholds import ca_scale, os_scale
 from rtradar.process.clutter import CLUTTER_REMOVALS, ClutterRemoval, clutter_removal
 from rtradar.process.clutter_map import ClutterMap, clutter_map_scale
 from rtradar.process.frames import SlidingWindows

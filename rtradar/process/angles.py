@@ -1,4 +1,4 @@
-"""Directions of echoes: power over the sines of the two virtual lines, its peaks, and one cell.
+"""Directions of echoes: power over the sines of the two virtual lines, its peaks, and its maps.
 
 In one TDM cycle Tx k transmits k chirps late; meanwhile the phase of an echo of range rate v grows
 by 2 pi f_D k T, f_D = 2 v / lambda with the wavelength of the sweep centre. That is removed with
@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
-from rtradar.kernels.angles import beam_power, highest_maxima
+from rtradar.kernels.angles import add_interpolated, beam_power, highest_maxima
 from rtradar.process.spectra import cell_spectra, range_spectrum
 from rtradar.process.steering import (
     Taper,
@@ -308,3 +308,89 @@ def _refine(
     shift = np.clip(0.5 * (left - right) / np.where(inside, bend, -1.0), -0.5, 0.5) * inside
     sine = sines[index] + shift * (sines[1] - sines[0])
     return sine, np.exp(middle - 0.25 * (left - right) * shift)
+
+
+# -- maps over range and angle ---------------------------------------------------------------------
+
+
+def angle_grid(radar: Radar) -> NDArray[np.float64]:
+    """Azimuths and elevations of the maps: uniform within the unambiguous angle.
+
+    Parameters
+    ----------
+    radar : Radar
+        Radar that has the array.
+
+    Returns
+    -------
+    (angle,) float64
+        Angles [rad].
+    """
+    largest = math.radians(radar.max_angle_deg)
+    return np.linspace(-largest, largest, len(sine_grid(radar)))
+
+
+def range_azimuth(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
+    """Power over range and azimuth, summed over cells.
+
+    The y-line measures u = sin(azimuth) cos(elevation); the azimuths of each cell follow with the
+    cosine of its strongest elevation. Without a z-line elevation is not measured, and the map is
+    over the cone angle asin(u) in place of azimuth.
+
+    Parameters
+    ----------
+    spectra : AngleSpectra
+        Angle spectra of the detected cells of one frame.
+    radar : Radar
+        Radar that gives range bins and angles.
+
+    Returns
+    -------
+    (range, azimuth) float64
+        Power on the range bins of the radar and on `angle_grid`, in the unit of ``spectra``; zero
+        where there are no cells.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no y-line.
+    """
+    w = 0.0 if spectra.z is None else spectra.sines[spectra.z.argmax(axis=1), None]
+    return _map(spectra, "y", np.sqrt(1 - w**2) * np.sin(angle_grid(radar)), radar)
+
+
+def range_elevation(spectra: AngleSpectra, radar: Radar) -> NDArray[np.float64]:
+    """Power over range and elevation, summed over cells; the z-line measures w = sin(elevation).
+
+    Parameters
+    ----------
+    spectra, radar
+        What they are for `range_azimuth`.
+
+    Returns
+    -------
+    (range, elevation) float64
+        Power as that of `range_azimuth`.
+
+    Raises
+    ------
+    InputError
+        Where the radar has no z-line.
+    """
+    return _map(spectra, "z", np.sin(angle_grid(radar)), radar)
+
+
+def _map(spectra: AngleSpectra, line: str, sines: _Reals, radar: Radar) -> _Reals:
+    """Power of each cell on a line read at its own sines (cell, angle), summed by range bin."""
+    power: NDArray[np.float32] | None = getattr(spectra, line)
+    if power is None:
+        raise InputError(
+            f"range-{'azimuth' if line == 'y' else 'elevation'} map: radar '{radar.name}' has no "
+            f"line of at least 2 channels along {line}; give it one"
+        )
+    total = np.zeros((radar.samples_per_chirp, sines.shape[-1]))
+    own = np.ascontiguousarray(np.broadcast_to(sines, (len(power), sines.shape[-1])))
+    bins = np.rint(spectra.range_m / radar.range_bin_m).astype(np.int64)
+    grid = spectra.sines
+    add_interpolated(power, own, grid[0], grid[1] - grid[0], bins, total)
+    return total

@@ -4,18 +4,13 @@ The map of a cell is the mean of its power in past frames, whose weights fall wi
 time constant; until there are enough, all have the same weight. Whatever stays in its cell becomes
 part of the map and is no longer detected: the room, but also a person who does not move.
 
-The law. In noise the power of one channel in past frames j is the sum of w_j |z_j|^2, the z_j
-complex Gaussian with the correlation C of frames that share chirps. That is the sum of l_j E_j,
-with independent exponential E_j and l_j the eigenvalues of sqrt(w_i) C_ij sqrt(w_j). With L
-channels ("looks") the cell under test follows the Gamma law of shape L, and the map is the sum of
-l_j G_j, G_j of that same law. For one look the false-alarm rate at the multiplier alpha is the
-product of 1 / (1 + alpha l_j); for l_j = a (1 - a)^j that is the digital exponential filter of
-R. Nitzberg (Clutter map CFAR analysis, IEEE Trans. AES 22(4), 1986). For L looks: a Gamma variable
-of shape L is the wait for L Poisson events, so the rate is the probability of fewer than L events
-while alpha times the map passes. Those are a sum of negative binomial numbers of success
-probabilities r_j = alpha l_j / (1 + alpha l_j), and the probabilities c_k of k events follow from
-the power sums of r_j, k c_k = L (p_1 c_(k-1) + ... + p_k c_0), p_m = sum r_j^m, without
-cancellation.
+The law. In noise the map of one channel is the sum of w_j |z_j|^2 over past frames j, the z_j
+complex Gaussian with the correlation C of frames that share chirps. That is :eq:`clutter-map`, with
+l_j the eigenvalues of sqrt(w_i) C_ij sqrt(w_j). For L channels ("looks"): a Gamma variable of shape
+L is the wait for L Poisson events, so the rate is the probability of fewer than L events while
+alpha times the map passes. Those are a sum of negative binomial numbers of success probabilities
+r_j = alpha l_j / (1 + alpha l_j), and the probabilities c_k of k events follow from the power sums
+of r_j, k c_k = L (p_1 c_(k-1) + ... + p_k c_0), p_m = sum r_j^m, without cancellation.
 
 Frames that share chirps with the one under test (three of the paper's radars) wait outside the map
 until they no longer do; otherwise an echo would hide itself. Frames in the map that share chirps
@@ -36,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig_banded
 
 from rtradar.errors import InputError
-from rtradar.process.cfar_thresholds import (
+from rtradar.process.cfar import (
     check_count,
     check_pfa,
     check_scale,
@@ -93,14 +88,13 @@ class ClutterMap:
         check_pfa(pfa)
         check_count("looks", looks)
         check_scale("clutter map", scale)
-        self._radar, self._pfa, self._looks, self._given = radar, float(pfa), int(looks), scale
-        self._window_functions = window_functions
+        self._law, self._given = (radar, float(pfa), int(looks), window_functions), scale
         hops = check_time_constant(time_constant_s) / (radar.hop_cycles * radar.cycle_duration_s)
         self._weight = -math.expm1(-1 / hops)
         self._memory = math.ceil(min(-math.log(_FORGOTTEN) * hops, _MOST_WINDOWS))  # of the law
         self._apart = _windows_apart(radar)
         self._waiting: deque[NDArray[np.floating]] = deque()
-        self._map = np.empty((0, 0))
+        self._map: NDArray[np.float64] | None = None
         self._count = 0  # frames in the map
         self._solved_for, self._scale = 0, math.inf
 
@@ -125,28 +119,22 @@ class ClutterMap:
             infinity or a negative value.
         """
         cells = checked_power("clutter map", power)
-        earlier = self._map if self._count else self._waiting[0] if self._waiting else cells
-        known = earlier.shape
-        if cells.shape != known:
+        if self._map is None:
+            self._map = np.zeros(cells.shape)
+        if cells.shape != self._map.shape:
             raise InputError(
-                f"clutter map: power has shape {cells.shape}, the windows before it {known}; all "
-                "must be alike"
+                f"clutter map: power has shape {cells.shape}, the windows before it "
+                f"{self._map.shape}; all must be alike"
             )
         found = np.zeros(cells.shape, dtype=np.bool_)
         if self._count:
             found = cells > self._multiplier() * self._map
         self._waiting.append(cells.copy())
         if len(self._waiting) == self._apart:
-            # It shares no chirp with the frame that comes next.
-            self._learn(self._waiting.popleft())
+            # The oldest shares no chirp with the frame that comes next.
+            self._count += 1
+            self._map += max(self._weight, 1 / self._count) * (self._waiting.popleft() - self._map)
         return found
-
-    def _learn(self, cells: NDArray[np.floating]) -> None:
-        self._count += 1
-        if self._count == 1:
-            self._map = cells.astype(np.float64)
-        else:
-            self._map += max(self._weight, 1 / self._count) * (cells - self._map)
 
     def _multiplier(self) -> float:
         if self._given is not None:
@@ -156,9 +144,7 @@ class ClutterMap:
         # then in growing steps. Meanwhile that of fewer frames is kept, whose rate is at most 5 %
         # too low at 1e-6, less above.
         if count >= self._solved_for + max(1.0, self._solved_for**2 / 5000):
-            self._scale = _scale_after(
-                count, self._weight, self._radar, self._pfa, self._looks, self._window_functions
-            )
+            self._scale = _scale_after(count, self._weight, *self._law)
             self._solved_for = count
         return self._scale
 
@@ -166,7 +152,7 @@ class ClutterMap:
 def clutter_map_scale(weights: ArrayLike, pfa: float, looks: int = 1) -> float:
     """Multiplier of a detector whose level is a weighted sum of independent cells of noise.
 
-    For one look equation :eq:`clutter-map` of the theory page.
+    For one look this is :eq:`clutter-map`.
 
     Parameters
     ----------

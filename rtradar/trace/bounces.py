@@ -12,7 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.meshes import unit_sphere
+from rtradar.body.body import unit_sphere
 from rtradar.scene.mitsuba_scene import build_body_scene, pose_body_scene, triangle_mesh
 from rtradar.trace.rays import ball_around, first_met, into_ball
 

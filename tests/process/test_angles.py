@@ -13,8 +13,14 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.process import range_spectrum
-from rtradar.process.angle_maps import angle_grid, range_azimuth, range_elevation
-from rtradar.process.angles import angle, angle_spectra, find_peaks
+from rtradar.process.angles import (
+    angle,
+    angle_grid,
+    angle_spectra,
+    find_peaks,
+    range_azimuth,
+    range_elevation,
+)
 from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import (
     measures_angle,

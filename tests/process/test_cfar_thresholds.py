@@ -11,7 +11,7 @@ from scipy.special import betainc, gammainc, gammaincc, gammaln
 
 from rtradar.errors import InputError
 from rtradar.process import ca_scale, os_scale
-from rtradar.process.cfar_thresholds import _log_os_pfa, order_rank
+from rtradar.process.cfar import _log_os_pfa, order_rank
 
 
 def log_rohling(alpha: float, n: int, k: int) -> float:

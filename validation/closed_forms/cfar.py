@@ -28,7 +28,7 @@ from scipy.special import gammaincc
 
 from rtradar.kernels.jit import compiled
 from rtradar.process import ca_cfar, ca_scale, os_cfar, os_scale, power_map, range_spectrum
-from rtradar.process.cfar_thresholds import order_rank
+from rtradar.process.cfar import order_rank
 from rtradar.process.window_functions import hann
 from rtradar.radar import Radar
 from rtradar.validate.rows import Row, judged, main, reported

@@ -27,7 +27,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import rtradar as rt
-from rtradar.body.meshes import ellipsoid_meshes, unit_sphere
+from rtradar.body.body import ellipsoid_meshes, unit_sphere
 from rtradar.kernels.jit import compiled
 from rtradar.trace.backends.backend import available, select, use
 from rtradar.trace.bounces import SUBDIVISIONS, BodySurfaces

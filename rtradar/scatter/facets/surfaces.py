@@ -13,7 +13,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.body.meshes import MAXIMUM_SUBDIVISIONS, unit_sphere
+from rtradar.body.body import MAXIMUM_SUBDIVISIONS, unit_sphere
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.facets import Facets, Views, Waves, integrate
