@@ -2,7 +2,7 @@
 Analytic against traced
 =======================
 
-The closed form adds up all parts of a body; ray tracing knows which of them another one hides.
+The closed form adds up all parts of a body; ray tracing knows which of them another one occludes.
 `rt.compare` runs several models on one recording with the same noise and says what differs.
 """
 
@@ -19,7 +19,7 @@ OUT = Path(os.environ.get("RTRADAR_GALLERY_OUT", "out/gallery"))
 SECONDS = float(os.environ.get("RTRADAR_GALLERY_S", 3.0))
 
 # %%
-# A kick seen from the side: one leg passes before the other, the trunk hides an arm.
+# A kick seen from the side: one leg passes before the other, the trunk occludes an arm.
 kick, radar = (
     rt.synthetic_motion("kick", seed=0, duration_s=SECONDS),
     rt.Radar.preset("paper-12ghz"),
@@ -45,8 +45,8 @@ above.set(
     xlabel="Time [s]", ylabel="Power [dB re maximum]", title="Power of the range-Doppler maps"
 )
 above.legend()
-hidden = found.summary["fidelities"]["specular"]["part_hidden_share"]
-below.barh(list(hidden), [100 * share for share in hidden.values()])
-below.set(xlabel="Hidden, share of time and channels [%]", title="What rays find hidden")
+occluded = found.summary["fidelities"]["specular"]["part_hidden_share"]
+below.barh(list(occluded), [100 * fraction for fraction in occluded.values()])
+below.set(xlabel="Occluded [% of time and channels]", title="What rays find occluded")
 below.tick_params(axis="y", labelsize=6)
 figure.savefig(OUT / "5_analytic_and_traced.png")

@@ -261,7 +261,7 @@ def _facet_shadows() -> tuple[Call, Call]:
     at = _geometry(1, 2, 21)
     facets, pose = ellipsoid_facets(at.semi_axes, 3), (*(array[0] for array in at[2:4]), at[4])
     rng, parts = np.random.default_rng(1), np.arange(21)
-    # Vertices on one side of a plane through each part are hidden by the next part.
+    # Vertices on one side of a plane through each part are occluded by the next part.
     hidden = facets.vertices @ rng.normal(size=3) > 0.02
     hidden_by = np.where(hidden, (parts[:, None] + 1) % 21, -1)[None].repeat(2, axis=0)
     corners = np.ascontiguousarray(facets.faces.T, dtype=np.uint32)

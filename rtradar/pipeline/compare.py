@@ -36,7 +36,7 @@ _MEASURES = (
     # key, heading, digits
     ("power_mean_db", "Echo power, mean difference [dB]", 2),
     ("power_rms_db", "Echo power, rms difference [dB]", 2),
-    ("hidden_share", "Hidden fraction of parts, times and channels", 3),
+    ("hidden_share", "Occluded fraction of parts, times and channels", 3),
     ("range_doppler_correlation", "Range-Doppler correlation [dB maps]", 3),
     ("range_doppler_mean_db", "Range-Doppler, mean difference [dB]", 2),
     ("range_doppler_rms_db", "Range-Doppler, rms difference [dB]", 2),
@@ -54,7 +54,7 @@ _MEASURES = (
 
 _PICTURES = {
     "Echo power over time": "compare_power.png",
-    "Echo power and hiding of each part": "compare_parts.png",
+    "Echo power and occlusion of each part": "compare_parts.png",
     "Range-Doppler": "compare_range_doppler.png",
     "Spectrogram": "compare_spectrogram.png",
     "Range-Doppler-time clouds": "compare_cloud.png",

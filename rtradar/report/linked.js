@@ -7,7 +7,7 @@ const nSteps = figure.times.length;
 const nEchoes = echoes.part.length;
 const range = floats(echoes.range_m);
 const velocity = floats(echoes.velocity_mps);
-const power = floats(echoes.power_db); // NaN where hidden
+const power = floats(echoes.power_db); // NaN where occluded
 const corners = floats(echoes.corners);
 const nCorners = nEchoes ? corners.length / (3 * nSteps * nEchoes) : 0;
 const isDirect = (echo) => echoes.bounces[echo] === 1;
@@ -308,7 +308,7 @@ async function main() {
 
     const [values, levels, rates] = [mode, "power", "velocity"].map((which) => partValues(which, step));
     const said = figure.parts.map((part, index) => [
-      part, levels[index] > modes.power.cmin ? `${levels[index].toFixed(1)} ${data.power_unit}` : "hidden", `${rates[index].toFixed(2)} m/s`,
+      part, levels[index] > modes.power.cmin ? `${levels[index].toFixed(1)} ${data.power_unit}` : "occluded", `${rates[index].toFixed(2)} m/s`,
     ].join("<br>"));
     const [figurePart, ...others] = placesAt(step, pointsTrace);
     await move(body, [

@@ -38,7 +38,7 @@ def scattering_length(
     Parameters
     ----------
     target : Ellipsoids or trimesh.Trimesh
-        Target. Its parts hide each other where the model traces, and of parts that fill the same
+        Target. Its parts occlude each other where the model traces, and of parts that fill the same
         place one counts. Meshes, of perfect conductors, are for ``physical-optics``, ``reference``
         (the same here, where nothing is interpolated) and ``rays``; an open mesh is a thin sheet.
     tx, rx : (n, 3) array_like

@@ -28,8 +28,8 @@ _STEP_S = 1e-3
 class Limit:
     """A limit of validity that the capture came near or went past.
 
-    ``name`` is short, for machines, ``message`` one line for people; ``share`` is the fraction of
-    the person's echo power that is concerned, 0 to 1.
+    ``name`` is short, for machines, ``message`` one line for people. ``share``, so called in
+    ``summary.json``, is the fraction of the person's echo power that is concerned, 0 to 1.
     """
 
     name: str

@@ -24,7 +24,7 @@ MAX_BINS_IN_CHIRP = 0.1
 MANY_ECHOES, MANY_VARYING_ECHOES = 300, 84
 """Echoes from which on the NUFFT is faster, if float32 will do: with amplitudes that are one
 number, and with amplitudes at several frequencies (`validation/other_methods/if_sum.py` times both
-ways)."""
+methods)."""
 
 _CHIRPS_A_THREAD = 16
 """Least number of chirps of one task of a thread, because handing out the next takes time."""

@@ -106,7 +106,7 @@ class BodySurfaces:
         return part, distance + ahead
 
     def sees(self, antennas: Array, points: Array, own: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """As `Surfaces.sees`; a part does not hide itself here, for its normal tells that."""
+        """As `Surfaces.sees`; a part does not occlude itself: its normal tells that."""
         directions = points - antennas
         range_m = np.sqrt(np.einsum("ij,ij->i", directions, directions))
         part, distance = self.first_parts(antennas, directions / range_m[:, None])

@@ -1,9 +1,9 @@
 """Fractions of facets that an antenna sees past other parts, exact at edges of shadows.
 
-A tracer says which part hides which vertex. Where it hides some vertices of a facet and not others,
-the edge of the shadow runs through that facet, and the fraction that it leaves is taken from how
-far the rays to its vertices pass outside the occluding ellipsoids, in float64, as linear over the
-facet. So a shadow moves over the body without jumps.
+A tracer says which part occludes which vertex. Where it occludes some vertices of a facet and not
+others, the edge of the shadow runs through that facet, and the fraction that it leaves is taken
+from how far the rays to its vertices pass outside the occluding ellipsoids, in float64, as linear
+over the facet. So a shadow moves over the body without jumps.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class _Room(NamedTuple):
 
     ``balls (part, 5, 3)``: from the part's axes to those in which another one is the unit ball, and
     the antenna in these. ``clear, of (vertex,)``: how far the ray to a vertex passes outside of
-    which occluder. ``hidden (vertex,)`` and ``counts (facet,)``: hidden vertices, and how many a
+    which occluder. ``hidden (vertex,)`` and ``counts (facet,)``: occluded vertices, and how many a
     facet has.
     """
 
@@ -91,7 +91,7 @@ def _cut(occluder, antenna, part, pose, vertices, corner, room):
 
 @inlined()
 def _shade_part(occluder, antenna, part, pose, vertices, corners, room, out):
-    """Fractions of the facets of one part for one antenna; whether any of it is hidden."""
+    """Fractions of the facets of one part for one antenna; whether any of it is occluded."""
     _, _, of, hidden, counts = room
     any_hidden = 0
     for vertex in range(len(occluder)):

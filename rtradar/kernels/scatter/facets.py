@@ -50,7 +50,7 @@ class Views(NamedTuple):
     """Tasks, each of which is one part in one pose, and what the antennas see of it.
 
     ``part (task,)`` int64; ``antennas (task, antenna, 3)`` float64 in the axes of that part [m];
-    ``seen (row, facet)`` float32, the fraction of each facet that nothing hides; ``row (task,
+    ``seen (row, facet)`` float32, the fraction of each facet that is not occluded; ``row (task,
     antenna)`` int64, which of them is whose.
     """
 

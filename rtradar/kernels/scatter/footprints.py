@@ -80,7 +80,7 @@ def radiate_tubes(tubes, visible, rx, wavenumber, length, horizontal, spreading,
         chunk, receiver = task // receivers, task % receivers
         x, y, z = rx[receiver, 0], rx[receiver, 1], rx[receiver, 2]
         u = np.empty(3)
-        # Interleaved, for hidden tubes come in runs.
+        # Interleaved, for occluded tubes come in runs.
         for tube in range(chunk, count, chunks):
             if not visible[receiver, tube]:
                 continue

@@ -58,7 +58,7 @@ def draw_part_power(
     unit: FieldUnit,
     title: str,
 ) -> None:
-    """Draw the mean echo power of each body part by model, and the fraction of time it is hidden.
+    """Draw the mean echo power of each body part by model, and the occluded fraction of time.
 
     ``power`` (part,) [m^2] and ``hidden`` (part,), a fraction of time and channels, are by model.
     """
@@ -74,7 +74,7 @@ def draw_part_power(
     left.set(yticks=places, yticklabels=parts, xlabel=unit.label("mean over time"), title=title)
     left.invert_yaxis()
     left.legend()
-    right.set(xlabel="Hidden [% of time and channels]", xlim=(0, 100))
+    right.set(xlabel="Occluded [% of time and channels]", xlim=(0, 100))
     for axes in (left, right):
         axes.grid(alpha=0.3)
     canvas.save_figure(figure, path)
@@ -170,4 +170,4 @@ def _seconds(value: float | None) -> str:
 
 
 def _level(power: float, unit: FieldUnit) -> str:
-    return f"{float(unit.level(power)):.1f}" if power > 0 else "hidden"
+    return f"{float(unit.level(power)):.1f}" if power > 0 else "occluded"

@@ -40,7 +40,7 @@ _BODY = """<div class="linked">
 </div>
 <p class="note">Each ellipsoid is a body part of the echo model. Lines are paths from the middle of
 the array to the specular point of the part, and back; dots on the map are the same echoes,
-diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are hidden from
+diamonds those over walls. Shown are echoes above the floor of the map. Grey parts are occluded from
 the radar; grey points of the cloud are far from any echo. A click on the spectrogram goes to its
 time.</p>
 """

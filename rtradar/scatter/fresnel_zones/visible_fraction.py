@@ -96,8 +96,8 @@ def zone_fractions(
     Returns
     -------
     (zone, frequency, pair) complex128
-        1 in full view, 0 hidden; in between its modulus may pass 1, as it does beyond any edge, but
-        never 2.
+        1 in full view, 0 occluded; in between its modulus may pass 1, as it does beyond any edge,
+        but never 2.
 
     Raises
     ------

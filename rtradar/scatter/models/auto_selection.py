@@ -39,7 +39,7 @@ from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
 
 CANDIDATES = ("left-out", "analytic", "specular", "fresnel", "physical-optics", "reference")
-"""Candidate models of a part, cheapest first; the first is no echo, for parts that are hidden."""
+"""Candidate models of a part, cheapest first; the first is no echo, for occluded parts."""
 
 LEFT_OUT, ANALYTIC, SPECULAR, FRESNEL, PHYSICAL_OPTICS, REFERENCE = range(len(CANDIDATES))
 

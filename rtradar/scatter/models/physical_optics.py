@@ -45,8 +45,8 @@ class PhysicalOptics(BuiltInModel):
         Change of a part's echo over the array, over the same, above which it is computed at more
         places of the array.
     frequencies : int
-        Number of frequencies over the sweep. Where a part is half hidden at 12 GHz, three leave an
-        error of 3.1 % of the field and five 1.9 %
+        Number of frequencies over the sweep. Where a part is half occluded at 12 GHz, three leave
+        an error of 3.1 % of the field and five 1.9 %
         (``tests/scatter/models/test_physical_optics.py``), but the IF takes longer.
 
     Raises

@@ -14,7 +14,7 @@ from rtradar.scatter.facets.target import facet_scattering
 from rtradar.scatter.specular_point.solver import solve_specular_points
 
 _NODES = 7
-"""Frequencies over the sweep. What is left of a part whose specular point is hidden comes from
+"""Frequencies over the sweep. What is left of a part whose specular point is occluded comes from
 beside it, and its phase changes over the sweep: three frequencies would not follow it."""
 
 
