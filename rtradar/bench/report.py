@@ -224,7 +224,7 @@ def _bars(axes: Any, models: Sequence[Row], radar: str) -> None:
     axes.invert_yaxis()
     capture_s = models[0]["capture_s"]
     axes.set(ylabel="model", xlabel=f"time of a run of {capture_s:.2f} s of radar, median [s]")
-    axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9)
+    axes.set_title(f"{radar} (hatched: does not lead to the cloud)", fontsize=9, parse_math=False)
     axes.legend(fontsize=6.5, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import RendererAgg
 from matplotlib.figure import Figure
+from matplotlib.image import imread
 
 import rtradar as rt
 from rtradar.pipeline.processing import frame_angles
@@ -27,6 +28,7 @@ from rtradar.process import (
 )
 from rtradar.report import (
     draw_before_after,
+    draw_plan,
     draw_range_angle,
     draw_range_azimuth_with_walls,
     draw_range_doppler,
@@ -35,13 +37,16 @@ from rtradar.report import (
     draw_spatial_cloud,
     draw_spectrogram,
 )
+from rtradar.report.figures import maps, rooms
 from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
+from rtradar.report.pages import comparison, evaluation
 from rtradar.report.pages.comparison import (
     draw_maps,
     draw_part_power,
     draw_power_over_time,
     draw_rdt_clouds,
 )
+from rtradar.scene import Wall, material
 from rtradar.signal import synthesize
 
 pytestmark = pytest.mark.drawn
@@ -97,6 +102,54 @@ SAID = {
     "range_angle": "detected cells",
     "before_after": "mean of channels",
     "walls": "detected cells",
+}
+
+
+NAME = r"5$ \none$"
+"""A name that would be a wrong formula, and that stops a picture if it is read as one."""
+ALONE = {"a": np.ones(8), NAME: np.ones(8)}
+POINTS = np.random.default_rng(0).normal(size=(10, 3))
+WALL = Wall(
+    name=NAME,
+    corner_m=(1.0, -1.0, 0.0),
+    edge_u_m=(0.0, 2.0, 0.0),
+    edge_v_m=(0.0, 0.0, 2.0),
+    material=material("metal"),
+    thickness_m=0.1,
+)
+ROOM = rt.Scene(walls=(WALL,))
+HISTORY = [{f"{side}_{name}": 0.5 for side in ("train", "test") for name in ("loss", "accuracy")}]
+EVERY: dict[str, Callable[[], None]] = {
+    "range_time": lambda: draw_range_time(FILE, POWER.T, np.arange(8.0), RADAR, NAME),
+    "range_doppler": lambda: draw_range_doppler(FILE, POWER, MASK, RADAR, NAME),
+    "spectrogram": lambda: draw_spectrogram(
+        FILE, POWER, np.arange(16.0), np.arange(8.0), RADAR, NAME
+    ),
+    "range_angle": lambda: draw_range_angle(FILE, MAPS, RADAR, NAME),
+    "before_after": lambda: draw_before_after(
+        FILE, {"As received": (POWER, MASK)}, [(NAME, 0.3, 0.0)], RADAR, NAME
+    ),
+    "walls": lambda: draw_range_azimuth_with_walls(
+        FILE, *MAPS["azimuth"], ROOM, RADAR, [(NAME, 0.3, 0.0)], NAME
+    ),
+    "plan": lambda: draw_plan(FILE, ROOM, RADAR, np.zeros((3, 2)), {NAME: POINTS}, NAME),
+    "rdt_cloud": lambda: draw_rdt_cloud(FILE, POINTS, NAME),
+    "spatial_cloud": lambda: draw_spatial_cloud(FILE, POINTS, POINTS[:, 0], RADAR, NAME),
+    "power_over_time": lambda: draw_power_over_time(FILE, np.arange(8.0), ALONE, UNIT, NAME, NAME),
+    "part_power": lambda: draw_part_power(FILE, [NAME] * 8, ALONE, ALONE, UNIT, NAME),
+    "maps": lambda: draw_maps(
+        FILE,
+        {"a": POWER, NAME: POWER},
+        UNIT.label("one channel"),
+        ("", np.arange(8.0)),
+        ("", np.arange(16.0)),
+        NAME,
+    ),
+    "rdt_clouds": lambda: draw_rdt_clouds(FILE, {"a": POINTS, NAME: POINTS}, NAME),
+    "accuracies": lambda: evaluation.draw_accuracies(FILE, [(NAME, [0.5, 0.7])]),
+    "confusion": lambda: evaluation.draw_confusion(FILE, np.eye(2, dtype=int), ["a", NAME], NAME),
+    "transfer": lambda: evaluation.draw_transfer(FILE, ["a", NAME], np.eye(2), np.eye(2), NAME),
+    "learning": lambda: evaluation.draw_learning(FILE, [HISTORY], NAME),
 }
 
 
@@ -258,6 +311,25 @@ def test_a_legend_says_once_what_dots_and_circles_are(drawn: list[Figure], ghost
         "detected",
         "ghost over a wall, predicted",
     ]
+
+
+def test_every_function_that_draws_is_among_those_drawn_below() -> None:
+    modules = (maps, rooms, comparison, evaluation)
+    named = {name for module in modules for name in vars(module) if name.startswith("draw_")}
+    assert named - {"draw_levels"} == {
+        "draw_range_azimuth_with_walls" if name == "walls" else f"draw_{name}" for name in EVERY
+    }
+
+
+@pytest.mark.parametrize("name", EVERY)
+def test_a_name_with_dollar_signs_is_drawn_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    EVERY[name]()
+    image = imread(FILE)
+    assert min(image.shape[:2]) > 100
+    assert np.ptp(image[..., :3]) == 1  # from black to white
 
 
 def test_a_saved_figure_keeps_neither_its_axes_nor_what_it_was_drawn_on(tmp_path: Path) -> None:

@@ -29,6 +29,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
+from matplotlib.text import Text
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.radar import Radar
@@ -101,6 +102,11 @@ def save_figure(figure: Figure, file: Path | BinaryIO) -> None:
     """
     for axes in figure.axes:
         axes.title.set_wrap(True)
+    for text in figure.findobj(Text):  # names of files, radars and walls may have dollar signs
+        if text.get_wrap():  # Matplotlib measures such a text as a formula whether or not it is one
+            text.set_text(text.get_text().replace("$", r"\$"))
+        else:
+            text.set_parse_math(False)
     figure.savefig(file, format=None if isinstance(file, Path) else "png")
     figure.clear()
 
