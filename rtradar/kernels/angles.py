@@ -14,16 +14,11 @@ from rtradar.kernels.jit import compiled
 class Steering(NamedTuple):
     """Weights that bring the echo of a point into phase on all elements of a line, for every sine.
 
-    Parameters
-    ----------
-    weights : (place, element, sine) complex64
-        Conjugate phases, times the weights of the elements; a place is a range bin.
-    runs : (run, 4) int64
-        Where each element is read: element, offset, first sine, sine after the last. The offset
-        counts range bins from the first that any element is read in. The runs of one place follow
-        those of the place before.
-    starts : (place + 1,) int64
-        Index of the first run of each place.
+    ``weights (place, element, sine)`` are conjugate phases, times the weights of the elements; a
+    place is a range bin. ``runs (run, 4)`` int64 say where each element is read: element, offset,
+    first sine, sine after the last; the offset counts range bins from the first that any element
+    is read in. The runs of one place follow those of the place before, from ``starts (place + 1,)``
+    on.
     """
 
     weights: NDArray[np.complex64]

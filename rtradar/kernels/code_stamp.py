@@ -54,15 +54,8 @@ def note_options(function: _Function, options: dict[str, Any]) -> None:
 def stamp_of(function: _Function) -> str:
     """Stamp of a compiled function, of all that it calls and of all constants that these use.
 
-    Returns
-    -------
-    str
-        Hexadecimal; the same in each process in which these are the same.
-
-    Raises
-    ------
-    UnknownCodeError
-        Where the function uses a value of which this module cannot tell whether it is the same.
+    It is the same in each process in which these are. An `UnknownCodeError` is raised if it uses a
+    value of which this module cannot tell whether it is the same.
     """
     versions = np.__version__, *(str(getattr(config, name, None)) for name in _FLAGS)
     return hashlib.sha256(repr((versions, _described(function, (), {}))).encode()).hexdigest()

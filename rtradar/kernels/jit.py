@@ -29,14 +29,9 @@ def compiled(
 
     It lets other threads run, keeps its code on disk, and divides by zero as NumPy does. The code
     is loaded again as long as all that went into it is the same, functions and constants of other
-    modules included. Where it cannot be kept, a `CacheWarning` says so once.
-
-    Parameters
-    ----------
-    parallel : bool
-        Whether Numba distributes its ``prange`` among threads.
-    fastmath : bool or set of str
-        Liberties that LLVM may take with floating point: all of them, or those named.
+    modules included. Where it cannot be kept, a `CacheWarning` says so once. If ``parallel``, Numba
+    distributes its ``prange`` among threads; ``fastmath`` are the liberties that LLVM may take with
+    floating point: all of them, or those named.
     """
     numba_decorator: Callable[[_Function], Any] = njit(
         nogil=True, error_model="numpy", parallel=parallel, fastmath=fastmath
@@ -204,10 +199,8 @@ def check_cache() -> None:
 def try_cache() -> tuple[str, str]:
     """Compile a function, keep its code and load it again.
 
-    Returns
-    -------
-    finding, advice : str
-        Where code is kept, or why it is not; and what to do about it, empty where all is well.
+    Returned are where code is kept, or why it is not; and what to do about it, empty where all is
+    well.
     """
     dispatcher: Any = compiled()(_increment)
     if not hasattr(dispatcher, "compile"):

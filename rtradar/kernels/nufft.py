@@ -63,14 +63,10 @@ class _Gaussian(NamedTuple):
 
 
 def sum_by_nufft(tones: Tones, out: NDArray[np.complex64]) -> None:
-    """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it.
+    """Fill ``out (chirp, rx, sample)`` with the sum of the echoes, to 1e-6 of it [m].
 
-    Parameters
-    ----------
-    tones : Tones
-        At most `MOST_NODES` nodes; powers of the sample number count from the first sample.
-    out : (chirp, rx, sample) complex64
-        IF samples [m], overwritten; each chirp has `LEAST_SAMPLES` or more.
+    The tones have at most `MOST_NODES` nodes, and powers of the sample number that count from the
+    first sample; each chirp has `LEAST_SAMPLES` or more.
     """
     chirps, receivers, samples = out.shape
     cells, half = fft.next_fast_len(2 * samples), samples // 2

@@ -36,14 +36,10 @@ _TOGETHER = 3
 class PrimeFactorDft(NamedTuple):
     """Tables of a DFT over as many cycles as there are in ``cycle_at``.
 
-    Parameters
-    ----------
-    cycle_at, bin_at : (place,) int64
-        Cycle at each place of the grid (first, second) of the factors, and Doppler bin afterwards.
-    cosines, sines : pair of (frequency, term) float32
-        Tables of each factor for the frequencies and terms from 1 to below half of it, filled up
-        with zeros to multiples of `_TOGETHER`.
-    factors : pair of int
+    ``cycle_at`` and ``bin_at (place,)`` are the cycle at each place of the grid (first, second) of
+    the two ``factors``, and the Doppler bin afterwards. ``cosines`` and ``sines (frequency, term)``
+    are tables of each factor for the frequencies and terms from 1 to below half of it, filled up
+    with zeros to multiples of `_TOGETHER`.
     """
 
     cycle_at: NDArray[np.int64]
@@ -93,18 +89,9 @@ def add_doppler_power(
 ) -> None:
     """Add the squared magnitudes of weighted DFTs over the cycles of some channels.
 
-    Parameters
-    ----------
-    spectra : (cycle, channel, range) complex64
-        Contiguous.
-    channels : range
-        Channels to transform, in steps of one.
-    weights : (cycle,) float32
-        Window weights of the cycles.
-    dft : PrimeFactorDft
-        Tables for as many cycles.
-    power : (doppler, range) float32
-        Added to, in the order of the DFT.
+    To ``power (doppler, range)``, in the order of the DFT, is added what ``spectra (cycle, channel,
+    range)``, contiguous, have in ``channels``, in steps of one, with ``weights (cycle,)``; all are
+    of single precision.
     """
     # Numba compiles anew for an array that may be written to: this one is always read-only.
     spectra = spectra.view()

@@ -36,16 +36,10 @@ lane: the next term is 0.024^8 / 8! = 3e-18."""
 class Tones(NamedTuple):
     """Echoes of a block of chirps, and the sweep that makes tones of them.
 
-    Parameters
-    ----------
-    length : (chirp, rx, echo) float64
-        Path lengths [m]. Echoes whose beat frequency lies outside [0, sample rate) add nothing.
-    amplitude : (node, chirp, rx, echo) complex
-        Amplitudes at some frequencies [m].
-    powers : (power, node) float64
-        Weights of these in the polynomial in the sample number over the number of samples.
-    start_frequency, slope, sample_rate : float
-        Start and slope of the sweep [Hz], [Hz/s], and rate of its samples [Hz].
+    ``length (chirp, rx, echo)`` are path lengths [m]; echoes whose beat frequency lies outside [0,
+    sample rate) add nothing. ``amplitude (node, chirp, rx, echo)`` is that at some frequencies [m],
+    ``powers (power, node)`` the weights of these in the polynomial in the sample number over the
+    number of samples. The sweep has a start frequency [Hz], a slope [Hz/s] and a sample rate [Hz].
     """
 
     length: NDArray[np.float64]
@@ -59,14 +53,9 @@ class Tones(NamedTuple):
 class ToneTables(NamedTuple):
     """Tables in the precision of the sum.
 
-    Parameters
-    ----------
-    first : (step, real or imaginary * lane)
-        Phasors of lane + 1/2 samples, for steps from 0 to 1 turn per sample.
-    middles : (lane,)
-        Lane + 1/2.
-    sines, cosines : (term,)
-        Coefficients of the odd and the even powers of the angle.
+    ``first (step, real or imaginary * lane)`` are phasors of lane + 1/2 samples, for steps from 0
+    to 1 turn per sample, ``middles (lane,)`` lane + 1/2, ``sines`` and ``cosines (term,)`` the
+    coefficients of the odd and the even powers of the angle.
     """
 
     first: NDArray[np.floating]

@@ -126,19 +126,9 @@ def _check_for_room(fidelity: str, radar: Radar, scene: Scene) -> None:
 
 
 def models_that(ability: str, names: Iterable[str] = MODELS.built_in) -> list[str]:
-    """List the models with an ability, such as ``supports_rooms``.
+    """List the names of models with an ability, an attribute of `BuiltInModel` that holds.
 
-    Parameters
-    ----------
-    ability : str
-        Attribute of the models' classes, as in `BuiltInModel`.
-    names : iterable of str
-        Models among which to look; the built-in ones, cheapest first, if left out.
-
-    Returns
-    -------
-    list of str
-        Their names in the same order, without models of packages that cannot be loaded.
+    Among the given names, in their order; models of packages that cannot be loaded are left out.
     """
     found = []
     for name in names:

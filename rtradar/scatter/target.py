@@ -43,24 +43,10 @@ def sum_of_echoes(
 
 
 def target_mesh(target: object, tx: NDArray[np.float64], rx: NDArray[np.float64]) -> Triangles:
-    """Triangles of a target that is no `Ellipsoids`.
+    """Triangles of a target that is a mesh, with antennas (n, 3) in its coordinates [m].
 
-    Parameters
-    ----------
-    target : trimesh.Trimesh
-        Mesh [m].
-    tx, rx : (n, 3) float64
-        Antennas, in its coordinates [m].
-
-    Returns
-    -------
-    Triangles
-
-    Raises
-    ------
-    InputError
-        Where the target is no mesh or cannot be used, or an antenna is inside of it or on its
-        surface.
+    An `InputError` is raised if the target is no mesh or cannot be used, or an antenna is inside of
+    it or on its surface.
     """
     import trimesh  # slow to import
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from rtradar.body import Body, Ellipsoids
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M, MINIMUM_KA, SPEED_OF_LIGHT_MPS
@@ -169,17 +170,13 @@ def refuse_too_near(radar: Radar, body: Body, times: Array) -> None:
 def _distance(place: Array, semi_axes: Array) -> float:
     """Distance of a place in an ellipsoid's axes from its surface; 0 inside.
 
-    The nearest point is a^2 x / (a^2 + t) with the root t of sum (a x / (a^2 + t))^2 = 1, found by
-    bisection.
+    The nearest point is a^2 x / (a^2 + t) with the root t of sum (a x / (a^2 + t))^2 = 1.
     """
-    squares = semi_axes**2
-    if ((place / semi_axes) ** 2).sum() <= 1:
+
+    def beyond(t: float) -> float:
+        return float(((semi_axes * place / (semi_axes**2 + t)) ** 2).sum()) - 1
+
+    if beyond(0.0) <= 0:
         return 0.0
-    low, high = 0.0, float(np.linalg.norm(semi_axes * place))
-    for _ in range(80):
-        middle = (low + high) / 2
-        if ((semi_axes * place / (squares + middle)) ** 2).sum() > 1:
-            low = middle
-        else:
-            high = middle
-    return float(np.linalg.norm(place - squares * place / (squares + high)))
+    t = brentq(beyond, 0.0, float(np.linalg.norm(semi_axes * place)))
+    return float(np.linalg.norm(t * place / (semi_axes**2 + t)))

@@ -25,13 +25,7 @@ _LINES_A_THREAD = 1 << 14
 
 
 class UnitSphere:
-    """The unit sphere in a Mitsuba scene of its own, made for the first rays.
-
-    Parameters
-    ----------
-    mi : module or callable
-        Mitsuba with its variant set, or what loads it.
-    """
+    """The unit sphere in a Mitsuba scene of its own, made for the first rays."""
 
     def __init__(self, mi: ModuleType | Callable[[], ModuleType]) -> None:
         self._mi: Any = mi
@@ -46,14 +40,9 @@ class UnitSphere:
 
 
 class BodyTracer:
-    """A body of ellipsoids, posed again and again.
+    """A body of ellipsoids with ``semi_axes (part, 3)`` [m], posed again and again.
 
-    Parameters
-    ----------
-    mi : module or callable
-        Mitsuba with its variant set, or what loads it for the first ray.
-    semi_axes : (part, 3) float64
-        Semi-axes of the parts [m].
+    Mitsuba, ``mi``, has its variant set; or it is what loads it for the first ray.
     """
 
     def __init__(
@@ -92,22 +81,11 @@ class BodyTracer:
         pose: NDArray[np.int64],
         poses: Poses,
     ) -> NDArray[np.bool_]:
-        """Whether no part is in the way of lines of sight past the body in several poses.
+        """Whether no part is in the way of lines of sight (line,) past the body in several poses.
 
-        Parameters
-        ----------
-        origins, targets : (line, 3) float64
-            Ends of the lines, world [m].
-        group : (line,) int64
-            Lines of one group have their targets on one part, in one pose.
-        own, pose : (group,) int64
-            That part, which cannot occlude them, -1 for none; and the pose.
-        poses : Poses
-            Poses of the body.
-
-        Returns
-        -------
-        (line,) bool
+        Lines go from ``origins`` to ``targets (line, 3)``, world [m]. Those of a ``group (line,)``
+        have their targets on the part ``own (group,)``, which cannot occlude them, -1 for none, in
+        the pose ``pose (group,)`` among ``poses``.
         """
         floats = (origins, targets, poses.centres, poses.frames, self._semi_axes)
         starts, ends, *body = (np.ascontiguousarray(a, dtype=np.float64) for a in floats)
@@ -135,25 +113,13 @@ class BodyTracer:
         vertices: NDArray[np.float64],
         margin: float,
     ) -> NDArray[np.int16]:
-        """Part that occludes each vertex, as each antenna sees it.
+        """Part that occludes each vertex, as each antenna sees it, (antenna, n, vertex) int16.
 
-        Parameters
-        ----------
-        centres, frames : (part, 3), (part, 3, 3) float64
-            Pose of the body, world [m].
-        antennas : (antenna, 3) float64
-            Places of the antennas, world [m].
-        parts : (n,) int64
-            Parts whose vertices are asked about; all parts may occlude them.
-        vertices : (part, 3, vertex) float64
-            Vertices of every part of the body, on its ellipsoid, in its own axes [m].
-        margin : float
-            Vertices that face away by more than this sine are not asked about.
-
-        Returns
-        -------
-        (antenna, n, vertex) int16
-            Another part that is nearer to the antenna on the same line; else -1.
+        It is another part that is nearer to the antenna on the same line, else -1. ``centres`` and
+        ``frames`` are the pose of the body, ``antennas (antenna, 3)`` places, world [m]. Asked
+        about are the vertices of ``parts (n,)``, but not those that face away by more than the sine
+        ``margin``; ``vertices (part, 3, vertex)`` are those of every part, on its ellipsoid, in its
+        own axes [m].
         """
         found = np.full((len(antennas), len(parts), vertices.shape[2]), -1, dtype=np.int16)
         floats = (antennas, centres, frames, self._semi_axes)

@@ -61,15 +61,7 @@ class Surfaces(Protocol):
 
 
 class BodySurfaces:
-    """Ellipsoids, posed; a surface is a part.
-
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    semi_axes : (part, 3) float64
-        [m].
-    """
+    """Ellipsoids with ``semi_axes (part, 3)`` [m], posed; a surface is a part."""
 
     flat = False
 
@@ -121,10 +113,8 @@ class BodySurfaces:
 
     def distance(self, surface: NDArray[np.int64], origins: Array, directions: Array) -> Array:
         """As `Surfaces.distance`: where the line enters the ellipsoid."""
-        o, d = (
-            self._stretched(surface, origins - self._centres[surface]),
-            self._stretched(surface, directions),
-        )
+        o = self._stretched(surface, origins - self._centres[surface])
+        d = self._stretched(surface, directions)
         square, half, rest = (d * d).sum(-1), (o * d).sum(-1), (o * o).sum(-1) - 1
         root = half**2 - square * rest
         return np.where(root > 0, (-half - np.sqrt(np.maximum(root, 0.0))) / square, np.nan)
@@ -143,15 +133,9 @@ class BodySurfaces:
 class MeshSurfaces:
     """A triangle mesh; a surface is a face, and reflects on both sides.
 
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    vertices, faces : (vertex, 3) float64, (face, 3) int
-        Vertices, world [m], and the numbers of the three of each face.
-    same : float
-        A hit nearer to a point than this fraction of the mesh's size is the point; float32 knows
-        distances to a millionth.
+    ``vertices (vertex, 3)`` are in the world [m], ``faces (face, 3)`` the numbers of the three of
+    each. A hit nearer to a point than the fraction ``same`` of the mesh's size is the point;
+    float32 knows distances to a millionth.
     """
 
     flat = True

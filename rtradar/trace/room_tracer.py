@@ -22,15 +22,7 @@ points: a thousand times the error of float32 some 10 m from the middle."""
 
 
 class RoomTracer:
-    """The furniture of a scene, in a Mitsuba scene of its own.
-
-    Parameters
-    ----------
-    mi : module
-        Mitsuba with its variant set.
-    scene : Scene
-        Its walls are left out.
-    """
+    """The furniture of a scene, in a scene of its own for Mitsuba, ``mi`` with its variant set."""
 
     def __init__(self, mi: Any, scene: Scene) -> None:
         self._mi = mi
@@ -48,18 +40,10 @@ class RoomTracer:
             self._scene = mi.load_dict({"type": "scene", "furniture": mesh})
 
     def blocked(self, origins: ArrayLike, targets: ArrayLike) -> NDArray[np.bool_]:
-        """Whether furniture is between two points.
+        """Whether furniture is between two points, ``origins`` and ``targets (..., 3)``, world [m].
 
-        Parameters
-        ----------
-        origins, targets : (..., 3) float64
-            Ends of the legs, world [m]; they broadcast. Both are drawn in by `CLEAR_M`, so either
-            may be on a surface.
-
-        Returns
-        -------
-        (...) bool
-            False without furniture, and where two points are at most twice `CLEAR_M` apart.
+        Both are drawn in by `CLEAR_M`, so either may be on a surface. The answer is False without
+        furniture, and where two points are at most twice `CLEAR_M` apart.
         """
         origins, targets = np.broadcast_arrays(
             np.asarray(origins, dtype=np.float64), np.asarray(targets, dtype=np.float64)

@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from rtradar.kernels.motion import (
-    pose,
-    pose_ellipsoids,
-    pose_ellipsoids_reference,
-    pose_reference,
-)
+from rtradar.kernels.motion import pose, pose_ellipsoids, pose_ellipsoids_reference, pose_reference
 
 
 def test_pose_is_that_of_the_reference() -> None:

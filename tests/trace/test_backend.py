@@ -34,11 +34,7 @@ Machine = Callable[..., None]
 def machine(monkeypatch: pytest.MonkeyPatch) -> Machine:
     """Let the machine have these libraries, and a GPU or none, without probing or Dr.Jit."""
 
-    def set_up(
-        *libraries: Library,
-        gpu: bool = False,
-        loaded: str | None = None,
-    ) -> None:
+    def set_up(*libraries: Library, gpu: bool = False, loaded: str | None = None) -> None:
         def probe_backend(
             variant: str, library: Library | None, *, fresh: bool = False
         ) -> ProbeResult:

@@ -180,27 +180,13 @@ def _correct(rx, point, plane, out, least, room):
 def nearby_echoes(images, tx_index, ellipsoids, near, length, amplitude):
     """Lengths and returns of echoes, by one or two steps from near their specular points.
 
-    Parameters
-    ----------
-    images : Images
-        Images of the antennas, and the legs and part of each echo.
-    tx_index : (chirp,) int64
-        Transmitter of each chirp.
-    ellipsoids : Ellipsoids
-        Parts of the body.
-    near : Nearby
-        Expected specular points. Echoes that are not wanted get the path over the part's centre and
-        no return.
-    length, amplitude : (chirp, rx, echo) float64
-        Filled: path lengths [m], and the returns of a perfect conductor over R1 R2 without regard
-        to polarisation [m].
-
-    Returns
-    -------
-    int
-        Number of echoes, over all chirps, that had to be searched for as by `solve`: where the
-        steps do not settle on the side that both antennas see, or lengths may be off by 1 um. That
-        is near forward scattering, where a small step of an antenna moves the specular point far.
+    Filled are ``length`` and ``amplitude (chirp, rx, echo)``: path lengths, and the returns of a
+    perfect conductor over R1 R2 without regard to polarisation [m]. ``tx_index (chirp,)`` is the
+    transmitter of each chirp. Echoes that are not wanted get the path over the part's centre and no
+    return. Returned is the number of echoes, over all chirps, that had to be searched for as by
+    `solve`: where the steps do not settle on the side that both antennas see, or lengths may be off
+    by 1 um. That is near forward scattering, where a small step of an antenna moves the specular
+    point far.
     """
     # Unpacked here, as in `solve`.
     images_tx, images_rx, images_middle, out_leg, back_leg, part_of = images

@@ -53,43 +53,18 @@ class ClutterItem:
 class Clutter:
     """Static clutter of a scene.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar at its position in the scene, where `Scene.place` puts it.
-    scene : Scene
-        Walls and furniture.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    seed : int
-        Seed of the positions and phases of diffuse returns.
-    order : int
-        Largest number of walls on a specular path, 0 to 3.
+    The radar is at its position in the scene, where `Scene.place` puts it; ``variant`` is Mitsuba's
+    backend, ``seed`` that of the positions and phases of diffuse returns, ``order`` the largest
+    number of walls on a specular path, 0 to 3. ``objects`` are the echoes that are kept, the
+    strongest object first; ``kept`` and ``dropped`` the same in figures, and what is too far for
+    the radar or was taken out by `prune`.
 
-    Attributes
-    ----------
-    objects : tuple of RoomEchoes
-        Echoes that are kept, the strongest object first.
-    kept, dropped : tuple of ClutterItem
-        The same in figures, and what is too far for the radar or was taken out by `prune`.
-
-    Raises
-    ------
-    InputError
-        If an option is out of range, a mesh cannot be used, or walls change a return faster over
-        the sweep than a polynomial follows to a thousandth of the strongest.
-    BackendError
-        If no backend of that kind works here.
+    An `InputError` is raised if an option is out of range, a mesh cannot be used, or walls change a
+    return faster over the sweep than a polynomial follows to a thousandth of the strongest.
     """
 
     def __init__(
-        self,
-        radar: Radar,
-        scene: Scene,
-        *,
-        variant: str = "auto",
-        seed: int = 0,
-        order: int = 2,
+        self, radar: Radar, scene: Scene, *, variant: str = "auto", seed: int = 0, order: int = 2
     ) -> None:
         if isinstance(order, bool) or not (isinstance(order, int) and 0 <= order <= MOST_ORDER):
             raise InputError(
@@ -117,20 +92,11 @@ class Clutter:
         return sum(echoes.n_echoes for echoes in self.objects)
 
     def prune(self, noise_power_m2: float, margin_db: float = MARGIN_DB) -> Clutter:
-        """Return the clutter without objects that stay below the noise in every cell.
+        """Return a copy without objects that stay below the noise in every cell.
 
-        Parameters
-        ----------
-        noise_power_m2 : float
-            Complex noise power per sample [m^2]; 0 keeps all.
-        margin_db : float
-            Margin below the noise up to which an object stays, for its strongest range bin after
-            the gain of all samples of a frame and of all channels [dB].
-
-        Returns
-        -------
-        Clutter
-            A copy, which lists what it lacks in ``dropped``, with the reason.
+        It lists what it lacks in ``dropped``, with the reason. The noise is the complex power per
+        sample [m^2]; 0 keeps all. An object stays up to the margin [dB] below it, for its strongest
+        range bin after the gain of all samples of a frame and of all channels.
         """
         gain = self.radar.samples_per_chirp * self.radar.cycles_per_frame * self.radar.n_channels
         kept, dropped = [], []

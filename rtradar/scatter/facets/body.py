@@ -36,14 +36,7 @@ class Seen(NamedTuple):
 class FacetShadows:
     """Fractions of the facets of a posed body that antennas see.
 
-    Parameters
-    ----------
-    tracer : BodyTracer
-        Tracer of the same body.
-    facets : Facets
-        Facets of ellipsoids with these semi-axes.
-    semi_axes : (part, 3) float64
-        Semi-axes of the parts [m].
+    The tracer is that of a body of ellipsoids with ``semi_axes (part, 3)`` [m], the facets theirs.
     """
 
     def __init__(self, tracer: BodyTracer, facets: Facets, semi_axes: Array) -> None:

@@ -58,21 +58,13 @@ class Course(NamedTuple):
 
 
 class Envelope:
-    """An envelope over a capture.
+    """An envelope over a capture, of so many parts.
 
-    Parameters
-    ----------
-    sample : callable
-        ``sample(place, parts, whole)``: the `Sample` of these parts (n,) at a place in time,
-        counted in keyframes from the start; ``whole`` is `whole_echo` near by, or None where all
-        parts are asked for. Several threads call it at once.
-    parts : int
-        Number of parts.
-    tolerance : float
-        Second difference of a part's echo over the root of the whole body's power that halves an
-        interval.
-    end : int
-        Keyframe from which on nothing moves.
+    ``sample(place, parts, whole)`` returns the `Sample` of parts (n,) at a place in time, counted
+    in keyframes from the start; ``whole`` is `whole_echo` near by, or None where all parts are
+    asked for. Several threads call it at once. ``tolerance`` is the second difference of a part's
+    echo over the root of the whole body's power that halves an interval, ``end`` the keyframe from
+    which on nothing moves.
     """
 
     def __init__(

@@ -27,13 +27,7 @@ _PARALLEL_TERMS = 4_000_000
 
 
 def subdivisions_for(facets: int) -> int:
-    """Subdivisions of the icosphere with at least that many triangles.
-
-    Raises
-    ------
-    InputError
-        Where ``facets`` is not a whole number from 20 to `MAXIMUM_FACETS`.
-    """
+    """Subdivisions of the icosphere with at least that many triangles, 20 to `MAXIMUM_FACETS`."""
     whole = isinstance(facets, int | np.integer) and not isinstance(facets, bool)
     if not whole or not 20 <= facets <= MAXIMUM_FACETS:
         raise InputError(
@@ -100,21 +94,9 @@ def _normals(
 
 
 def facet_integral(facets: Facets, views: Views, waves: Waves) -> NDArray[np.complex128]:
-    """Scattering length F of posed parts, the phase of a carrier taken out.
+    """Scattering length F of posed parts, the phase of a carrier taken out, (task, pair, node) [m].
 
-    Parameters
-    ----------
-    facets : Facets
-        Facets of the parts, in the axes of their parts.
-    views : Views
-        Parts, one a task, and what the antennas see of them. Facing away need not be marked.
-    waves : Waves
-        Pairs of antennas, and the waves between them.
-
-    Returns
-    -------
-    (task, pair, node) complex128
-        F [m], for exp(+j omega t); 0 where nothing is lit.
+    It is for exp(+j omega t), and 0 where nothing is lit. `Views` need not mark what faces away.
     """
     # What may not be written to is another type to Numba, for which it would compile all again.
     views = Views(

@@ -51,21 +51,9 @@ _BEND = 0.02
 class ZoneFractions:
     """Visible fractions of the returns of a moving body over a capture.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar that sees the body.
-    body : Body
-        Body whose parts occlude each other.
-    frequency : (frequency,) float64
-        Frequencies at which fractions are computed [Hz].
-    tracer : BodyTracer
-        Tracer of the same body.
-    wanted : callable, optional
-        ``wanted(time)``: which parts (part,) bool are computed at a keyframe [s]; the others are 1.
-        All parts if left out.
-    shadow_rays : int
-        Points on each part to which rays are traced from each node of the array.
+    They are for frequencies (frequency,) [Hz]. ``wanted(time)`` says which parts (part,) bool are
+    computed at a keyframe [s]; the others are 1. ``shadow_rays`` is the number of points on each
+    part to which rays are traced from each node of the array.
     """
 
     def __init__(
@@ -92,18 +80,9 @@ class ZoneFractions:
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
     ) -> NDArray[np.complex128]:
-        """Fractions V at these chirps, numbered from the start of the capture.
+        """Fractions V (frequency, chirp, rx, part) at chirps, of some parts or all of them.
 
-        Parameters
-        ----------
-        chirps : (chirp,) int64
-            Chirps to evaluate.
-        parts : (part,) int64, optional
-            Parts to evaluate; all if left out.
-
-        Returns
-        -------
-        (frequency, chirp, rx, part) complex128
+        Chirps are numbered from the start of the capture.
         """
         chirps = np.asarray(chirps, dtype=np.int64)
         if parts is None:

@@ -77,32 +77,12 @@ def zone_fractions(
 ) -> NDArray[np.complex128]:
     """Fraction V that is left of the return of each zone's part, for exp(+j omega t).
 
-    Parameters
-    ----------
-    tracer : BodyTracer
-        Tracer of the body.
-    zones : Zones
-        Zones, those of one pose after the other.
-    poses : Poses
-        Poses of the whole body.
-    pairs : (pair, 2) int64
-        Tx and Rx among the antennas.
-    wavenumber : (zone, frequency) float64
-        Wavenumbers at which V is wanted [rad/m].
-    shadow_rays : int
-        Points on each part to which rays are traced from each antenna, about so many: a whole
-        number on each meridian.
-
-    Returns
-    -------
-    (zone, frequency, pair) complex128
-        1 in full view, 0 occluded; in between its modulus may pass 1, as it does beyond any edge,
-        but never 2.
-
-    Raises
-    ------
-    InputError
-        Where ``shadow_rays`` is out of range.
+    The result is (zone, frequency, pair): 1 in full view, 0 occluded; in between its modulus may
+    pass 1, as it does beyond any edge, but never 2. Zones come pose after pose of the tracer's
+    body; ``pairs (pair, 2)`` are Tx and Rx among their antennas, ``wavenumber (zone, frequency)``
+    those at which V is wanted [rad/m]. To about ``shadow_rays`` points on each part rays are traced
+    from each antenna: a whole number on each meridian. An `InputError` is raised if it is out of
+    range.
     """
     bounds = bounds_of(shadow_rays)
     out = np.ones((len(zones.part), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
@@ -125,12 +105,8 @@ def bounds_of(shadow_rays: int) -> Bounds:
 
     Near the specular point each is one cell, and farther out as wide as a fixed fraction of the
     distance from it, because what an edge does near that point counts most
-    (`validation/other_methods/fresnel.py`, power beside the Doppler line).
-
-    Raises
-    ------
-    InputError
-        Where ``shadow_rays`` is out of range.
+    (`validation/other_methods/fresnel.py`, power beside the Doppler line). An `InputError` is
+    raised if ``shadow_rays`` is out of range.
     """
     whole = isinstance(shadow_rays, int | np.integer) and not isinstance(shadow_rays, bool)
     if not (whole and LEAST_SHADOW_RAYS <= shadow_rays <= MOST_SHADOW_RAYS):
@@ -192,9 +168,7 @@ def _edges(tracer: BodyTracer, zones: Zones, poses: Poses, maps: ZoneMaps, bound
     along = np.arange(len(z)) < lengths[0]
     first = corners[z, m, j]
     last = np.where(
-        along[:, None],
-        corners[z, m, np.minimum(j + 1, bands)],
-        corners[z, (m + 1) % MERIDIANS, j],
+        along[:, None], corners[z, m, np.minimum(j + 1, bands)], corners[z, (m + 1) % MERIDIANS, j]
     )
     # From the open end to the blocked one.
     swap = blocked[z, a, m, j][:, None]

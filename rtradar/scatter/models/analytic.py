@@ -24,25 +24,11 @@ def far_field_echo(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Echo of each ellipsoid by its far-field cross-section along the bisector of both antennas.
 
-    The bisector is that of the directions of Tx and Rx from the centre.
+    The bisector is that of the directions of Tx and Rx from the centre. Returned are the lengths
+    (chirp, rx, part) of the path over the surface point whose normal is that bisector [m], and the
+    square roots of the cross-sections (chirp, rx, part), over R1 R2 with ``spreading`` [m]; 0 where
+    Tx and Rx are exactly opposite.
 
-    Parameters
-    ----------
-    at : Geometry
-        Antennas and ellipsoids, chirp by chirp.
-    spreading : bool
-        Whether the amplitude is divided by R1 R2, normalised to 1 m.
-
-    Returns
-    -------
-    length : (chirp, rx, part) float64
-        Tx..Rx path over the surface point whose normal is that bisector [m].
-    amplitude : (chirp, rx, part) float64
-        Square root of the cross-section, over R1 R2 with ``spreading`` [m]; 0 where Tx and Rx are
-        exactly opposite.
-
-    Notes
-    -----
     Equations :eq:`specular-point-far` and :eq:`rcs-ellipsoid` of the theory page.
     """
     at = Geometry.of(at)
@@ -114,18 +100,9 @@ class FormulaModel(BuiltInModel, ABC):
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
 
-        Parameters
-        ----------
-        at : Geometry
-            Antennas and ellipsoids, chirp by chirp. In rooms the antennas may be images of those of
-            the radar over walls, and the ellipsoids only some of the body's.
-
-        Returns
-        -------
-        length : (chirp, rx, part) float64
-            Length of the path from Tx to Rx [m].
-        amplitude : (chirp, rx, part) float64
-            Scattering length, over R1 R2 with ``spreading`` [m].
+        In rooms the antennas may be images of those of the radar over walls, and the ellipsoids
+        only some of the body's. Returned are the lengths of the paths from Tx to Rx, and scattering
+        lengths, over R1 R2 with ``spreading``, both (chirp, rx, part) float64 [m].
         """
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:

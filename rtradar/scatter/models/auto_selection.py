@@ -155,26 +155,13 @@ fraction e leaves its power off by up to 1.3 e in the worst frame of a hundred
 def select_candidates(
     budget: ErrorBudget, power_fraction: float, complex_fraction: float | None
 ) -> NDArray[np.int64]:
-    """Select a candidate for each part at each instant.
+    """Select a candidate, a number into `CANDIDATES`, for each part at each instant (time, part).
 
     All parts begin with the cheapest; as long as the whole misses the tolerance, the one change
     that mends the most for its cost is made. What a part needs at an instant it is given at the
-    ones before and after, too.
-
-    Parameters
-    ----------
-    budget : ErrorBudget
-        Errors of the candidates.
-    power_fraction : float
-        Largest error of the power of all parts together, over that power.
-    complex_fraction : float, optional
-        Largest rms complex error of all parts together over the root of their power; None: not
-        asked for.
-
-    Returns
-    -------
-    (time, part) int64
-        Numbers into `CANDIDATES`.
+    ones before and after, too. Tolerances are the largest error of the power of all parts together,
+    over that power; and their largest rms complex error over the root of it, None if it does not
+    matter.
     """
     chosen = np.where(budget.hidden, LEFT_OUT, ANALYTIC)
     whole = budget.true.sum(axis=1)

@@ -48,36 +48,10 @@ def fresnel_scattering(
     variant: str = "auto",
     shadow_rays: int = SHADOW_RAYS,
 ) -> NDArray[np.complex128]:
-    """Co-polar scattering length of ellipsoids that occlude each other, pair by pair.
+    """Co-polar scattering length (n,) of ellipsoids that occlude each other, pair by pair.
 
-    Parameters
-    ----------
-    target : Ellipsoids
-        Ellipsoids in coordinates of their own [m].
-    tx, rx : (n, 3) float64
-        Antennas outside the target, in its coordinates [m].
-    frequency : (n,) float64
-        Frequency of each pair [Hz].
-    polarization : {"v", "h"}
-        v is world z projected across the line of sight, h is across both.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    shadow_rays : int
-        Number of points on each part to which rays are traced, see `Fresnel`.
-
-    Returns
-    -------
-    (n,) complex128
-        [m], times |tx| |rx|, its phase relative to the path over the origin, for exp(+j omega t).
-
-    Raises
-    ------
-    InputError
-        Where ``shadow_rays`` is out of range.
-
-    Notes
-    -----
-    Equation :eq:`fresnel` of the theory page.
+    Parameters, returns and errors are those of `scattering_length`; ``shadow_rays`` is that of
+    `Fresnel`. Equation :eq:`fresnel` of the theory page.
     """
     pairs, parts = len(tx), len(target.semi_axes)
     at = target_geometry(target, tx, rx)
@@ -102,10 +76,6 @@ class Fresnel(BuiltInModel):
 
     Parameters
     ----------
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     shadow_rays : int
         Points on each part to which rays are traced from each node of the array, 8 to 4096.
 

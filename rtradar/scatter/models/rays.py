@@ -47,12 +47,6 @@ class Rays(BuiltInModel):
 
     Parameters
     ----------
-    radar : Radar
-    body : Body
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    spreading : bool
-        Whether amplitudes hold 1 / (R1 R2).
     rays_per_wavelength : float
         The edge of a tube's facet is the wavelength at the sweep centre over this.
     bounces : int
@@ -66,8 +60,6 @@ class Rays(BuiltInModel):
     ------
     InputError
         Where an option is out of range, or would take too many tubes.
-    BackendError
-        Where no backend of that kind works here.
     """
 
     accepts_meshes = True
@@ -123,8 +115,7 @@ class Rays(BuiltInModel):
 
     def _shot(self, chirp: int, tx: int) -> _Shot:
         """What every Rx receives of one Tx in the pose of that chirp."""
-        key = (chirp, tx)
-        return self._shots.get(key, partial(self._shoot, chirp, tx))
+        return self._shots.get((chirp, tx), partial(self._shoot, chirp, tx))
 
     def _shoot(self, chirp: int, tx: int) -> _Shot:
         radar, axes = self._radar, self._body.semi_axes
@@ -132,15 +123,12 @@ class Rays(BuiltInModel):
             at = chirp_poses(radar, self._body, np.array([chirp]))
             self._posed = chirp, PosedGrid(self._grid, at.centres[0], at.frames[0], axes)
             self._surfaces.pose(at.centres[0], at.frames[0])
-        grid = self._posed[1]
+        grid, stop_hz = self._posed[1], radar.start_frequency_hz + radar.bandwidth_hz
         shooter = Shooter(
             surfaces=self._surfaces,
             grid=grid,
             bounces=self._bounces,
-            wavenumber=2
-            * np.pi
-            * (radar.start_frequency_hz + radar.bandwidth_hz)
-            / SPEED_OF_LIGHT_MPS,
+            wavenumber=2 * np.pi * stop_hz / SPEED_OF_LIGHT_MPS,
             polarization=radar.polarization,
             spreading=self._spreading,
         )

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.body.body import Poses
-from rtradar.kernels.scatter.rooms import PathFactors
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.scatter.common.interpolation import ArrayEnds
 from rtradar.scatter.common.polarization import (
@@ -59,10 +58,6 @@ class PathKeyframes(NamedTuple):
     factor: NDArray[np.complex64]
     seen: NDArray[np.bool_]
     start: NDArray[np.float32]
-
-    def factors(self) -> PathFactors:
-        """Return what the kernel interpolates."""
-        return PathFactors(self.factor, self.seen)
 
 
 class Surroundings(NamedTuple):

@@ -19,7 +19,7 @@ from rtradar.body.body import Poses
 from rtradar.echoes import Echoes
 from rtradar.errors import InputError
 from rtradar.kernels.scatter.nearby_points import Nearby
-from rtradar.kernels.scatter.rooms import Blend, path_amplitudes
+from rtradar.kernels.scatter.rooms import Blend, PathFactors, path_amplitudes
 from rtradar.kernels.scatter.specular_point import Geometry
 from rtradar.radar import Radar
 from rtradar.scatter.common.interpolation import ArrayEnds
@@ -98,29 +98,13 @@ class HasSpecularPoints(RoomReady, Protocol):
 
 
 class RoomModel:
-    """An echo model in a room.
+    """An echo model in a room, around that of the ``person`` alone.
 
-    Parameters
-    ----------
-    model : HasFormula or HasSpecularPoints
-        Echo model of the person alone, `person`.
-    scene : Scene
-        Walls and furniture.
-    radar : Radar
-        Radar of the model, at its position in the scene.
-    body : Body
-        Body of the model.
-    order : int
-        Largest number of reflections at walls on both legs together, 0 to 3; 0 leaves the direct
-        echoes, through walls and behind furniture.
-
-    Attributes
-    ----------
-    paths : tuple of WallPath
-        All paths, the direct one first.
-    not_followed : dict of str to float
-        Walls whose frequency response is not known to `FIELD_ERROR`, and the fraction of the echo
-        power that meets each; known after `prune`.
+    Radar and body are those of the model, at their positions in the scene. ``order`` is the largest
+    number of reflections at walls on both legs together, 0 to 3; 0 leaves the direct echoes,
+    through walls and behind furniture. ``paths`` are all paths, the direct one first;
+    ``not_followed``, known after `prune`, are the walls whose frequency response is not known to
+    `FIELD_ERROR`, with the fraction of the echo power that meets each.
     """
 
     def __init__(
@@ -197,7 +181,7 @@ class RoomModel:
             own = columns.path[ghosts], columns.part[ghosts]
             found.append(self._legs.echoes(*own, at, near.take(ghosts), formula))
         length, bare = (np.concatenate(arrays, axis=2) for arrays in zip(*found, strict=True))
-        factors = [before.factors(), after.factors()]
+        factors = [PathFactors(end.factor, end.seen) for end in (before, after)]
         if columns.delayed:
             echo = np.array(columns.echo)
             length = columns.lengths(at, near.places(), length)

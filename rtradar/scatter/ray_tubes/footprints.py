@@ -40,21 +40,12 @@ _TASKS = 32
 class Footprints:
     """Triangles where tubes end, and the field that arrives there.
 
-    Parameters
-    ----------
-    places : (tube, 4, 3) float64
-        Ends of the three corner rays and the middle ray, world [m]; on a curved surface the middle
-        is off the triangle.
-    path : (tube, 4) float64
-        From the Tx to there over all bounces before [m].
-    directions : (tube, 4, 3) float64
-        Unit vectors along which the four rays arrive.
-    normals : (tube, 4, 3) float64
-        Unit normals of the surface there, on the side that is lit.
-    field : (tube, 3) float64
-        The field at the middle without its phase, for a Tx that makes 1 at 1 m [1/m].
-    surface : (tube,) int64
-        Part or face.
+    ``places (tube, 4, 3)`` are the ends of the three corner rays and the middle ray, world [m]; on
+    a curved surface the middle is off the triangle. ``path (tube, 4)`` is that from the Tx to there
+    over all bounces before [m], ``directions (tube, 4, 3)`` the unit vectors along which the rays
+    arrive, ``normals (tube, 4, 3)`` those of the surface there, on the side that is lit. ``field
+    (tube, 3)`` is the field at the middle without its phase, for a Tx that makes 1 at 1 m [1/m],
+    ``surface (tube,)`` the part or face.
     """
 
     places: Array
@@ -108,31 +99,13 @@ def radiate(
     spreading: bool = True,
     tapered: bool = False,
 ) -> NDArray[np.complex128]:
-    """Sum of what footprints send to receivers.
+    """Sum of what footprints send to receivers, (node, rx, group) complex128.
 
-    Parameters
-    ----------
-    footprints : Footprints
-    visible : (rx, tube) bool
-        Whether the last leg is free.
-    rx : (rx, 3) float64
-        [m].
-    wavenumber : (node,) float64
-        [1/m].
-    length : (rx, group) float64
-        Path whose phase is taken out [m]. Footprints are summed by their surface, or all
-        together if there is one group.
-    polarization : {"v", "h"}
-        Polarization of the receiving antennas.
-    spreading : bool
-        Whether the last leg's 1 / R2 is in.
-    tapered : bool
-        Whether the integral fades toward the horizons.
-
-    Returns
-    -------
-    (node, rx, group) complex128
-        Scattering length for exp(+j omega t), over R2 with ``spreading`` [m].
+    It is a scattering length for exp(+j omega t), over R2 with ``spreading`` [m]. ``visible (rx,
+    tube)`` says whether the last leg to a receiver ``rx (rx, 3)`` [m] is free; ``wavenumber
+    (node,)`` [1/m]; ``length (rx, group)`` is the path whose phase is taken out [m]. Footprints are
+    summed by their surface, or all together if there is one group. ``polarization`` is that of the
+    receivers; ``tapered``, the integral fades toward the horizons.
     """
     chunks = math.ceil(_TASKS / len(rx))
     parts = np.zeros((chunks, len(wavenumber), *length.shape), dtype=np.complex128)

@@ -17,14 +17,14 @@ Ling, Chou, Lee, IEEE Trans. Antennas Propag. 37 (1989) 194: Shooting and bounci
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.scatter.common.polarization import antenna_field
 from rtradar.scatter.ray_tubes.footprints import Footprints
-from rtradar.scatter.ray_tubes.tubes import Tubes
+from rtradar.scatter.ray_tubes.tubes import Grid
 from rtradar.trace.bounces import Surfaces
 
 MOST_SPLITS = 3
@@ -40,39 +40,14 @@ _GRAZING = 0.02
 Array = NDArray[np.float64]
 
 
-class Grid(Protocol):
-    """Facets, fixed in the material, that can be split."""
-
-    @property
-    def tubes(self) -> Tubes:
-        """The facets in the world."""
-        ...
-
-    def split(self, which: NDArray[np.int64]) -> Grid:
-        """Those facets, each in four."""
-        ...
-
-
 @dataclass(frozen=True, kw_only=True)
 class Shooter:
     """A target, and how rays are shot at it.
 
-    Parameters
-    ----------
-    surfaces : Surfaces
-        What rays meet.
-    grid : Grid
-        At what they are aimed.
-    bounces : int
-        The most reflections.
-    wavenumber : float
-        The largest that the footprints have to serve [1/m].
-    polarization : {"v", "h"}
-        Polarization of the transmitting antenna.
-    spreading : bool
-        Whether the first leg's 1 / R1 is in the field.
-    two_sided : bool
-        Whether facets are lit from behind as well.
+    Rays are aimed at a ``grid`` and meet ``surfaces``, with up to so many ``bounces``;
+    ``wavenumber`` is the largest that the footprints have to serve [1/m], ``polarization`` that of
+    the transmitting antenna. With ``spreading`` the first leg's 1 / R1 is in the field;
+    ``two_sided`` facets are lit from behind as well.
     """
 
     surfaces: Surfaces

@@ -11,8 +11,8 @@ from rtradar.body import Ellipsoids
 from rtradar.conventions import SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.scatter.ray_tubes.footprints import radiate
-from rtradar.scatter.ray_tubes.shooting import Grid, Shooter, exits
-from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, MeshGrid, PosedGrid
+from rtradar.scatter.ray_tubes.shooting import Shooter, exits
+from rtradar.scatter.ray_tubes.tubes import EllipsoidGrid, Grid, MeshGrid, PosedGrid
 from rtradar.scatter.target import target_mesh
 from rtradar.scene.mesh_files import Triangles
 from rtradar.trace.backends.backend import select, use
@@ -38,37 +38,11 @@ def rays_scattering(
     rays_per_wavelength: float = RAYS_PER_WAVELENGTH,
     bounces: int = BOUNCES_OF_TARGET,
 ) -> NDArray[np.complex128]:
-    """Co-polar scattering length of a perfectly conducting target by shooting and bouncing rays.
+    """Co-polar scattering length (n,) of a perfect conductor by shooting and bouncing rays.
 
-    Parameters
-    ----------
-    target : Ellipsoids or trimesh.Trimesh
-        A mesh that is not closed is a thin sheet, and reflects on both sides.
-    tx, rx : (n, 3) float64
-        Antennas, pair by pair [m].
-    frequency : (n,) float64
-        [Hz].
-    polarization : {"v", "h"}
-        v is world z projected across the line of sight, h is across both.
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        Mitsuba's backend.
-    rays_per_wavelength : float
-        The edge of a tube's facet is the shortest wavelength over this.
-    bounces : int
-        The most reflections on the way.
-
-    Returns
-    -------
-    (n,) complex128
-        [m], for exp(+j omega t): the scattered field times |tx - origin| |rx - origin|, its phase
-        relative to the path over the origin of the coordinates.
-
-    Raises
-    ------
-    InputError
-        Where an option is out of range, or would take too many tubes, or a mesh cannot be used.
-    BackendError
-        Where no backend of that kind works here.
+    Parameters, returns and errors are those of `scattering_length`; the edge of a tube's facet is
+    the shortest wavelength over ``rays_per_wavelength``, ``bounces`` the most reflections on the
+    way. An `InputError` is raised, too, where these would take too many tubes.
     """
     check_options(rays_per_wavelength, bounces)
     solid = target if isinstance(target, Ellipsoids) else target_mesh(target, tx, rx)
@@ -112,13 +86,7 @@ def _scene(mi: Any, solid: Ellipsoids | Triangles, edge: float) -> tuple[Surface
 
 
 def check_options(rays_per_wavelength: float, bounces: int) -> None:
-    """Refuse options that mean nothing.
-
-    Raises
-    ------
-    InputError
-        Where one is out of range.
-    """
+    """Raise an `InputError` where an option is out of range."""
     if not 0.1 <= rays_per_wavelength <= 100:
         raise InputError(
             f"rays: rays_per_wavelength = {rays_per_wavelength}; allowed are 0.1 to 100"

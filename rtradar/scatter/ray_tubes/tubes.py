@@ -25,13 +25,8 @@ Array = NDArray[np.float64]
 class Tubes:
     """Facets at which rays are aimed.
 
-    Parameters
-    ----------
-    places, normals : (tube, 4, 3) float64
-        Three corners and the centroid of each facet [m], and the unit normals of the smooth surface
-        there.
-    surface : (tube,) int64
-        Part or face that the facet belongs to.
+    ``places`` and ``normals (tube, 4, 3)`` are three corners and the centroid of each facet [m],
+    and the unit normals of the smooth surface there; ``surface (tube,)`` is the part or face.
     """
 
     places: Array
@@ -46,11 +41,8 @@ class Tubes:
 class EllipsoidGrid:
     """Facets of the parts of a body, in the axes in which each part is a unit sphere.
 
-    Parameters
-    ----------
-    corners : (tube, 3, 3) float64
-        On a sphere a little larger than 1, so that the mean of |x|^2 over the facets is 1.
-    part : (tube,) int64
+    ``corners (tube, 3, 3)`` are on a sphere a little larger than 1, so that the mean of |x|^2 over
+    the facets is 1; ``part (tube,)`` is the part of each.
     """
 
     corners: Array
@@ -61,12 +53,8 @@ class EllipsoidGrid:
         """As many facets on each part as equilateral triangles of that edge [m] would cover it.
 
         They are stretched with the part and long where it bends little. That costs no accuracy,
-        because the phase over each is integrated exactly as far as it is linear.
-
-        Raises
-        ------
-        InputError
-            Where they would be more than `MOST_TUBES`.
+        because the phase over each is integrated exactly as far as it is linear. An `InputError` is
+        raised if they would be more than `MOST_TUBES`.
         """
         divisions = np.maximum(2, np.ceil(np.sqrt(_areas(semi_axes) / (5 * np.sqrt(3) * edge**2))))
         _refuse_many(20 * divisions**2)
@@ -88,14 +76,7 @@ class EllipsoidGrid:
 
 @dataclass(frozen=True)
 class PosedGrid:
-    """Facets of a body in one pose.
-
-    Parameters
-    ----------
-    grid : EllipsoidGrid
-    centres, frames, semi_axes : (part, 3), (part, 3, 3), (part, 3) float64
-        [m].
-    """
+    """Facets of a body in one pose: ``centres``, ``frames``, ``semi_axes`` of its parts [m]."""
 
     grid: EllipsoidGrid
     centres: Array
@@ -123,14 +104,7 @@ class PosedGrid:
 
 @dataclass(frozen=True)
 class MeshGrid:
-    """Facets of the faces of a mesh.
-
-    Parameters
-    ----------
-    corners : (tube, 3, 3) float64
-        [m].
-    face : (tube,) int64
-    """
+    """Facets of the faces of a mesh: ``corners (tube, 3, 3)`` [m], and the face of each."""
 
     corners: Array
     face: NDArray[np.int64]
@@ -139,10 +113,7 @@ class MeshGrid:
     def cover(cls, vertices: Array, faces: NDArray[np.integer], edge: float) -> MeshGrid:
         """Cut every face evenly until no facet has a side longer than ``edge`` [m].
 
-        Raises
-        ------
-        InputError
-            Where they would be more than `MOST_TUBES`.
+        An `InputError` is raised if they would be more than `MOST_TUBES`.
         """
         triangles = np.asarray(vertices, dtype=np.float64)[faces]
         longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=-1).max(axis=1)
@@ -167,6 +138,10 @@ class MeshGrid:
     def split(self, which: NDArray[np.int64]) -> MeshGrid:
         """Those facets, each in four."""
         return MeshGrid(in_four(self.corners[which]), np.repeat(self.face[which], 4))
+
+
+Grid = PosedGrid | MeshGrid
+"""Facets, fixed in the material, that can be split."""
 
 
 def _with_middle(corners: Array) -> Array:

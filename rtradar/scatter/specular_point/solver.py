@@ -32,30 +32,12 @@ def solve_specular_points(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Path length, amplitude and specular point of every ellipsoid, as if each stood alone.
 
-    Parameters
-    ----------
-    at : Geometry or ChirpPoses
-        Antennas and ellipsoids, chirp by chirp.
-    start : (chirp, part, 3) float64, optional
-        Where the search begins, in the ellipsoid's axes [m]; NaN where nothing is known.
-    polarization : {"v", "h"}
-        Polarisation of both antennas, v along world z.
-    spreading : bool
-        Whether the amplitude is divided by R1 R2, normalised to 1 m.
-    points : bool
-        Whether specular points are wanted; they are many.
+    The search begins at ``start (chirp, part, 3)``, in the ellipsoid's axes [m], NaN where nothing
+    is known. Both antennas have the same polarisation, v along world z. Returned are the lengths
+    |T - p| + |R - p| (chirp, rx, part) [m]; the co-polar scattering lengths (chirp, rx, part), over
+    R1 R2 with ``spreading`` [m]; and, if ``points`` are wanted, for they are many, the specular
+    points (chirp, rx, part, 3), world [m].
 
-    Returns
-    -------
-    length : (chirp, rx, part) float64
-        |T - p| + |R - p| [m].
-    amplitude : (chirp, rx, part) float64
-        Co-polar scattering length, over R1 R2 with ``spreading`` [m].
-    point : (chirp, rx, part, 3) float64
-        World [m]; empty unless ``points``.
-
-    Notes
-    -----
     Equations :eq:`specular-point`, :eq:`mirror-matrix` and :eq:`mirror-return` of the theory page,
     times :eq:`polarization`.
     """
@@ -78,14 +60,7 @@ def solve_specular_points(
 class StartPoints:
     """Starting points of a moving body, from which three steps lead to a specular point.
 
-    They are the specular points of one pair of antennas at keyframes 10 ms apart.
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar whose first antennas form the pair.
-    body : Body
-        Body in motion.
+    They are the specular points of the radar's first two antennas at keyframes 10 ms apart.
     """
 
     def __init__(self, radar: Radar, body: Body) -> None:
@@ -98,19 +73,9 @@ class StartPoints:
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
     ) -> NDArray[np.float64]:
-        """Specular points at the keyframes before some chirps, in the axes of the parts.
+        """Specular points (chirp, part, 3) at the keyframes before some chirps, in the parts' axes.
 
-        Parameters
-        ----------
-        chirps : (chirp,) int64
-            Chirps, numbered from the start of the capture.
-        parts : (part,) int64, optional
-            Wanted parts; all if left out.
-
-        Returns
-        -------
-        (chirp, part, 3) float64
-            Positions [m].
+        They are those of some parts (part,), or of all [m].
         """
         numbers, place = np.unique(
             np.asarray(chirps, dtype=np.int64) // self._step, return_inverse=True

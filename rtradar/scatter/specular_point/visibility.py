@@ -69,17 +69,7 @@ def unobstructed(
 
 
 class SpecularVisibility:
-    """Visibility of the specular points of a moving body over a capture.
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar in the scene.
-    body : Body
-        Body in motion.
-    tracer : BodyTracer
-        Tracer of the same body.
-    """
+    """Visibility of the specular points of a moving body, the tracer's, over a capture."""
 
     def __init__(self, radar: Radar, body: Body, tracer: BodyTracer) -> None:
         self._radar, self._body, self._tracer = radar, body, tracer
@@ -111,21 +101,11 @@ class SpecularVisibility:
     def at(
         self, chirps: NDArray[np.int64], parts: NDArray[np.int64] | None = None
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Visibility and starting points at these chirps.
+        """Visibility and starting points at chirps, of some parts or all of them.
 
-        Parameters
-        ----------
-        chirps : (chirp,) int64
-            Chirps, numbered from the start of the capture.
-        parts : (part,) int64, optional
-            Wanted parts; all if left out.
-
-        Returns
-        -------
-        weight : (chirp, rx, part) float64
-            1 visible, 0 occluded, in between on the ramp between two keyframes that differ.
-        start : (chirp, part, 3) float64
-            Specular point of one pair at the keyframe before, in the part's axes [m].
+        Returned are weights (chirp, rx, part), 1 visible, 0 occluded, in between on the ramp
+        between two keyframes that differ; and the specular points (chirp, part, 3) of one pair at
+        the keyframe before, in the parts' axes [m].
         """
         chirps = np.asarray(chirps, dtype=np.int64)
         if parts is None:

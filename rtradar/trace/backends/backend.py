@@ -37,19 +37,10 @@ class BackendWarning(UserWarning):
 class Backend:
     """A Mitsuba variant that works on this machine.
 
-    Parameters
-    ----------
-    kind : {"llvm", "scalar", "cuda"}
-        Name that users give it.
-    variant : str
-        Name that Mitsuba gives it.
-    llvm_path : str or None
-        The libLLVM for Dr.Jit, whatever the kind: it is loaded once and must work if the kind is
-        changed later.
-    llvm_version : str or None
-        Version of that library.
-    warning : str or None
-        Why it is slower than it could be, and what to install; one line.
+    ``kind`` is the name that users give it, ``variant`` Mitsuba's. ``llvm_path`` is the libLLVM for
+    Dr.Jit, whatever the kind: it is loaded once and must work if the kind is changed later;
+    ``llvm_version`` is that of this library. ``warning`` says in one line why the variant is slower
+    than it could be, and what to install.
     """
 
     kind: Kind
@@ -62,24 +53,10 @@ class Backend:
 def select(variant: str = "auto") -> Backend:
     """The backend to use.
 
-    Parameters
-    ----------
-    variant : {"auto", "cpu", "llvm", "scalar", "cuda"}
-        ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does.
-        A GPU traces rays only where ``cuda`` is named.
-
-    Raises
-    ------
-    InputError
-        Where there is no such variant.
-    BackendError
-        Where the variant was asked for by name and does not work, or Mitsuba is missing; the
-        message says what to install.
-
-    Warns
-    -----
-    BackendWarning
-        Where ``auto`` or ``cpu`` has to take scalar.
+    ``auto`` and ``cpu`` take llvm with the first libLLVM that works, or scalar where none does,
+    with a `BackendWarning`. A GPU traces rays only where ``cuda`` is named. An `InputError` is
+    raised if there is no such variant; a `BackendError` that says what to install where the variant
+    was asked for by name and does not work, or Mitsuba is missing.
     """
     if variant not in ("auto", "cpu", *VARIANTS):
         raise InputError(
@@ -116,13 +93,8 @@ def use(backend: Backend) -> ModuleType:
 
     Objects made under one variant belong to it: drop them before the next is set. Dr.Jit has one
     thread until many rays come (`rtradar.trace.backends.jit_threads`); where it was imported
-    before, it keeps the threads it has.
-
-    Raises
-    ------
-    BackendError
-        Where Dr.Jit was imported with another libLLVM since the backend was selected, or the
-        variant cannot be set.
+    before, it keeps the threads it has. A `BackendError` is raised if Dr.Jit was imported with
+    another libLLVM since the backend was selected, or the variant cannot be set.
     """
     loaded = loaded_llvm_version()
     first = "drjit" not in sys.modules

@@ -39,15 +39,10 @@ _SYSTEM_PATTERNS = {
 
 @dataclass(frozen=True)
 class Library:
-    """A libLLVM that may or may not work.
+    """A libLLVM that may or may not work, and who brought it.
 
-    Parameters
-    ----------
-    path : str
-        Path for the dynamic loader; it exists unless the environment variable names one that does
-        not.
-    origin : {"environment", "wheel", "system"}
-        Who brought it.
+    The path, for the dynamic loader, exists unless the environment variable names one that does
+    not.
     """
 
     path: str

@@ -33,14 +33,9 @@ _STOPPED = {
 
 @dataclass(frozen=True)
 class ProbeResult:
-    """What a probe found.
+    """What a probe found: ``good``, or in a few words what went wrong.
 
-    Parameters
-    ----------
-    finding : str
-        ``good``, or in a few words what went wrong.
-    version : str or None
-        Version of the libLLVM in use; None without one, or where it does not say.
+    ``version`` is that of the libLLVM in use; None without one, or where it does not say.
     """
 
     finding: str
@@ -53,20 +48,11 @@ class ProbeResult:
 
 
 def probe_backend(variant: str, library: Library | None, *, fresh: bool = False) -> ProbeResult:
-    """Whether ``variant`` works, with that libLLVM loaded.
+    """Whether a variant, by Mitsuba's name, works with that libLLVM; None leaves Dr.Jit the choice.
 
-    The answer of an earlier process is taken from the disk if the library, Dr.Jit, Mitsuba and the
-    probe are the same. Answers on GPUs, which come and go without a trace in a file, and probes
-    that took too long are not kept.
-
-    Parameters
-    ----------
-    variant : str
-        Mitsuba's name of it.
-    library : Library or None
-        The libLLVM for Dr.Jit; None leaves the choice to Dr.Jit.
-    fresh : bool
-        Probe even where the answer is on the disk.
+    The answer of an earlier process is taken from the disk, unless it is to be ``fresh``, if the
+    library, Dr.Jit, Mitsuba and the probe are the same. Answers on GPUs, which come and go without
+    a trace in a file, and probes that took too long are not kept.
     """
     key = None if variant.startswith("cuda") else _key(variant, library)
     kept = {} if key is None else _read_cache()
