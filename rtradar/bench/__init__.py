@@ -92,11 +92,7 @@ def measure(plan: Plan) -> dict[str, Any]:
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
     found: dict[str, Any] = {
         "settings": asdict(plan) | {"motion": MOTION},
-        "machine": {
-            "system": platform.platform(),
-            "cores": os.cpu_count(),
-            "versions": versions,
-        },
+        "machine": {"system": platform.platform(), "cores": os.cpu_count(), "versions": versions},
         "rates": {},
         "models": [],
         "paper": {"trouble": "", "radars": {}},

@@ -81,15 +81,7 @@ def test_all_that_is_measured_is_in_the_json(
         main([*words, "--json", str(tmp_path / "b.json"), "--figure", str(tmp_path / "b.png")]) == 0
     )
     found = json.loads((tmp_path / "b.json").read_text())
-    assert list(found) == [
-        "settings",
-        "machine",
-        "rates",
-        "models",
-        "paper",
-        "growth",
-        "kernels",
-    ]
+    assert list(found) == ["settings", "machine", "rates", "models", "paper", "growth", "kernels"]
     assert found["settings"]["repeats"] == 2
     assert list(found["rates"]) == ["paper-12ghz", "paper-77ghz"]
     rows = found["models"]
@@ -107,14 +99,7 @@ def test_all_that_is_measured_is_in_the_json(
     assert specular["stages"]["elsewhere"]["median"] == 0.5
     assert specular["stages"]["signal"]["floor"] == pytest.approx(2 * 21 * CHIRPS * 8 * 256 / 1e10)
     assert specular["stages"]["pictures"] == {"best": 1.0, "median": 1.0, "floor": None, "rule": ""}
-    assert [row["first_use"] is None for row in rows] == [
-        False,
-        False,
-        False,
-        True,
-        True,
-        True,
-    ]
+    assert [row["first_use"] is None for row in rows] == [False, False, False, True, True, True]
     assert found["growth"]["chirps"][0] == {
         "radar": "paper-77ghz",
         "of_radar": "paper-12ghz",
@@ -148,9 +133,7 @@ def test_models_take_turns_after_their_first_use(
 
 
 def test_growth_with_length(
-    machine: list[Case],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
+    machine: list[Case], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = [
         "bench",

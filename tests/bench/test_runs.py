@@ -4,14 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from rtradar.bench.runs import (
-    ELSEWHERE,
-    Spread,
-    by_stage,
-    paired_ratio,
-    to_cloud_s,
-    with_elsewhere,
-)
+from rtradar.bench.runs import ELSEWHERE, Spread, by_stage, paired_ratio, to_cloud_s, with_elsewhere
 
 
 def test_best_and_median() -> None:

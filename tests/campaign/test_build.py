@@ -270,8 +270,7 @@ def test_samples_that_cannot_be_made_are_told_in_one_line(
         TINY + "[drawn]\noffset_x_m = [-4.0, -4.0]\noffset_y_m = [1.0, 1.0]"
     )
     with pytest.raises(
-        InputError,
-        match=r"2 of 2 samples cannot be made, the other 0 are there; .*synthetic:walk",
+        InputError, match=r"2 of 2 samples cannot be made, the other 0 are there; .*synthetic:walk"
     ):
         build_dataset(tmp_path / "set.toml", tmp_path / "out")
 
