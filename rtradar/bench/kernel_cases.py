@@ -6,52 +6,45 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.bench.kernels import Call, filled, kernel_case
+from rtradar.bench.kernels import Calls, filled, kernel_case
+from rtradar.kernels.tone_sum import Tones, tone_sum_reference
 
 # -- general ---------------------------------------------------------------------------------------
 
 
 @kernel_case("elementary.fill_phasors", "unit phasors of 100 000 phases", 1e-15)
-def _phasors() -> tuple[Call, Call]:
-    from rtradar.kernels.elementary import fill_phasors, phasor_reference
-
+def _phasors(k: Any) -> Calls:
     turns = np.random.default_rng(0).uniform(-1e3, 1e3, 100_000)
     out = np.empty(len(turns), dtype=np.complex128)
-    return filled(fill_phasors, turns, out=(out,)), lambda: phasor_reference(turns)
+    return filled(k.fill_phasors, turns, out=(out,)), lambda: k.phasor_reference(turns)
 
 
 @kernel_case("motion.pose", "joints of a skeleton of 23, at 3000 times")
-def _pose() -> tuple[Call, Call]:
-    from rtradar.kernels.motion import pose, pose_reference
-
+def _pose(k: Any) -> Calls:
     rng, joints, knots = np.random.default_rng(0), 23, np.linspace(0.0, 3.0, 91)
     root, rotation = rng.normal(size=(4, 90, 3)), rng.normal(size=(4, 90, 4 * joints))
     offsets, parents = rng.normal(size=(joints, 3)), np.maximum(np.arange(-1, joints - 1) // 2, -1)
     times, which = rng.uniform(0, 3, 3000), np.arange(3000)
     skeleton = knots, root, rotation, offsets, parents
     out = np.empty((3000, joints, 3)), np.empty((3000, 4 * joints))
-    call = filled(pose, times, which, *skeleton, out=out)
-    return call, lambda: pose_reference(times, *skeleton)
+    call = filled(k.pose, times, which, *skeleton, out=out)
+    return call, lambda: k.pose_reference(times, *skeleton)
 
 
 @kernel_case("motion.pose_ellipsoids", "centres and axes of 21 ellipsoids, at 3000 times")
-def _pose_ellipsoids() -> tuple[Call, Call]:
-    from rtradar.kernels.motion import pose_ellipsoids, pose_ellipsoids_reference
-
+def _pose_ellipsoids(k: Any) -> Calls:
     rng, parents = np.random.default_rng(0), np.maximum(np.arange(-1, 21) // 2, -1)
     positions, quaternions = rng.normal(size=(3000, 22, 3)), rng.normal(size=(3000, 22, 4))
     quaternions /= np.linalg.norm(quaternions, axis=2, keepdims=True)
     given = positions, quaternions, parents, rng.normal(size=(21, 3, 3))
     out = np.empty((3000, 21, 3)), np.empty((3000, 21, 3, 3))
-    return filled(pose_ellipsoids, *given, out=out), lambda: pose_ellipsoids_reference(*given)
+    return filled(k.pose_ellipsoids, *given, out=out), lambda: k.pose_ellipsoids_reference(*given)
 
 
 # -- signal ----------------------------------------------------------------------------------------
 
 
 def _tones(nodes: int, echoes: int, chirps: int) -> Any:
-    from rtradar.kernels.tone_sum import Tones
-
     rng, shape = np.random.default_rng(0), (chirps, 8, echoes)
     length = np.broadcast_to(rng.uniform(0, 15, shape[1:]), shape).copy()
     amplitude = rng.standard_normal((nodes, *shape)) + 1j * rng.standard_normal((nodes, *shape))
@@ -62,33 +55,26 @@ def _tones(nodes: int, echoes: int, chirps: int) -> Any:
 
 
 @kernel_case("tone_sum.add_tones", "IF of 48 chirps, 8 receivers, 21 echoes, 256 samples", 1e-6)
-def _tone_sum() -> tuple[Call, Call]:
-    from rtradar.kernels.tone_sum import MIDDLE, add_tones, tone_sum_reference, tone_tables
-
+def _tone_sum(k: Any) -> Calls:
     tones, out = _tones(1, 21, 48), np.empty((48, 8, 256), dtype=np.complex64)
-    call = filled(add_tones, 0, 48, tones, tone_tables(np.float32), out=(out,))
-    return call, lambda: tone_sum_reference(tones, 256, MIDDLE)
+    call = filled(k.add_tones, 0, 48, tones, k.tone_tables(np.float32), out=(out,))
+    return call, lambda: k.tone_sum_reference(tones, 256, k.MIDDLE)
 
 
 @kernel_case("nufft.sum_by_nufft", "IF of 12 chirps, 8 receivers, 315 echoes, 256 samples", 1e-6)
-def _nufft() -> tuple[Call, Call]:
-    from rtradar.kernels.nufft import sum_by_nufft
-    from rtradar.kernels.tone_sum import tone_sum_reference
-
+def _nufft(k: Any) -> Calls:
     tones, out = _tones(3, 315, 12), np.empty((12, 8, 256), dtype=np.complex64)
-    call = filled(sum_by_nufft, tones, out=(out,))
+    call = filled(k.sum_by_nufft, tones, out=(out,))
     return call, lambda: tone_sum_reference(tones, 256, 0.0)
 
 
 @kernel_case("gaussian_noise.add_noise", "noise of 192 chirps, 8 receivers, 256 samples", 2e-6)
-def _noise() -> tuple[Call, Call]:
-    from rtradar.kernels.gaussian_noise import add_noise, noise_reference
-
+def _noise(k: Any) -> Calls:
     streams = np.array([np.random.SFC64(n).state["state"]["state"] for n in range(16)])
     out = np.empty((192, 8, 256), dtype=np.complex64)
     given = streams, 12, np.float32(0.5)
-    call = filled(add_noise, *given, out=(out,), adds=True)
-    return call, lambda: noise_reference(*given, out.shape)
+    call = filled(k.add_noise, *given, out=(out,), adds=True)
+    return call, lambda: k.noise_reference(*given, out.shape)
 
 
 # -- processing ------------------------------------------------------------------------------------
@@ -100,18 +86,12 @@ def _spectra(*shape: int) -> Any:
 
 
 @kernel_case("prime_factor_dft.add_doppler_power", "133 cycles, 8 channels, 256 bins", 3e-6)
-def _doppler_power() -> tuple[Call, Call]:
-    from rtradar.kernels.prime_factor_dft import (
-        add_doppler_power,
-        doppler_power_reference,
-        prime_factor_dft,
-    )
-
+def _doppler_power(k: Any) -> Calls:
     spectra, weights = _spectra(133, 8, 256), np.linspace(0, 1, 133, dtype=np.float32)
     out = np.empty((133, 256), dtype=np.float32)
-    given = spectra, range(8), weights, prime_factor_dft(133)
-    call = filled(add_doppler_power, *given, out=(out,), adds=True)
-    return call, lambda: doppler_power_reference(spectra, range(8), weights)
+    given = spectra, range(8), weights, k.prime_factor_dft(133)
+    call = filled(k.add_doppler_power, *given, out=(out,), adds=True)
+    return call, lambda: k.doppler_power_reference(spectra, range(8), weights)
 
 
 def _map() -> Any:
@@ -128,28 +108,22 @@ def _overlap(i: Any, half: int) -> Any:
 
 
 @kernel_case("cfar.os_cfar_rows", "order-statistic CFAR of a map of 256 x 133", 0)
-def _os_cfar() -> tuple[Call, Call]:
-    from rtradar.kernels.cfar import os_cfar_reference, os_cfar_rows
-
+def _os_cfar(k: Any) -> Calls:
     power, thresholds, ranks, counts = _map()
     mask = np.empty(power.shape, dtype=np.bool_)
-    call = filled(os_cfar_rows, 0, 256, power, thresholds, ranks, counts, 2, 6, out=(mask,))
-    return call, lambda: os_cfar_reference(power, thresholds, ranks, 2, 6)
+    call = filled(k.os_cfar_rows, 0, 256, power, thresholds, ranks, counts, 2, 6, out=(mask,))
+    return call, lambda: k.os_cfar_reference(power, thresholds, ranks, 2, 6)
 
 
 @kernel_case("cfar.ca_cfar_rows", "cell-averaging CFAR of a map of 256 x 133", 0)
-def _ca_cfar() -> tuple[Call, Call]:
-    from rtradar.kernels.cfar import ca_cfar_reference, ca_cfar_rows
-
+def _ca_cfar(k: Any) -> Calls:
     power, _, _, counts = _map()
     given, mask = (power, power * (counts / np.float32(4)), 2, 6), np.empty((256, 133), np.bool_)
-    return filled(ca_cfar_rows, 0, 256, *given, out=(mask,)), lambda: ca_cfar_reference(*given)
+    return filled(k.ca_cfar_rows, 0, 256, *given, out=(mask,)), lambda: k.ca_cfar_reference(*given)
 
 
 @kernel_case("angles.beam_power", "beams of 64 cells on a line of 48, 200 sines", 1e-5)
-def _beam_power() -> tuple[Call, Call]:
-    from rtradar.kernels.angles import Steering, beam_power, beam_power_reference
-
+def _beam_power(k: Any) -> Calls:
     values, still, place = _spectra(64, 3, 96), _spectra(64, 96), np.arange(64) % 8
     runs = [
         (element, (element + half) % 3, 100 * half, 100 * half + 100)
@@ -157,30 +131,26 @@ def _beam_power() -> tuple[Call, Call]:
         for element in range(48)
         for half in range(2)
     ]
-    steering = Steering(_spectra(8, 48, 200), np.array(runs), 96 * np.arange(9))
+    steering = k.Steering(_spectra(8, 48, 200), np.array(runs), 96 * np.arange(9))
     given, out = (values, still, place, np.arange(0, 96, 2), steering), np.empty((64, 200), "f4")
-    return filled(beam_power, 0, 64, *given, out=(out,)), lambda: beam_power_reference(*given)
+    return filled(k.beam_power, 0, 64, *given, out=(out,)), lambda: k.beam_power_reference(*given)
 
 
 @kernel_case("angles.highest_maxima", "3 peaks of each of 1000 spectra of 200 sines", 0)
-def _maxima() -> tuple[Call, Call]:
-    from rtradar.kernels.angles import highest_maxima, highest_maxima_reference
-
+def _maxima(k: Any) -> Calls:
     power = np.random.default_rng(0).exponential(size=(1000, 200)).astype(np.float32) ** 4
     limits, out = (
         (np.float32(0.25), np.float32(12)),
         (np.empty((1000, 3), int), np.empty(1000, int)),
     )
-    call = filled(highest_maxima, power, *limits, out=out)
-    return call, lambda: highest_maxima_reference(power, *limits, 3)
+    call = filled(k.highest_maxima, power, *limits, out=out)
+    return call, lambda: k.highest_maxima_reference(power, *limits, 3)
 
 
 @kernel_case("angles.add_interpolated", "1000 spectra of 200 sines onto 200 angles", 1e-6)
-def _interpolated() -> tuple[Call, Call]:
-    from rtradar.kernels.angles import add_interpolated, add_interpolated_reference
-
+def _interpolated(k: Any) -> Calls:
     rng, first, step = np.random.default_rng(0), -0.9, 1.8 / 199
     power, sines = rng.exponential(size=(1000, 200)).astype("f4"), rng.uniform(-1, 1, (1000, 200))
     given, out = (power, sines.clip(-0.9, 0.9), first, step, rng.integers(0, 256, 1000)), (256, 200)
-    call = filled(add_interpolated, *given, out=(np.empty(out),), adds=True)
-    return call, lambda: add_interpolated_reference(*given, out)
+    call = filled(k.add_interpolated, *given, out=(np.empty(out),), adds=True)
+    return call, lambda: k.add_interpolated_reference(*given, out)

@@ -1,16 +1,17 @@
 """``rtradar bench --only kernels``: what each compiled kernel buys beside its plain reference.
 
-A case is a function that makes arguments, as `rtradar.bench.kernel_cases` and
-`rtradar.bench.scatter_cases` have them. It returns two functions without arguments, which call the
-kernel and its reference and give the same arrays. ``tests/kernels/test_references.py`` holds each
-kernel to its reference within the tolerance.
+A case, as `rtradar.bench.kernel_cases` and `rtradar.bench.scatter_cases` have them, is a function
+of the module ``k`` of the kernel. It makes arguments, and returns two functions without arguments,
+which call the kernel and its reference and give the same arrays. Each kernel is held to its
+reference within the tolerance by ``tests/kernels/test_references.py``.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from importlib import import_module
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,29 +20,23 @@ from rtradar.bench.floors import best_s
 Call = Callable[[], Any]
 """Returns an array, or a tuple of arrays."""
 
+Calls = tuple[Call, Call]
+"""Of a kernel and of its reference."""
+
 _LEAST_S = 0.2  # of repeats of each function
 
 
-@dataclass(frozen=True)
-class KernelCase:
-    """One kernel and what it is compared with.
+class KernelCase(NamedTuple):
+    """One kernel and what it is compared with."""
 
-    Parameters
-    ----------
-    name : str
-        Module and function below `rtradar.kernels`.
-    does : str
-        What the kernel computes, and the size of the case, in a few words.
-    tolerance : float
-        Largest allowed difference, relative to the largest magnitude of the reference.
-    make : callable
-        Makes the arguments, and returns the calls of the kernel and of the reference.
-    """
+    name: str  # module and function below `rtradar.kernels`
+    does: str  # what it computes, and the size of the case, in a few words
+    tolerance: float  # largest allowed difference, relative to the reference's largest magnitude
+    calls_of: Callable[[ModuleType], Calls]
 
-    name: str
-    does: str
-    tolerance: float
-    make: Callable[[], tuple[Call, Call]]
+    def make(self) -> Calls:
+        """Make the arguments, and return the calls of the kernel and of the reference."""
+        return self.calls_of(import_module(f"rtradar.kernels.{self.name.rpartition('.')[0]}"))
 
 
 CASES: dict[str, KernelCase] = {}
@@ -50,9 +45,9 @@ CASES: dict[str, KernelCase] = {}
 def kernel_case(name: str, does: str, tolerance: float = 1e-12) -> Callable[[Any], Any]:
     """Register the decorated function as the case of a kernel; see `KernelCase`."""
 
-    def add(make: Callable[[], tuple[Call, Call]]) -> Callable[[], tuple[Call, Call]]:
-        CASES[name] = KernelCase(name, does, tolerance, make)
-        return make
+    def add(calls_of: Callable[[ModuleType], Calls]) -> Callable[[ModuleType], Calls]:
+        CASES[name] = KernelCase(name, does, tolerance, calls_of)
+        return calls_of
 
     return add
 
@@ -76,16 +71,12 @@ def difference(found: Any, expected: Any) -> float:
 
     NaN where any of the arrays holds it, so that no tolerance lets it pass.
     """
-    pairs = [
-        (np.asarray(one), np.asarray(other).reshape(np.shape(one)))
+    differences = [
+        np.abs(np.asarray(one, np.complex128) - np.reshape(other, np.shape(one))).max(initial=0)
+        / max(float(np.abs(other).max(initial=0)), 1e-300)
         for one, other in zip(_arrays(found), _arrays(expected), strict=True)
     ]
-    found_by_pair = [
-        np.abs(one.astype(np.complex128) - other).max(initial=0)
-        / max(float(np.abs(other).max(initial=0)), 1e-300)
-        for one, other in pairs
-    ]
-    return float(np.max(found_by_pair))  # Python's max would lose a NaN that comes later
+    return float(np.max(differences))  # Python's max would lose a NaN that comes later
 
 
 def _arrays(values: Any) -> tuple[Any, ...]:
@@ -102,14 +93,7 @@ def measure_kernels() -> list[dict[str, Any]]:
         kernel, reference = case.make()
         found = difference(kernel(), reference())
         kernel_s, reference_s = best_s(kernel, _LEAST_S), best_s(reference, _LEAST_S)
-        rows.append(
-            {
-                "name": case.name,
-                "does": case.does,
-                "kernel_s": kernel_s,
-                "reference_s": reference_s,
-                "ratio": reference_s / kernel_s,
-                "difference": found,
-            }
-        )
+        row = {"name": case.name, "does": case.does, "kernel_s": kernel_s}
+        row |= {"reference_s": reference_s, "ratio": reference_s / kernel_s, "difference": found}
+        rows.append(row)
     return rows

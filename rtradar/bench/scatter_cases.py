@@ -6,15 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.bench.kernels import Call, filled, kernel_case
+from rtradar.bench.kernels import Calls, filled, kernel_case
+from rtradar.kernels.scatter.facets import Views, Waves
+from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
+from rtradar.kernels.scatter.nearby_points import Ellipsoids
+from rtradar.kernels.scatter.specular_point import Geometry, solve_reference
+from rtradar.scatter.facets.surfaces import ellipsoid_facets
 
 # -- tracing ---------------------------------------------------------------------------------------
 
 
 @kernel_case("scatter.near_rays.near_rays", "rays of 3000 lines near 21 parts, counted by line", 0)
-def _near_rays() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.near_rays import near_lines_reference, near_rays
-
+def _near_rays(k: Any) -> Calls:
     rng, parts = np.random.default_rng(0), 21
     origins = np.array([-4.0, 0, 0]) + rng.uniform(-0.2, 0.2, (3000, 3))
     lines = origins, rng.uniform(-0.9, 0.9, (3000, 3)), rng.integers(0, parts, 3000)
@@ -23,9 +26,9 @@ def _near_rays() -> tuple[Call, Call]:
     whose = np.arange(parts), np.zeros(parts, dtype=np.int64), body[0][None], body[1][None]
 
     def count() -> Any:
-        return np.bincount(near_rays(*lines, *whose, body[2])[1], minlength=3000)
+        return np.bincount(k.near_rays(*lines, *whose, body[2])[1], minlength=3000)
 
-    return count, lambda: near_lines_reference(*lines, *body).sum(axis=1)
+    return count, lambda: k.near_lines_reference(*lines, *body).sum(axis=1)
 
 
 _WAVENUMBER = 300.0
@@ -33,8 +36,6 @@ _WAVENUMBER = 300.0
 
 def _zones(zones: int) -> Any:
     """Zones of a monostatic radar 4 m from ellipsoids: maps, and the arguments of `lay_zones`."""
-    from rtradar.kernels.scatter.fresnel_zones import ZoneMaps, lay_zones
-
     rng = np.random.default_rng(0)
     axes, centres = rng.uniform(0.05, 0.2, (zones, 3)), rng.uniform(-0.5, 0.5, (zones, 3))
     frames = np.linalg.qr(rng.normal(size=(zones, 3, 3)))[0]
@@ -49,17 +50,15 @@ def _zones(zones: int) -> Any:
 
 
 @kernel_case("scatter.fresnel_zones.lay_zones", "tangents of 200 Fresnel zones", 1e-9)
-def _lay_zones() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import lay_zones, lay_zones_reference
-
+def _lay_zones(k: Any) -> Calls:
     maps, given = _zones(200)
 
     def tangents() -> Any:
-        lay_zones(*given, np.full(200, _WAVENUMBER), maps)
+        k.lay_zones(*given, np.full(200, _WAVENUMBER), maps)
         return np.einsum("zkj,zij->zki", maps.along, maps.stretch)
 
     def reference() -> Any:
-        lay: Any = lay_zones_reference
+        lay: Any = k.lay_zones_reference
         return np.stack([lay(*zone, _WAVENUMBER) for zone in zip(*given, strict=True)])
 
     return tangents, reference
@@ -68,59 +67,46 @@ def _lay_zones() -> tuple[Call, Call]:
 @kernel_case(
     "scatter.fresnel_zones.zone_points", "10 000 points on ellipsoids, along great circles"
 )
-def _zone_points() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import zone_points, zone_points_reference
-
+def _zone_points(k: Any) -> Calls:
     rng, (maps, _) = np.random.default_rng(0), _zones(200)
     given = maps, rng.integers(0, 200, 10_000), *rng.uniform(-7, 7, (2, 10_000))
-    call = filled(zone_points, *given, out=(np.empty((10_000, 3)),))
-    return call, lambda: zone_points_reference(*given)
+    call = filled(k.zone_points, *given, out=(np.empty((10_000, 3)),))
+    return call, lambda: k.zone_points_reference(*given)
 
 
 @kernel_case("scatter.zone_edges.open_fractions", "cells of a zone cut by an edge, counted", 0.06)
-def _open_fractions() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS
-    from rtradar.kernels.scatter.zone_edges import open_fractions, straight_edge
-    from rtradar.kernels.scatter.zone_edges import open_fractions_reference as reference
-
+def _open_fractions(k: Any) -> Calls:
     (maps, _), line = _zones(1), (np.cos(0.4), np.sin(0.4), 1.7)
     bounds = np.arange(0, CELLS + 1, 4)
-    given = maps, straight_edge(maps, line, bounds), bounds
-    call = filled(open_fractions, *given, out=(np.empty((1, 1, MERIDIANS, CELLS)),))
-    return call, lambda: reference(maps.rim[0], line)
+    given = maps, k.straight_edge(maps, line, bounds), bounds
+    call = filled(k.open_fractions, *given, out=(np.empty((1, 1, MERIDIANS, CELLS)),))
+    return call, lambda: k.open_fractions_reference(maps.rim[0], line)
 
 
 @kernel_case("scatter.fresnel_zones.zone_sums", "V of a zone, 3 antennas", 1e-9)
-def _zone_sums() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, zone_sums
-    from rtradar.kernels.scatter.fresnel_zones import zone_sums_reference as reference
-
+def _zone_sums(k: Any) -> Calls:
     rng, (maps, given) = np.random.default_rng(0), _zones(1)
     antennas, pairs = given[0] + rng.normal(0, 0.1, (3, 3)), np.array([[0, 1], [2, 1]])
-    fractions = np.clip(rng.uniform(-0.5, 1.5, (3, MERIDIANS, CELLS)), 0, 1)
+    fractions = np.clip(rng.uniform(-0.5, 1.5, (3, k.MERIDIANS, k.CELLS)), 0, 1)
     wavenumber, out = np.array([[_WAVENUMBER]]), np.empty((1, 1, 2), dtype=np.complex128)
     rest = given[5], antennas[None], pairs, wavenumber, fractions[None]
-    call = filled(zone_sums, 0, 1, maps, *rest, out=(out,))
-    return call, lambda: reference(maps, 0, antennas, pairs, _WAVENUMBER, fractions)
+    call = filled(k.zone_sums, 0, 1, maps, *rest, out=(out,))
+    return call, lambda: k.zone_sums_reference(maps, 0, antennas, pairs, _WAVENUMBER, fractions)
 
 
 @kernel_case("scatter.fresnel_zones.blend_fractions", "fractions of 21 parts at 100 chirps, 8 Rx")
-def _blend_fractions() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.fresnel_zones import blend_fractions, blend_fractions_reference
-
+def _blend_fractions(k: Any) -> Calls:
     rng = np.random.default_rng(0)
     nodes, slopes = rng.normal(size=(2, 9, 3, 18, 21, 2)) @ [1, 1j]
     fine, where = rng.uniform(size=21) < 0.3, np.sort(rng.uniform(0, 8, 100))
     given = nodes, slopes, fine, where, rng.normal(size=(100, 8, 18))
     out = np.empty((3, 100, 8, 21), dtype=np.complex128)
-    call = filled(blend_fractions, *given, np.arange(100), out=(out,))
-    return call, lambda: blend_fractions_reference(*given)
+    call = filled(k.blend_fractions, *given, np.arange(100), out=(out,))
+    return call, lambda: k.blend_fractions_reference(*given)
 
 
 @kernel_case("scatter.facet_rays.facet_rays", "rays to 300 vertices of 6 parts, counted", 0)
-def _facet_rays() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.facet_rays import facet_rays, facet_rays_reference
-
+def _facet_rays(k: Any) -> Calls:
     rng, parts, antennas = np.random.default_rng(0), np.array([4, 1, 2]), 2
     u = rng.normal(size=(6, 3, 300))
     u /= np.linalg.norm(u, axis=1, keepdims=True)
@@ -130,52 +116,46 @@ def _facet_rays() -> tuple[Call, Call]:
     given = places, parts, centres, frames, axes, u * axes[:, :, None]
 
     def count() -> Any:
-        slots = facet_rays(*given, 0.0)[1][0]
+        slots = k.facet_rays(*given, 0.0)[1][0]
         return np.bincount(slots, minlength=antennas * 900).reshape(antennas, 3, 300)
 
-    return count, lambda: facet_rays_reference(*given)
+    return count, lambda: k.facet_rays_reference(*given)
 
 
 @kernel_case("scatter.facet_rays.first_occluders", "the part met first of 5000 rays", 0)
-def _first_occluders() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.facet_rays import first_occluders, first_occluders_reference
-
+def _first_occluders(k: Any) -> Calls:
     rng, found = np.random.default_rng(0), np.empty(3000, dtype=np.int16)
     rays = rng.uniform(size=5000) < 0.5, rng.uniform(size=5000).astype(np.float32)
     whose = np.stack([rng.integers(0, 3000, 5000), rng.integers(0, 21, 5000)])
 
     def call() -> Any:
         found[:] = -1
-        first_occluders(*rays, whose, found)
+        k.first_occluders(*rays, whose, found)
         return found
 
-    return call, lambda: first_occluders_reference(*rays, whose, 3000)
+    return call, lambda: k.first_occluders_reference(*rays, whose, 3000)
 
 
 @kernel_case("scatter.footprints.radiate_tubes", "2000 footprints of ray tubes to one Rx", 1e-3)
-def _radiate_tubes() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.footprints import Tubes, radiate_tubes, radiate_tubes_reference
-
+def _radiate_tubes(k: Any) -> Calls:
     rng, count = np.random.default_rng(0), 2000
     places = rng.normal(0, 0.3, (count, 1, 3)) + rng.normal(0, 0.004, (count, 4, 3))
     places[:, 3] = places[:, :3].mean(axis=1)
     directions, fields = rng.normal(size=(2, count, 3))
     path = 4 + rng.uniform(0, 0.01, (count, 4))
-    tubes = Tubes(places, path, directions, -directions, fields, np.zeros(count, dtype=np.int64))
+    tubes = k.Tubes(places, path, directions, -directions, fields, np.zeros(count, dtype=np.int64))
     rx, wavenumber = np.array([[-4.0, 0.5, 0.2]]), np.array([_WAVENUMBER])
     out, length = np.empty((8, 1, 1, 1), dtype=np.complex128), np.full((1, 1), 8.0)
     given = tubes, np.ones((1, count), dtype=np.bool_), rx, wavenumber, length
-    call = filled(radiate_tubes, *given, False, True, False, out=(out,), adds=True)
+    call = filled(k.radiate_tubes, *given, False, True, False, out=(out,), adds=True)
     reference = (tubes, rx[0], _WAVENUMBER, 8.0)
-    return lambda: call()[0].sum(), lambda: radiate_tubes_reference(*reference)
+    return lambda: call()[0].sum(), lambda: k.radiate_tubes_reference(*reference)
 
 
 # -- specular points and facets --------------------------------------------------------------------
 
 
 def _geometry(chirps: int, receivers: int, parts: int) -> Any:
-    from rtradar.kernels.scatter.specular_point import Geometry
-
     rng = np.random.default_rng(0)
     frames = np.linalg.qr(rng.normal(size=(chirps, parts, 3, 3)))[0]
     return Geometry(
@@ -188,51 +168,41 @@ def _geometry(chirps: int, receivers: int, parts: int) -> Any:
 
 
 @kernel_case("scatter.specular_point.solve", "21 ellipsoids, 100 chirps, 8 receivers", 1e-6)
-def _specular_points() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.specular_point import Options, solve, solve_reference
-
+def _specular_points(k: Any) -> Calls:
     at = _geometry(100, 8, 21)
     start, shape = np.full(at.centres.shape, np.nan), (100, 8, 21)
-    given = 0, 100, at, start, Options(polarized=False, horizontal=False, spreading=True)
+    given = 0, 100, at, start, k.Options(polarized=False, horizontal=False, spreading=True)
     out = np.empty(shape), np.empty(shape), np.empty((*shape, 3))
-    return filled(solve, *given, out=out), lambda: solve_reference(at)
+    return filled(k.solve, *given, out=out), lambda: k.solve_reference(at)
 
 
 @kernel_case("scatter.nearby_points.nearby_echoes", "147 echoes, 100 chirps, 8 receivers", 0.03)
-def _nearby_points() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter import nearby_points as nearby
-    from rtradar.kernels.scatter.specular_point import solve_reference
-
+def _nearby_points(k: Any) -> Calls:
     at, part, zero = _geometry(1, 8, 147), np.arange(147), np.zeros(100, dtype=np.int64)
     points = solve_reference(at._replace(rx=at.rx.mean(axis=1, keepdims=True)))[2][0, 0]
     local = np.einsum("pji,pj->pi", at.frames[0], points - at.centres[0]).astype(np.float32)
     places = np.broadcast_to(local, (1, 1, 2, 147, 3)).copy()
     ends = np.broadcast_to([0.5, 0.5], (100, 2)).copy()
     wanted = np.ones((1, 1, 147), dtype=bool)
-    near = nearby.Nearby(places, places, wanted, zero, zero, np.linspace(0, 1, 100), ends)
+    near = k.Nearby(places, places, wanted, zero, zero, np.linspace(0, 1, 100), ends)
     rx = np.ascontiguousarray(at.rx[None, :1].swapaxes(2, 3))
     middle = at.rx.mean(axis=1)[None]
-    images = nearby.Images(at.tx[None], rx, middle, 0 * part, 0 * part, part)
+    images = k.Images(at.tx[None], rx, middle, 0 * part, 0 * part, part)
     centres, frames = (np.repeat(array, 100, axis=0) for array in at[2:4])
-    given = images, zero, nearby.Ellipsoids(centres, frames, at.semi_axes)
+    given = images, zero, k.Ellipsoids(centres, frames, at.semi_axes)
     out = np.empty((100, 8, 147)), np.empty((100, 8, 147))
-    call = filled(nearby.nearby_echoes, *given, near, out=out)
-    return call, lambda: nearby.nearby_echoes_reference(*given)
+    call = filled(k.nearby_echoes, *given, near, out=out)
+    return call, lambda: k.nearby_echoes_reference(*given)
 
 
 @kernel_case("scatter.far_field.far_field", "21 ellipsoids, 1000 chirps, 8 receivers")
-def _far_field() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.far_field import far_field, far_field_reference
-
+def _far_field(k: Any) -> Calls:
     at = _geometry(1000, 8, 21)
     out = np.empty((1000, 8, 21)), np.empty((1000, 8, 21))
-    return filled(far_field, at, True, out=out), lambda: far_field_reference(at, True)
+    return filled(k.far_field, at, True, out=out), lambda: k.far_field_reference(at, True)
 
 
 def _views(parts: int) -> tuple[Any, Any, Any]:
-    from rtradar.kernels.scatter.facets import Views, Waves
-    from rtradar.scatter.facets.surfaces import ellipsoid_facets
-
     at = _geometry(1, 2, parts)
     facets, rows = ellipsoid_facets(at.semi_axes, 3), np.arange(2 * parts).reshape(parts, 2)
     local = np.einsum("pji,paj->pai", at.frames[0], at.rx[0] - at.centres[0][:, None])
@@ -246,18 +216,13 @@ def _views(parts: int) -> tuple[Any, Any, Any]:
 
 
 @kernel_case("scatter.facets.integrate", "1280 facets of 21 ellipsoids, one pair", 1e-3)
-def _facet_integral() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.facets import integrate, integrate_reference
-
+def _facet_integral(k: Any) -> Calls:
     given, out = _views(21), np.empty((21, 1, 1), dtype=np.complex128)
-    return filled(integrate, 0, 21, *given, out=(out,)), lambda: integrate_reference(*given)
+    return filled(k.integrate, 0, 21, *given, out=(out,)), lambda: k.integrate_reference(*given)
 
 
 @kernel_case("scatter.facet_shadows.shade", "1280 facets of 21 ellipsoids, two antennas", 0.06)
-def _facet_shadows() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.facet_shadows import shade, shade_reference
-    from rtradar.scatter.facets.surfaces import ellipsoid_facets
-
+def _facet_shadows(k: Any) -> Calls:
     at = _geometry(1, 2, 21)
     facets, pose = ellipsoid_facets(at.semi_axes, 3), (*(array[0] for array in at[2:4]), at[4])
     rng, parts = np.random.default_rng(1), np.arange(21)
@@ -269,10 +234,10 @@ def _facet_shadows() -> tuple[Call, Call]:
     row, out = np.empty((2, 21), dtype=np.int64), np.empty((43, 1280), dtype=np.float32)
 
     def call() -> Any:
-        shade(*given, row, out)
+        k.shade(*given, row, out)
         return out[row]
 
-    return call, lambda: shade_reference(*given)
+    return call, lambda: k.shade_reference(*given)
 
 
 def _courses() -> tuple[Any, ...]:
@@ -287,36 +252,32 @@ def _courses() -> tuple[Any, ...]:
 
 
 @kernel_case("scatter.envelope.find_slopes", "9 places, 3 nodes, 16 pairs, 21 parts")
-def _slopes() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.envelope import find_slopes, find_slopes_reference
-
+def _slopes(k: Any) -> Calls:
     given, slope = _courses(), np.zeros((9, 3, 16, 21), dtype=np.complex128)
-    return filled(find_slopes, True, *given, out=(slope,)), lambda: find_slopes_reference(*given)
+    return filled(k.find_slopes, True, *given, out=(slope,)), lambda: k.find_slopes_reference(
+        *given
+    )
 
 
 @kernel_case("scatter.envelope.fill_envelope", "50 chirps, 3 nodes, 16 pairs, 8 receivers")
-def _envelope() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.envelope import fill_envelope, fill_envelope_reference
-
+def _envelope(k: Any) -> Calls:
     rng, (ratio, known) = np.random.default_rng(2), _courses()[1]
     course = ratio, rng.normal(size=ratio.shape) + 0j, known
     tx, weights = np.arange(50) % 6, rng.normal(size=(6, 8, 16))
     strength = rng.normal(size=(50, 8, 21))
     given = np.arange(50), np.arange(50) / 50, tx, weights, course, strength
     out = np.empty((3, 50, 8, 21), dtype=np.complex128)
-    return filled(fill_envelope, *given, out=(out,)), lambda: fill_envelope_reference(*given)
+    return filled(k.fill_envelope, *given, out=(out,)), lambda: k.fill_envelope_reference(*given)
 
 
 # -- rooms -----------------------------------------------------------------------------------------
 
 
 @kernel_case("scatter.rooms.path_amplitudes", "273 echoes, 100 chirps, 8 receivers, 3 nodes", 1e-5)
-def _path_amplitudes() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter import rooms
-
+def _path_amplitudes(k: Any) -> Calls:
     rng, shape = np.random.default_rng(0), (2, 2, 4, 273)
     before, after = (
-        rooms.PathFactors(
+        k.PathFactors(
             rng.normal(size=(2, 3, *shape, 2)).astype(np.float32).view(np.complex64)[..., 0],
             rng.random((2, *shape)) > 0.2,
         )
@@ -324,38 +285,33 @@ def _path_amplitudes() -> tuple[Call, Call]:
     )
     interval, line = rng.integers(0, 2, (2, 100))
     ends = rng.random((100, 2)), rng.random((100, 8, 4))
-    at = rooms.Blend(interval, rng.random(100), line, *ends)
+    at = k.Blend(interval, rng.random(100), line, *ends)
     given = rng.normal(size=(100, 8, 273)), before, after, at
     out = (np.empty((3, 100, 8, 273), dtype=np.complex64),)
-    call = filled(rooms.path_amplitudes, *given, out=out)
-    return call, lambda: rooms.path_amplitudes_reference(*given)
+    call = filled(k.path_amplitudes, *given, out=out)
+    return call, lambda: k.path_amplitudes_reference(*given)
 
 
 @kernel_case("scatter.rooms.delayed_lengths", "273 echoes, 100 chirps, 8 receivers, 3 passages")
-def _delayed_lengths() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter import rooms
-    from rtradar.kernels.scatter.nearby_points import Ellipsoids
-
+def _delayed_lengths(k: Any) -> Calls:
     rng, at = np.random.default_rng(0), _geometry(100, 8, 21)
-    antennas = rooms.LegAntennas(*(rng.normal(-5, 1, shape) for shape in ((2, 4, 3), (2, 4, 8, 3))))
-    points = rooms.PartPoints(rng.normal(size=(100, 273, 3)), np.arange(273) % 21)
+    antennas = k.LegAntennas(*(rng.normal(-5, 1, shape) for shape in ((2, 4, 3), (2, 4, 8, 3))))
+    points = k.PartPoints(rng.normal(size=(100, 273, 3)), np.arange(273) % 21)
     slabs = [[1.0, 0, 0, 0.1, 4.0], [0, 0.6, 0.8, 0.2, 3.0], [0, 1.0, 0, 0.05, 2.5]]
     # Without a slab, with two of them on the way out, and with one on each way.
     legs = [[[0, 0, 0], [1, 0, 0]], [[0, 0, 2], [0, 2, 2]], [[1, 1, 2], [0, 2, 3]]] * 91
     passes = np.array([1, 2, 3])
-    delays = rooms.SlabDelays(np.arange(273), np.array(legs), passes, np.array(slabs))
+    delays = k.SlabDelays(np.arange(273), np.array(legs), passes, np.array(slabs))
     bodies, tx = Ellipsoids(*at[2:]), rng.integers(0, 4, 100)
     given = antennas, tx, points, bodies, delays, 8 + rng.random((100, 8, 273))
-    call = filled(rooms.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
-    return call, lambda: rooms.delayed_lengths_reference(*given)
+    call = filled(k.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
+    return call, lambda: k.delayed_lengths_reference(*given)
 
 
 @kernel_case("scatter.rooms.add_fading", "IF of 100 chirps, 8 receivers, 256 samples", 1e-6)
-def _fading() -> tuple[Call, Call]:
-    from rtradar.kernels.scatter.rooms import add_fading, add_fading_reference
-
+def _fading(k: Any) -> Calls:
     rng = np.random.default_rng(0)
     pair = rng.normal(size=(2, 12, 8, 256, 2)).astype(np.float32).view(np.complex64)[..., 0]
     given = *pair, rng.random(100, dtype=np.float32), rng.integers(0, 12, 100)
     out = (np.empty((100, 8, 256), dtype=np.complex64),)
-    return filled(add_fading, *given, out=out, adds=True), lambda: add_fading_reference(*given)
+    return filled(k.add_fading, *given, out=out, adds=True), lambda: k.add_fading_reference(*given)
