@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 from rtradar.errors import InputError
 from rtradar.radar import PRESETS, Radar
@@ -14,14 +14,8 @@ PARTS = ("models", "growth", "kernels")
 """Parts that may be measured alone: models with baseline and bounds, growth with the size of the
 problem, and compiled kernels beside their references."""
 
-RADARS, FIDELITIES = tuple(PRESETS.built_in), tuple(affordable_models(12.0))
-"""Radars and models by default: models that take less than minutes for seconds of radar."""
-
 CHEAPEST = "analytic"
 """Model with which all others are compared."""
-
-QUICK = ("analytic-paper", CHEAPEST, "specular")
-"""Models of a quick measurement: the paper's, the cheapest, and the one that runs take."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +27,7 @@ class Plan:
     radars : tuple of str
         Presets or TOML files, the first for what is measured with one only: first use, growth.
     fidelities : tuple of str
-        Names of models.
+        Names of models; by default those that take less than minutes for seconds of radar.
     repeats : int
         Number of runs of everything except the first use.
     duration_s : float
@@ -46,12 +40,12 @@ class Plan:
     Raises
     ------
     InputError
-        Where a radar or model is unknown or named twice, a number has no meaning, or the capture
-        holds no frame.
+        Where a part, radar or model is unknown, a name is given twice, a number has no meaning, or
+        the capture holds no frame.
     """
 
-    radars: tuple[str, ...] = RADARS
-    fidelities: tuple[str, ...] = FIDELITIES
+    radars: tuple[str, ...] = tuple(PRESETS.built_in)
+    fidelities: tuple[str, ...] = tuple(affordable_models(12.0))
     repeats: int = 3
     duration_s: float = 3.0
     quick: bool = False
@@ -61,11 +55,15 @@ class Plan:
         for option, names in (("--radar", self.radars), ("--fidelity", self.fidelities)):
             if not all(names) or len(set(names)) < len(names):
                 raise InputError(f"{option} {','.join(names)}: name each once, with commas between")
-        for fidelity in self.fidelities:
-            if fidelity not in MODELS:
-                raise InputError(
-                    f"--fidelity {fidelity}: there is no such model; allowed: {', '.join(MODELS)}"
-                )
+        for option, names, what, allowed in (
+            ("--fidelity", self.fidelities, "model", MODELS),
+            ("--only", self.parts, "part", PARTS),
+        ):
+            for name in names:
+                if name not in allowed:
+                    raise InputError(
+                        f"{option} {name}: there is no such {what}; allowed: {', '.join(allowed)}"
+                    )
         if self.repeats < 1:
             raise InputError(f"--repeats {self.repeats}: it must be a whole number, at least 1")
         for radar in map(Radar.load, self.radars):
@@ -87,16 +85,8 @@ class Plan:
         return few if self.quick else (3.0, 6.0, 12.0, 30.0, 60.0)
 
 
-@dataclass(frozen=True)
-class Case:
-    """One whole run.
-
-    Parameters
-    ----------
-    radar, fidelity : str
-        Options of the command line.
-    duration_s : float
-    """
+class Case(NamedTuple):
+    """One whole run: options of the command line, and the length of the capture [s]."""
 
     radar: str
     fidelity: str
@@ -108,35 +98,16 @@ def model_cases(plan: Plan) -> list[Case]:
     return [Case(one, own, plan.duration_s) for one in plan.radars for own in plan.fidelities]
 
 
-def plan_of(
-    *,
-    radar: str | None,
-    fidelity: str | None,
-    repeats: int | None,
-    duration_s: float | None,
-    quick: bool,
-    only: str | None,
-) -> Plan:
-    """The plan of the options of the command line; None leaves a value to `Plan` or to ``quick``.
+def plan_of(*, quick: bool, **options: Any) -> Plan:
+    """The plan of the options of the command line, by the names of `Plan`.
 
-    Raises
-    ------
-    InputError
-        Where there is no such part, or `Plan` refuses a value.
+    Radars and models are separated by commas; None leaves a value to `Plan` or to ``quick``.
+    InputError where `Plan` refuses a value.
     """
-    if only is not None and only not in PARTS:
-        raise InputError(f"--only {only}: there is no such part; allowed: {', '.join(PARTS)}")
-    given: dict[str, Any] = {
-        "radars": None if radar is None else _named(radar),
-        "fidelities": None if fidelity is None else _named(fidelity),
-        "repeats": repeats,
-        "duration_s": duration_s,
-        "parts": None if only is None else (only,),
-    }
-    less = Plan(RADARS[:1], QUICK, repeats=1, duration_s=0.5, quick=True)
-    named = {name: value for name, value in given.items() if value is not None}
-    return replace(less if quick else Plan(), **named)
-
-
-def _named(text: str) -> tuple[str, ...]:
-    return tuple(name.strip() for name in text.split(","))
+    given = {name: value for name, value in options.items() if value is not None}
+    for name in given.keys() & {"radars", "fidelities"}:
+        given[name] = tuple(one.strip() for one in given[name].split(","))
+    # The models of a quick measurement: the paper's, the cheapest, and the one that runs take.
+    models = ("analytic-paper", CHEAPEST, "specular")
+    less = Plan(Plan.radars[:1], models, repeats=1, duration_s=0.5, quick=True)
+    return replace(less if quick else Plan(), **given)

@@ -48,20 +48,14 @@ class RunError(RuntimeError):
 
 @dataclass(frozen=True)
 class Spread:
-    """Some measurements of one thing.
-
-    Parameters
-    ----------
-    best, median : float
-        Seconds [s].
-    """
+    """Best and median of some measurements of one thing [s]."""
 
     best: float
     median: float
 
     @classmethod
     def of(cls, seconds: Sequence[float]) -> Spread:
-        """Best and median of at least one measurement."""
+        """Of at least one measurement."""
         return cls(min(seconds), median(seconds))
 
 
@@ -82,13 +76,7 @@ def by_stage(runs: Sequence[Mapping[str, float]]) -> dict[str, Spread]:
 
 
 def paired_ratio(seconds: Sequence[float], of: Sequence[float]) -> float:
-    """Median of the ratios of neighbours, so that a slow minute affects both.
-
-    Raises
-    ------
-    ValueError
-        Where they are not pairs.
-    """
+    """Median of the ratios of neighbours, so that a slow minute affects both."""
     return median(one / other for one, other in zip(seconds, of, strict=True))
 
 
@@ -134,13 +122,7 @@ class Runner:
         """First use of each model."""
 
     def measure(self, cases: Sequence[Case], repeats: int, what: str) -> dict[Case, list[Run]]:
-        """Run every case some times, all cases in turn, each model once before that.
-
-        Raises
-        ------
-        RunError
-            Where a run fails.
-        """
+        """Run every case some times, all cases in turn, each model once before that."""
         fresh = {case.fidelity: case for case in reversed(cases) if case.fidelity not in self.first}
         runs: dict[Case, list[Run]] = {case: [] for case in cases}
         count = len(fresh) + repeats * len(cases)
@@ -148,26 +130,21 @@ class Runner:
             for fidelity, case in reversed(fresh.items()):
                 self.first[fidelity] = self.run(case)
                 bar.update()
-            for _ in range(repeats):
-                for case in cases:
-                    runs[case].append(self.run(case))
-                    bar.update()
+            for case in repeats * list(cases):
+                runs[case].append(self.run(case))
+                bar.update()
         return runs
 
     def run(self, case: Case) -> Run:
         """One run of a case."""
         with temporary_folder(inside=self._folder) as out:
-            written = out / "summary.json"
             words = f"-m rtradar run {MOTION} --duration {case.duration_s}".split()
             words += ["--radar", case.radar, "--fidelity", case.fidelity, "--variant", "cpu"]
-            words += ["--out", str(out / "run"), "--json", str(written)]
+            words += ["--out", str(out / "run")]
+            what = f"{case.fidelity}, radar {case.radar}"
             began = time.perf_counter()
-            done = _run([sys.executable, *words], self._environment(case.fidelity))
-            process_s = time.perf_counter() - began
-            if done.returncode != 0:
-                lines = done.stderr.strip().splitlines() or [f"ended with status {done.returncode}"]
-                raise RunError(f"bench: {case.fidelity}, radar {case.radar}: {lines[-1]}")
-            return Run(process_s, json.loads(written.read_text(encoding="utf-8")))
+            summary = _json_of(words, out / "summary.json", what, self._environment(case.fidelity))
+            return Run(time.perf_counter() - began, summary)
 
     def _environment(self, fidelity: str) -> dict[str, str]:
         """Environment with all caches of compiled code and of fonts in a folder of the model."""
@@ -182,24 +159,24 @@ class Runner:
         }
 
 
-def _run(
-    command: list[str], environment: dict[str, str] | None = None
-) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+def _json_of(
+    words: Sequence[str], written: Path, what: str, environment: Mapping[str, str] | None = None
+) -> dict[str, Any]:
+    """What Python, run with these words, writes into a JSON file; `RunError` where it fails."""
+    command = [sys.executable, *words, "--json", str(written)]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        lines = done.stderr.strip().splitlines() or [f"ended with status {done.returncode}"]
+        raise RunError(f"bench: {what}: {lines[-1]}")
+    found: dict[str, Any] = json.loads(written.read_text(encoding="utf-8"))
+    return found
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """Time of the paper's method for one frame.
+    """Time of the paper's method for one frame, by stage and in all [s].
 
-    Parameters
-    ----------
-    stages : dict of str to Spread
-        Seconds by stage.
-    total : Spread
-        All of it [s].
-    cycles, cycles_per_frame : int
-        TDM cycles that were synthesised, and those of a frame, to which the times are scaled.
+    ``cycles`` TDM cycles were synthesised, and the times are scaled to ``cycles_per_frame``.
     """
 
     stages: dict[str, Spread]
@@ -209,40 +186,17 @@ class Baseline:
 
 
 def measure_baseline(radar: str, repeats: int, *, quick: bool) -> Baseline | None:
-    """Time the paper's method in plain NumPy, one thread, for some frames.
+    """Time the paper's method in plain NumPy, one thread, for some frames, or a part of each.
 
-    Parameters
-    ----------
-    radar : str
-        Preset or TOML file.
-    repeats : int
-        Number of frames.
-    quick : bool
-        Whether a part of each frame is enough.
-
-    Returns
-    -------
-    Baseline or None
-        None where the validation scripts, one of which it is, are not there.
-
-    Raises
-    ------
-    RunError
-        Where the script fails.
+    None where the validation scripts, one of which it is, are not there.
     """
     script = validation_folder() / "other_methods" / "paper_numpy.py"
     if not script.is_file():
         return None
+    words = [str(script), "--radar", radar, "--repeats", str(repeats)]
+    words += ["--cycles", str(_QUICK_CYCLES)] if quick else []
     with temporary_folder() as folder:
-        written = folder / "frames.json"
-        command = [sys.executable, str(script), "--radar", radar, "--repeats", str(repeats)]
-        command += ["--json", str(written)]
-        command += ["--cycles", str(_QUICK_CYCLES)] if quick else []
-        done = _run(command)
-        if done.returncode != 0:
-            last = (done.stderr.strip().splitlines() or ["failed"])[-1]
-            raise RunError(f"bench: {script.name}: {last}")
-        found = json.loads(written.read_text(encoding="utf-8"))
+        found = _json_of(words, folder / "frames.json", script.name)
     frames = found["frames"]
     total = Spread.of([sum(frame.values()) for frame in frames])
     return Baseline(by_stage(frames), total, found["cycles"], found["cycles_per_frame"])

@@ -87,11 +87,11 @@ def _bench(options: argparse.Namespace) -> int:
     from rtradar.bench import bench, plan_of
 
     plan = plan_of(
-        radar=options.radar,
-        fidelity=options.fidelity,
+        quick=options.quick,
+        radars=options.radar,
+        fidelities=options.fidelity,
         repeats=options.repeats,
         duration_s=options.duration,
-        quick=options.quick,
-        only=options.only,
+        parts=None if options.only is None else (options.only,),
     )
     return bench(plan, json_path=options.json, figure=options.figure)

@@ -9,14 +9,7 @@ from rtradar.cli import main
 
 
 def test_quick_is_less_of_everything_unless_asked_for() -> None:
-    plan = plan_of(
-        radar=None,
-        fidelity="specular , fresnel",
-        repeats=None,
-        duration_s=0.25,
-        quick=True,
-        only=None,
-    )
+    plan = plan_of(fidelities="specular , fresnel", duration_s=0.25, quick=True, radars=None)
     assert plan == Plan(
         ("paper-12ghz",), ("specular", "fresnel"), repeats=1, duration_s=0.25, quick=True
     )
@@ -30,8 +23,7 @@ def test_growth_is_of_specular_or_of_the_last_model() -> None:
 
 
 def test_a_quick_measurement_has_the_usual_model() -> None:
-    given = dict.fromkeys(("radar", "fidelity", "repeats", "duration_s", "only"))
-    plan = plan_of(**given, quick=True)  # type: ignore[arg-type]
+    plan = plan_of(quick=True)
     assert plan.fidelities == ("analytic-paper", "analytic", "specular")
     assert plan.growing_fidelity == "specular"
 
