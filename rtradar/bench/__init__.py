@@ -78,16 +78,8 @@ def bench(plan: Plan, *, json_path: Path | None = None, figure: Path | None = No
 def measure(plan: Plan) -> dict[str, Any]:
     """Measure all that the plan asks for, and give it as plain values.
 
-    Returns
-    -------
-    dict
-        With keys ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth`` and
-        ``kernels``.
-
-    Raises
-    ------
-    RunError
-        Where a run fails.
+    The keys are ``settings``, ``machine``, ``rates``, ``models``, ``paper``, ``growth`` and
+    ``kernels``. `RunError` where a run fails.
     """
     versions = {"python": platform.python_version()} | {name: version(name) for name in _VERSIONS}
     found: dict[str, Any] = {
@@ -106,9 +98,6 @@ def measure(plan: Plan) -> dict[str, Any]:
         if "growth" in plan.parts:
             found["growth"]["duration"] = with_duration(plan, runner)
     return found
-
-
-# -- models ----------------------------------------------------------------------------------------
 
 
 def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
@@ -130,7 +119,7 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
         baseline = baselines[case.radar]
         row["paper_over"] = baseline and _paper_over(baseline, radars[case.radar], row)
         found["models"].append(row)
-    found["rates"] = {radars[name].name: asdict(own) for name, own in rates.items()}
+    found["rates"] = {radars[name].name: own._asdict() for name, own in rates.items()}
     known = {radars[name].name: asdict(own) for name, own in baselines.items() if own is not None}
     missing = "there is no paper_numpy.py among the validation scripts; use a checkout, or install "
     found["paper"] = {"trouble": "" if known else missing + "rtradar again", "radars": known}
@@ -140,22 +129,13 @@ def _measure_models(plan: Plan, runner: Runner, found: dict[str, Any]) -> None:
 def _model_row(case: Case, runs: list[Run], radar: Radar, rates: Rates) -> Row:
     """What was measured of one model with one radar, without comparisons."""
     summary = runs[0].summary
-    work = Work.of(
-        radar,
-        chirps=summary["chirps"],
-        windows=summary["windows"],
-        echoes=len(summary["part_power_m2"]),
-        detections=summary["detections"],
-    )
-    least = {
-        name: {"floor": own.seconds, "rule": own.rule} for name, own in floors(work, rates).items()
-    }
-    none = {"floor": None, "rule": ""}
+    work = Work.of(radar, summary)
+    least, none = floors(work, rates), {"floor": None, "rule": ""}
     return {
         "radar": radar.name,
         "fidelity": case.fidelity,
         "capture_s": summary["capture_s"],
-        "work": asdict(work),
+        "work": work._asdict(),
         "process_s": asdict(Spread.of([run.process_s for run in runs])),
         "warmup_s": asdict(Spread.of([run.summary["warmup_s"] for run in runs])),
         **_costs(runs),
@@ -204,24 +184,19 @@ def _paper_over(baseline: Baseline, radar: Radar, row: Row) -> dict[str, float]:
 def _chirp_rows(models: list[Row]) -> list[Row]:
     """Radars with more chirps than the first: each model's cost over its own with the first."""
     base = {row["fidelity"]: row for row in models if row["radar"] == models[0]["radar"]}
-    found = []
-    for row in models:
-        of = base[row["fidelity"]]
-        if row["radar"] != of["radar"]:
-            found.append(
-                {
-                    "radar": row["radar"],
-                    "of_radar": of["radar"],
-                    "fidelity": row["fidelity"],
-                    "chirps": row["work"]["chirps"] / of["work"]["chirps"],
-                    "to_cloud": row["to_cloud_s"]["median"] / of["to_cloud_s"]["median"],
-                    "peak_memory": row["peak_memory_mb"] / of["peak_memory_mb"],
-                }
-            )
-    return found
-
-
-# -- growth ----------------------------------------------------------------------------------------
+    pairs = ((row, base[row["fidelity"]]) for row in models)
+    return [
+        {
+            "radar": row["radar"],
+            "of_radar": of["radar"],
+            "fidelity": row["fidelity"],
+            "chirps": row["work"]["chirps"] / of["work"]["chirps"],
+            "to_cloud": row["to_cloud_s"]["median"] / of["to_cloud_s"]["median"],
+            "peak_memory": row["peak_memory_mb"] / of["peak_memory_mb"],
+        }
+        for row, of in pairs
+        if row["radar"] != of["radar"]
+    ]
 
 
 def with_duration(plan: Plan, runner: Runner) -> list[Row]:

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -27,6 +27,7 @@ _SAMPLE = 8  # bytes of a complex64
 _ECHO = 24  # bytes of a float64 length and a complex128 amplitude
 _MULTIPLY_ADDS = 2  # of a complex amplitude times a complex power that another one shares
 
+_CORES = os.cpu_count() or 1
 _REPEATS, _LEAST_S = 5, 0.3
 _COPIED_BYTES = 1 << 28  # of each of two arrays, more than caches hold
 _CACHED_BYTES = 1 << 20  # for each core
@@ -34,27 +35,17 @@ _WORDS = 1 << 16  # at once, for each core
 _MATRIX = 1536
 
 
-@dataclass(frozen=True)
-class Rates:
+class Rates(NamedTuple):
     """What this machine does in a second, all cores together.
 
-    Parameters
-    ----------
-    copied_bytes : float
-        Bytes read and written, in a copy much larger than the caches.
-    random_words : float
-        Random words of 64 bits drawn.
-    multiply_adds : float
-        Multiply-adds in float32, in a matrix product.
-    range_ffts, doppler_ffts, spectrogram_ffts, angle_ffts : float
-        Transforms (complex64) of the radar's lengths: samples per chirp, cycles per frame, cycles
-        of a spectrogram's window, and directions of a line; over the cycles of a frame by the
-        library, or as fast as the multiply-adds of our own would be.
+    FFTs are of complex64, over the samples of a chirp, the cycles of a frame, those of a window of
+    the spectrogram, and the directions of a line. Over the cycles of a frame they are by the
+    library, or as fast as the multiply-adds of our own would be.
     """
 
-    copied_bytes: float
-    random_words: float
-    multiply_adds: float
+    copied_bytes: float  # read and written, in a copy much larger than the caches
+    random_words: float  # of 64 bits
+    multiply_adds: float  # in float32, in a matrix product
     range_ffts: float
     doppler_ffts: float
     spectrogram_ffts: float
@@ -64,17 +55,16 @@ class Rates:
 def measure_rates(radar: Radar) -> Rates:
     """Measure all, the best of some, with the lengths of this radar's transforms; takes seconds."""
     multiply_adds, dft = _multiply_adds(), prime_factor_dft(radar.cycles_per_frame)
+    own_ffts = multiply_adds / dft.multiply_adds if dft is not None else 0.0
+    directions = len(angle_grid(radar)) if measures_angle(radar) else 1
     return Rates(
         copied_bytes=_copied_bytes(),
         random_words=_random_words(),
         multiply_adds=multiply_adds,
         range_ffts=_ffts(radar.samples_per_chirp),
-        doppler_ffts=max(
-            _ffts(radar.cycles_per_frame),
-            multiply_adds / dft.multiply_adds if dft is not None else 0,
-        ),
+        doppler_ffts=max(_ffts(radar.cycles_per_frame), own_ffts),
         spectrogram_ffts=_ffts(window_cycles(radar)),
-        angle_ffts=_ffts(max(1, direction_count(radar))),
+        angle_ffts=_ffts(directions),
     )
 
 
@@ -89,25 +79,21 @@ def best_s(work: Callable[[], object], least_s: float = _LEAST_S) -> float:
     return min(seconds)
 
 
-def _cores() -> int:
-    return os.cpu_count() or 1
-
-
 def _copied_bytes() -> float:
-    arrays = [np.array_split(np.ones(_COPIED_BYTES // 8), _cores()) for _ in range(2)]
-    with ThreadPoolExecutor(_cores()) as pool:
+    arrays = [np.array_split(np.ones(_COPIED_BYTES // 8), _CORES) for _ in range(2)]
+    with ThreadPoolExecutor(_CORES) as pool:
         return 2 * _COPIED_BYTES / best_s(lambda: list(pool.map(np.copyto, *arrays)))
 
 
 def _random_words() -> float:
-    streams = [np.random.SFC64(seed) for seed in range(_cores())]
+    streams = [np.random.SFC64(seed) for seed in range(_CORES)]
 
     def draw(stream: np.random.SFC64) -> None:
         for _ in range(8):
             stream.random_raw(_WORDS)
 
-    with ThreadPoolExecutor(_cores()) as pool:
-        return 8 * _WORDS * _cores() / best_s(lambda: list(pool.map(draw, streams)))
+    with ThreadPoolExecutor(_CORES) as pool:
+        return 8 * _WORDS * _CORES / best_s(lambda: list(pool.map(draw, streams)))
 
 
 def _multiply_adds() -> float:
@@ -117,7 +103,7 @@ def _multiply_adds() -> float:
 
 def _ffts(length: int) -> float:
     """Transforms per second, in whichever layout they are faster."""
-    count = max(16, _CACHED_BYTES * _cores() // (8 * length))
+    count = max(16, _CACHED_BYTES * _CORES // (8 * length))
     noise = np.random.default_rng(0).standard_normal((2, length, count), dtype=np.float32)
     columns = noise[0] + 1j * noise[1]
     rows = np.ascontiguousarray(columns.T)
@@ -130,49 +116,32 @@ def _ffts(length: int) -> float:
     return count / min(seconds(columns, 0), seconds(rows, 1))
 
 
-@dataclass(frozen=True)
-class Work:
-    """The size of a run.
-
-    Parameters
-    ----------
-    chirps, rx, samples : int
-        Shape of its IF.
-    echoes : int
-        Number of echoes of one chirp at one receiver.
-    windows, cycles, channels : int
-        Frames, TDM cycles in each, virtual channels.
-    detections : int
-        Cells that CFAR marked, in all frames.
-    lines : int
-        Lines of the array that measure an angle.
-    spectrogram_cycles : int
-        TDM cycles in a window of the spectrogram.
-    """
+class Work(NamedTuple):
+    """The size of a run."""
 
     chirps: int
     rx: int
     samples: int
-    echoes: int
-    windows: int
-    cycles: int
-    channels: int
-    detections: int
-    lines: int
-    spectrogram_cycles: int
+    echoes: int  # of one chirp at one receiver
+    windows: int  # frames
+    cycles: int  # TDM cycles in each frame
+    channels: int  # virtual ones
+    detections: int  # cells that CFAR marked, in all frames
+    lines: int  # of the array that measure an angle
+    spectrogram_cycles: int  # TDM cycles in a window of the spectrogram
 
     @classmethod
-    def of(cls, radar: Radar, *, chirps: int, windows: int, echoes: int, detections: int) -> Work:
-        """Size of a run with this radar."""
+    def of(cls, radar: Radar, summary: Mapping[str, Any]) -> Work:
+        """Size of a run with this radar, by its summary."""
         return cls(
-            chirps=chirps,
+            chirps=summary["chirps"],
             rx=radar.n_rx,
             samples=radar.samples_per_chirp,
-            echoes=echoes,
-            windows=windows,
+            echoes=len(summary["part_power_m2"]),
+            windows=summary["windows"],
             cycles=radar.cycles_per_frame,
             channels=radar.n_channels,
-            detections=detections,
+            detections=summary["detections"],
             lines=len(measured_angles(radar)),
             spectrogram_cycles=window_cycles(radar),
         )
@@ -183,11 +152,6 @@ class Work:
         return self.chirps * self.rx * self.samples
 
     @property
-    def cells(self) -> int:
-        """Cells of all range-Doppler maps."""
-        return self.windows * self.samples * self.cycles
-
-    @property
     def spectrogram_columns(self) -> int:
         """Windows of one channel's spectrogram; one starts every twentieth of its length."""
         tdm_cycles = self.chirps * self.rx // self.channels
@@ -195,48 +159,37 @@ class Work:
         return max(0, (tdm_cycles - window) // max(1, window // 20) + 1)
 
 
-@dataclass(frozen=True)
-class Floor:
-    """Lower bound of the time of a stage [s], and what it consists of, in words."""
+def floors(work: Work, rates: Rates) -> dict[str, dict[str, Any]]:
+    """Bound of each stage that has one, by the names of ``stages`` in a summary and `ELSEWHERE`.
 
-    seconds: float
-    rule: str
-
-
-def direction_count(radar: Radar) -> int:
-    """Directions that each line of the array is steered to; 0 without a line."""
-    return len(angle_grid(radar)) if measures_angle(radar) else 0
-
-
-def floors(work: Work, rates: Rates) -> dict[str, Floor]:
-    """Bound of each stage that has one, by the names of ``stages`` in a summary and `ELSEWHERE`."""
-
-    def copied(count: float) -> float:
-        return count / rates.copied_bytes
-
+    ``floor`` is the time [s], and ``rule`` says what it consists of.
+    """
     samples, echoes = work.if_samples, work.chirps * work.rx * work.echoes
+    passed = 2 * _SAMPLE * samples / rates.copied_bytes  # read and written
     tones = _MULTIPLY_ADDS * samples * work.echoes / rates.multiply_adds
-    passed = copied(2 * _SAMPLE * samples)  # read and written
+    range_ffts = samples / work.samples / rates.range_ffts
     transforms = work.windows * work.channels * work.samples
-    doppler = max(transforms / rates.doppler_ffts, copied(_SAMPLE * work.cycles * transforms))
+    doppler_ffts = transforms / rates.doppler_ffts
+    spectra = _SAMPLE * work.cycles * transforms / rates.copied_bytes
     columns = work.spectrogram_columns * work.samples / rates.spectrogram_ffts
     angles = work.detections * work.lines / rates.angle_ffts
+    cells = work.windows * work.samples * work.cycles / rates.copied_bytes  # a byte of each
     found = {
         ELSEWHERE: (passed, "spectra kept for the windows"),
-        "scatter": (copied(_ECHO * echoes), "lengths and amplitudes written"),
+        "scatter": (_ECHO * echoes / rates.copied_bytes, "lengths and amplitudes written"),
         "signal": (
-            max(tones, copied(_SAMPLE * samples)),
+            max(tones, passed / 2),
             "two multiply-adds an echo and sample, or samples written",
         ),
         "noise": (max(samples / rates.random_words, passed), "a random word a sample"),
-        "range": (
-            max(samples / work.samples / rates.range_ffts, passed),
-            "an FFT a chirp and receiver",
-        ),
+        "range": (max(range_ffts, passed), "an FFT a chirp and receiver"),
         "spectrogram": (columns, "an FFT a column and range bin"),
-        "doppler": (doppler, "an FFT a window, channel and range bin, or spectra read"),
-        "cfar": (copied(5 * work.cells), "power read, mask written"),
-        "cloud": (copied(work.cells), "masks read"),
+        "doppler": (
+            max(doppler_ffts, spectra),
+            "an FFT a window, channel and range bin, or spectra read",
+        ),
+        "cfar": (5 * cells, "power read, mask written"),
+        "cloud": (cells, "masks read"),
         "angle": (angles, "an FFT a detection and line, zero-padded to the directions"),
     }
-    return {name: Floor(*bound) for name, bound in found.items()}
+    return {name: {"floor": seconds, "rule": rule} for name, (seconds, rule) in found.items()}

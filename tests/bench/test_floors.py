@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
-
 import pytest
 
 from rtradar.bench.floors import Rates, Work, floors
@@ -33,7 +31,7 @@ WORK = Work(
 
 
 def test_each_stage_has_the_largest_of_its_floors() -> None:
-    found = {name: floor.seconds for name, floor in floors(WORK, RATES).items()}
+    found = {name: row["floor"] for name, row in floors(WORK, RATES).items()}
     assert WORK.if_samples == 7680
     assert found == {
         "elsewhere": pytest.approx(2 * 8 * 7680 / 8e3),
@@ -50,24 +48,29 @@ def test_each_stage_has_the_largest_of_its_floors() -> None:
 
 
 def test_a_slow_memory_is_the_floor_of_what_moves_much() -> None:
-    slow = floors(WORK, dataclasses.replace(RATES, copied_bytes=80.0))
-    assert slow["signal"].seconds == pytest.approx(8 * 7680 / 80)
-    assert slow["noise"].seconds == pytest.approx(16 * 7680 / 80)
-    assert slow["range"].seconds == pytest.approx(16 * 7680 / 80)
-    assert slow["doppler"].seconds == pytest.approx(8 * 5 * 10 * 4 * 16 / 80)
+    slow = floors(WORK, RATES._replace(copied_bytes=80.0))
+    assert slow["signal"]["floor"] == pytest.approx(8 * 7680 / 80)
+    assert slow["noise"]["floor"] == pytest.approx(16 * 7680 / 80)
+    assert slow["range"]["floor"] == pytest.approx(16 * 7680 / 80)
+    assert slow["doppler"]["floor"] == pytest.approx(8 * 5 * 10 * 4 * 16 / 80)
+
+
+SUMMARY = {
+    "chirps": 48_000,
+    "windows": 117,
+    "detections": 20_000,
+    "part_power_m2": dict.fromkeys(range(21), 1.0),
+}
 
 
 def test_the_size_of_a_run_by_the_papers_radar() -> None:
-    work = Work.of(
-        Radar.preset("paper-12ghz"), chirps=48_000, windows=117, echoes=21, detections=20_000
-    )
-    assert (work.channels, work.cycles, work.lines) == (96, 133, 2)
+    work = Work.of(Radar.preset("paper-12ghz"), SUMMARY)
+    assert (work.channels, work.cycles, work.lines, work.echoes) == (96, 133, 2, 21)
     assert work.if_samples == 48_000 * 8 * 256
     assert work.spectrogram_columns == 646  # starts at cycles 0, 6, ... 3870 of 4000
 
 
 def test_a_window_of_the_spectrogram_is_as_long_where_all_transmit_at_once() -> None:
-    radar = Radar(multiplexing="fdm")
-    work = Work.of(radar, chirps=48_000, windows=117, echoes=21, detections=20_000)
+    work = Work.of(Radar(multiplexing="fdm"), SUMMARY)
     # 12 Tx at once: windows of 12 x 128 of 4000 cycles, which start at cycles 0, 76, ... 2432.
     assert (work.spectrogram_cycles, work.spectrogram_columns) == (1536, 33)
