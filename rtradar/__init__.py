@@ -29,31 +29,20 @@ __version__ = "0.2.0"
 # have work. The variable is read when OpenMP is loaded, with the first loop that runs in parallel.
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
-_HOME = {
-    "Antenna": "antenna",
-    "BackendError": "errors",
-    "Body": "body",
-    "Comparison": "pipeline",
-    "Echoes": "echoes",
-    "Ellipsoids": "body",
-    "ExtensionError": "errors",
-    "InputError": "errors",
-    "Motion": "motion",
-    "Radar": "radar",
-    "Result": "pipeline",
-    "RunSettings": "settings",
-    "Scene": "scene",
-    "ValidityWarning": "errors",
-    "compare": "pipeline",
-    "load_motion": "motion",
-    "register_detector": "process",
-    "register_radar": "radar",
-    "register_reader": "motion",
-    "register_model": "scatter",
-    "run": "pipeline",
-    "scattering_length": "scatter",
-    "synthetic_motion": "motion",
+_NAMES = {
+    "antenna": "Antenna",
+    "body": "Body Ellipsoids",
+    "echoes": "Echoes",
+    "errors": "BackendError ExtensionError InputError ValidityWarning",
+    "motion": "Motion load_motion register_reader synthetic_motion",
+    "pipeline": "Comparison Result compare run",
+    "process": "register_detector",
+    "radar": "Radar register_radar",
+    "scatter": "register_model scattering_length",
+    "scene": "Scene",
+    "settings": "RunSettings",
 }
+_HOME = {name: module for module, names in _NAMES.items() for name in names.split()}
 _MODULES = ("classify", "exchange", "process", "rcs", "signal")
 
 __all__ = [

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.errors import InputError
-from rtradar.system.checks import brief, check_keys, check_number
+from rtradar.system.checks import brief, check_number
 
 _HALF_WAVE_DIRECTIVITY = 1.640922376984585  # 4 / Cin(2 pi), Balanis, Antenna Theory, eq. 4-91
 _PATTERNS = ("isotropic", "cosine", "dipole", "table")
@@ -90,27 +88,6 @@ class Antenna:
                 "antenna: pattern = 'table' needs azimuth_deg and azimuth_db, or elevation_deg and "
                 "elevation_db"
             )
-
-    @classmethod
-    def of(cls, table: Mapping[str, Any]) -> Antenna:
-        """Make an antenna from a table of a TOML file.
-
-        Parameters
-        ----------
-        table : mapping
-            Table whose keys are the fields of this class.
-
-        Returns
-        -------
-        Antenna
-
-        Raises
-        ------
-        InputError
-            Where there is an unknown key, or a value without meaning.
-        """
-        check_keys("antenna: ", table, (), tuple(field.name for field in dataclasses.fields(cls)))
-        return cls(**table)
 
     @property
     def peak_gain(self) -> float:

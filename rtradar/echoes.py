@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, kw_only=True)
 class Echoes:
-    """Echoes of a block of chirps.
+    """Echoes of a block of chirps, which :eq:`received-spectrum` and :eq:`if-signal` define.
 
     Parameters
     ----------
@@ -33,11 +33,6 @@ class Echoes:
     ------
     ValueError
         Where the shapes do not fit each other.
-
-    Notes
-    -----
-    Equation :eq:`received-spectrum` of the theory page says what they mean, and :eq:`if-signal`
-    what is made of them.
     """
 
     length: NDArray[np.float64]

@@ -87,9 +87,8 @@ def test_table() -> None:
 
 @pytest.mark.parametrize("cut", ["azimuth", "elevation"])
 def test_a_cut_that_is_left_out_is_flat(cut: str) -> None:
-    antenna = Antenna.of(
-        {"pattern": "table", "gain_dbi": 3, f"{cut}_deg": [0, 40], f"{cut}_db": [0, -8]}
-    )
+    table: dict[str, Any] = {f"{cut}_deg": [0, 40], f"{cut}_db": [0, -8]}
+    antenna = Antenna(pattern="table", gain_dbi=3, **table)
     for angle, level in ((0, 0), (20, -4), (40, -8)):
         for other in (-30, 0, 60):
             azimuth, elevation = (angle, other) if cut == "azimuth" else (other, angle)

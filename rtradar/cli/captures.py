@@ -145,9 +145,9 @@ def _registered(module: str, registry: str) -> str:
 
 
 def _scenes() -> str:
-    from rtradar.scene.scene import scenes_folder
+    from rtradar.scene.scene import scene_files
 
-    return ", ".join(sorted(file.stem for file in scenes_folder().glob("*.toml")))
+    return ", ".join(scene_files())
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -24,7 +24,6 @@ from rtradar.process.frames import SlidingWindows
 from rtradar.process.power_maps import power_map
 from rtradar.process.range_time import SlidingRangeTime, range_time
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
-from rtradar.process.spectrogram import WINDOW_CYCLES as SPECTROGRAM_CYCLES
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
 from rtradar.process.steering import measured_angles, measures_angle
 from rtradar.process.window_functions import WindowFunctions
@@ -32,7 +31,6 @@ from rtradar.process.window_functions import WindowFunctions
 __all__ = [
     "CLUTTER_REMOVALS",
     "DETECTORS",
-    "SPECTROGRAM_CYCLES",
     "AngleSpectra",
     "ClutterMap",
     "ClutterRemoval",

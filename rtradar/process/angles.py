@@ -1,14 +1,12 @@
 """Directions of echoes: power over the sines of the two virtual lines, its peaks, and its maps.
 
-In one TDM cycle Tx k transmits k chirps late; meanwhile the phase of an echo of range rate v grows
-by 2 pi f_D k T, f_D = 2 v / lambda with the wavelength of the sweep centre. That is removed with
-the velocity of the cell; an echo faster than the unambiguous velocity keeps a part of it, and
-appears in a wrong direction (`rtradar.scatter.validity.folded_angle_deg`).
+The phase :eq:`tdm-phase` is removed with the velocity of the cell; an echo faster than the
+unambiguous velocity keeps a part of it, and appears in a wrong direction
+(`rtradar.scatter.validity.folded_angle_deg`).
 
-The line along y measures the sine u = y / r, the line along z the sine w = z / r;
-azimuth = atan2(y, x) = asin(u / sqrt(1 - w^2)), elevation = asin(w). A radar with one line alone
-measures the cone about that line: along y azimuth is asin(u), the cone angle, which is the true
-azimuth only at the height of the radar, and elevation is not measured; along z azimuth is not.
+Both lines together measure :eq:`direction`. A radar with one line alone measures the cone about
+that line: along y azimuth is asin(u), the cone angle, which is the true azimuth only at the height
+of the radar, and elevation is not measured; along z azimuth is not.
 
 Off the boresight an echo reaches the ends of the line up to several range bins before and behind
 its cell (12 GHz: 1 bin at 14 degrees, 2 at 30, 3.4 at the unambiguous 59). Each element is
@@ -94,8 +92,7 @@ def angle_spectra(
 ) -> AngleSpectra:
     """Power over direction of range-Doppler cells, without the motion within a TDM cycle.
 
-    The phases :eq:`tdm-phase` of the theory page are removed; elements are added along
-    :eq:`near-field`.
+    The phases :eq:`tdm-phase` are removed; elements are added along :eq:`near-field`.
 
     Parameters
     ----------
@@ -232,15 +229,13 @@ def angle(
     row = _nearest(range_m / radar.range_bin_m, 0, radar.samples_per_chirp - 1)
     if row is None:
         raise InputError(
-            f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m, the "
-            "last range bin"
+            f"angle: range_m = {range_m}; it must lie between 0 and {radar.range_m[-1]:.3f} m"
         )
     step = radar.wavelength_m / (2 * n_cycles * radar.cycle_duration_s)
     column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
     if column is None:
         raise InputError(
-            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s, "
-            "the unambiguous one"
+            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s"
         )
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
     cell = [row], [(column + n_cycles // 2) % n_cycles]

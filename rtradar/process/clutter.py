@@ -41,6 +41,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rtradar.errors import InputError
+from rtradar.process.spectra import checked_chirps
 from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
 
@@ -100,12 +101,8 @@ class ClutterRemoval:
             Where the shape does not fit the radar, the block does not hold whole cycles or does not
             follow the last one.
         """
-        chirps, radar = _complex(spectra, "spectra"), self._radar
-        if chirps.ndim != 3 or chirps.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
-            raise InputError(
-                f"clutter removal: spectra have shape {chirps.shape}; radar '{radar.name}' needs "
-                f"(chirp, rx, range) = (any, {radar.n_rx}, {radar.samples_per_chirp})"
-            )
+        radar = self._radar
+        chirps = _complex(checked_chirps("clutter removal: spectra", spectra, radar))
         if first_chirp % radar.n_tx or len(chirps) % radar.n_tx:
             raise InputError(
                 f"clutter removal: {len(chirps)} chirps from chirp {first_chirp} on are not whole "
@@ -114,8 +111,7 @@ class ClutterRemoval:
         if self._next not in (None, first_chirp):
             raise InputError(
                 f"clutter removal: the block begins with chirp {first_chirp}, the last one ended "
-                f"before {self._next}; give the chirps without a gap, or begin anew with another "
-                "removal"
+                f"before {self._next}; give the chirps without a gap, or begin another removal"
             )
         self._next = first_chirp + len(chirps)
         cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])
@@ -140,7 +136,7 @@ class ClutterRemoval:
         InputError
             Where there is nothing to average.
         """
-        values = _complex(cycles, "cycles")
+        values = _complex(cycles)
         if values.ndim < 1 or len(values) < 1:
             raise InputError(
                 f"clutter removal: cycles have shape {values.shape}; a window needs at least one "
@@ -283,8 +279,7 @@ def clutter_removal(
     if method != "none" and radar.multiplexing == "ddm":
         raise InputError(
             f"clutter removal '{method}': under multiplexing = 'ddm' what does not move has a "
-            "Doppler of its own for each Tx, which this would leave in; choose 'none', or another "
-            "multiplexing"
+            "Doppler of its own for each Tx, which this would leave in; choose 'none', or TDM"
         )
     for name, value, owner in (
         ("time_constant_s", time_constant_s, "exponential"),
@@ -323,10 +318,10 @@ def check_time_constant(time_constant_s: float) -> float:
     return float(time_constant_s)
 
 
-def _complex(values: ArrayLike, name: str) -> NDArray[np.complexfloating]:
+def _complex(values: ArrayLike) -> NDArray[np.complexfloating]:
     array = np.asarray(values)
     if array.dtype.kind not in "fc":
         raise InputError(
-            f"clutter removal: {name} are of type {array.dtype}; they must be complex numbers"
+            f"clutter removal: cycles are of type {array.dtype}; they must be complex numbers"
         )
     return array.astype(np.result_type(array.dtype, np.complex64), copy=False)

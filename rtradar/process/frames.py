@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.errors import InputError
+from rtradar.process.spectra import checked_chirps
 from rtradar.radar import Radar
 from rtradar.system.threads import thread_map
 
@@ -76,19 +76,13 @@ class SlidingWindows:
         RuntimeError
             Where the frames of the last call were not all taken: the block is read meanwhile.
         """
-        block = np.asarray(spectra)
-        if block.ndim != 3 or block.shape[1:] != self._buffer.shape[1:]:
-            raise InputError(
-                f"SlidingWindows: spectra have shape {block.shape}; radar '{self._radar.name}' "
-                f"needs (chirp, rx, range) = (any, {self._buffer.shape[1]}, "
-                f"{self._buffer.shape[2]})"
-            )
+        block = checked_chirps("SlidingWindows: spectra", spectra, self._radar)
         if self._busy:
             raise RuntimeError("SlidingWindows: take every window of one push before the next push")
         self._busy = True
         return self._frames(block)
 
-    def _frames(self, block: NDArray[np.complexfloating]) -> Iterator[_Frame]:
+    def _frames(self, block: NDArray[np.generic]) -> Iterator[_Frame]:
         taken = 0
         while taken < len(block):
             taken += self._take(block[taken:])
@@ -102,7 +96,7 @@ class SlidingWindows:
                 yield index, start, cube
         self._busy = False
 
-    def _take(self, block: NDArray[np.complexfloating]) -> int:
+    def _take(self, block: NDArray[np.generic]) -> int:
         """Copy what fits of the block behind what is still needed; how many chirps it took."""
         # No later frame needs a chirp before this one.
         wanted = self._start_of(self._candidate) * self._radar.n_tx
@@ -144,7 +138,7 @@ class SlidingWindows:
         return None
 
 
-def _copy(chirps: NDArray[np.complexfloating], to: NDArray[np.complex64]) -> None:
+def _copy(chirps: NDArray[np.generic], to: NDArray[np.complex64]) -> None:
     def some(first: int) -> None:
         to[first : first + _CHIRPS_AT_ONCE] = chirps[first : first + _CHIRPS_AT_ONCE]
 

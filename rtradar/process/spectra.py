@@ -78,7 +78,7 @@ def range_doppler(
         Where the shape does not fit the radar, not one whole cycle is there, or a sample is not
         finite.
     """
-    samples = _checked_if(x, radar)
+    samples = checked_chirps("IF samples", x, radar)
     n_cycles = samples.shape[0] // radar.n_tx
     if n_cycles < 1:
         raise InputError(
@@ -130,7 +130,7 @@ def range_spectrum(
     ValueError
         Where ``out`` is not an array of that shape and type.
     """
-    samples = _checked_if(x, radar)
+    samples = checked_chirps("IF samples", x, radar)
     scale = weights(window_functions.range, samples.shape[2]).astype(np.float32).repeat(2)
     spectra = array_to_fill("range_spectrum", out, samples.shape, np.complex64)
 
@@ -148,16 +148,17 @@ def range_spectrum(
     return spectra
 
 
-def _checked_if(x: ArrayLike, radar: Radar) -> NDArray[np.generic]:
-    samples = np.asarray(x)
-    if samples.ndim != 3 or samples.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
+def checked_chirps(what: str, values: ArrayLike, radar: Radar) -> NDArray[np.generic]:
+    """Values (chirp, rx, sample or range) as an array; InputError if they are none of the radar."""
+    chirps, needed = np.asarray(values), (radar.n_rx, radar.samples_per_chirp)
+    if chirps.ndim != 3 or chirps.shape[1:] != needed:
         raise InputError(
-            f"IF samples have shape {samples.shape}; radar '{radar.name}' needs "
-            f"(chirp, rx, sample) = (any, {radar.n_rx}, {radar.samples_per_chirp})"
+            f"{what} have shape {chirps.shape}; radar '{radar.name}' needs (chirp, rx, "
+            f"{'sample' if what == 'IF samples' else 'range'}) = (any, {needed[0]}, {needed[1]})"
         )
-    if samples.dtype.kind not in "fc":
-        raise InputError(f"IF samples are of type {samples.dtype}; they must be complex numbers")
-    return samples
+    if chirps.dtype.kind not in "fc":
+        raise InputError(f"{what} are of type {chirps.dtype}; they must be complex numbers")
+    return chirps
 
 
 def complex_kind(values: NDArray[np.generic]) -> type[np.complex64] | type[np.complex128]:

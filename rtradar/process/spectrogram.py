@@ -25,7 +25,7 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.process.clutter import ClutterRemoval
 from rtradar.process.power_maps import without_copies
-from rtradar.process.spectra import complex_kind
+from rtradar.process.spectra import checked_chirps, complex_kind
 from rtradar.process.window_functions import DEFAULT_WINDOWS, WindowFunctions, weights
 from rtradar.radar import Radar
 
@@ -179,9 +179,9 @@ class SlidingSpectrogram:
                 f"spectrogram: channel = {channel}; radar '{radar.name}' has channels 0 to "
                 f"{radar.n_channels - 1}"
             )
-        self._radar, self._window, self._removal = radar, window, removal or ClutterRemoval(radar)
-        self._window_functions = window_functions
+        self._radar, self._window = radar, window
         self._tx, self._rx = divmod(channel, radar.n_rx)
+        self._own = self._tx, removal or ClutterRemoval(radar), window_functions
         self._hop = _hop(radar, self._tx, window, overlap)
         self._chirps = 0  # pushed so far
         self._start = 0  # cycle that the next window begins with, and the first of those held
@@ -206,19 +206,13 @@ class SlidingSpectrogram:
         InputError
             Where the shape does not fit the radar.
         """
-        block, radar = np.asarray(spectra), self._radar
-        if block.ndim != 3 or block.shape[1:] != (radar.n_rx, radar.samples_per_chirp):
-            raise InputError(
-                f"SlidingSpectrogram: spectra have shape {block.shape}; radar '{radar.name}' needs "
-                f"(chirp, rx, range) = (any, {radar.n_rx}, {radar.samples_per_chirp})"
-            )
+        radar = self._radar
+        block = checked_chirps("SlidingSpectrogram: spectra", spectra, radar)
         new = block[(self._tx - self._chirps) % radar.n_tx :: radar.n_tx, self._rx]
         self._chirps += len(block)
         cycles = np.concatenate([self._held, new.astype(np.complex64, copy=False)])
         starts = np.arange(0, len(cycles) - self._window + 1, self._hop)
-        power = _columns(
-            cycles, starts, self._window, radar, self._tx, self._removal, self._window_functions
-        )
+        power = _columns(cycles, starts, self._window, radar, *self._own)
         times = _times(self._start + starts, radar, self._tx, self._window)
         # The hop is at most the window, so no more goes than is here.
         gone = len(starts) * self._hop

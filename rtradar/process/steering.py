@@ -1,10 +1,7 @@
 """The two virtual lines of the cross, and the phases by which they measure a direction.
 
-An echo that reaches Rx j from Tx i over L_ij metres lies in its range bin with the phase
-2 pi f L_ij / c, f the middle of the sweep. Tx and Rx of the y-line are at (0, t, 0) and (0, q, 0)
-about the radar, so the path to a point P at range r contains the square root of
-|P|^2 - 2 t P_y + t^2: it depends on the sine u = P_y / r alone and not on the elevation. The z-line
-measures w = P_z / r alike. Both sines are exact at any range, near field included.
+The path :eq:`near-field` over the elements of the y-line depends on the sine u = y / r alone and
+not on the elevation; the z-line measures w = z / r alike. Both are exact at any range.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ import numpy as np
 
 from rtradar.antenna import Antenna
 from rtradar.errors import InputError
-from rtradar.system.checks import brief
+from rtradar.system.checks import brief, check_keys
 
 if TYPE_CHECKING:
     from rtradar.radar.radar import Radar
@@ -133,8 +133,7 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         r.carrier_step_hz is None
         or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz),
         f"carrier_step_hz = {brief(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
-        "Hz wide (samples_per_chirp / chirp_duration_s), so carriers must be at least that far "
-        "apart",
+        "Hz wide (samples_per_chirp / chirp_duration_s), the least between carriers",
     )
     yield (
         -r.tx_offset_hz[0] < r.start_frequency_hz,
@@ -179,7 +178,8 @@ def checked_fields(values: Mapping[str, Any]) -> dict[str, Any]:
         value = values[field]
         if rule is _ANTENNA and isinstance(value, Mapping):
             try:
-                value = Antenna.of(value)
+                check_keys("antenna: ", value, (), tuple(vars(Antenna())))
+                value = Antenna(**value)
             except InputError as error:
                 raise InputError(f"{radar}: {field}: {error}") from None
         if not rule.allows(value):

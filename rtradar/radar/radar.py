@@ -75,20 +75,6 @@ class Radar:
     ------
     InputError
         Where a value has no physical meaning.
-
-    Notes
-    -----
-    Derived quantities, which are properties; units are in their names.
-
-    - waveform: `centre_frequency_hz`, `wavelength_m`, `start_wavelength_m`, `slope_hz_per_s`,
-      `sample_rate_hz`, `occupied_bandwidth_hz`, `receiver_rate_hz`
-    - array: `n_tx`, `n_rx`, `n_channels`, `tx` and `rx` [m], `rx_of_tx`
-    - schedule: `at_once`, `cycle_duration_s`, `chirp_interval_s`, `tx_delay_s`, `tx_offset_hz`,
-      `n_doppler_bands`, `cycles_per_frame`, `hop_cycles`, `chirps_per_frame`
-    - limits: `range_bin_m`, `max_range_m`, `velocity_bin_mps`, `max_velocity_mps`,
-      `angle_resolution_deg`, `max_angle_deg`
-    - axes: `range_m`; `velocity_mps`, `chirp_times` [s] and `window_times` [s] are methods
-    - powers: `watts_per_m2` and `noise_power_w`
     """
 
     name: str = "custom"

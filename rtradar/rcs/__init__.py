@@ -19,7 +19,7 @@ __all__ = ["ellipsoid", "ellipsoid_radii", "sphere"]
 def ellipsoid(
     a: ArrayLike, b: ArrayLike, c: ArrayLike, theta: ArrayLike, phi: ArrayLike
 ) -> NDArray[np.float64]:
-    """Monostatic radar cross-section of a conducting ellipsoid, far away, by geometric optics.
+    """Monostatic radar cross-section of a conducting ellipsoid, far away (:eq:`rcs-ellipsoid`).
 
     Parameters
     ----------
@@ -33,7 +33,8 @@ def ellipsoid(
     Returns
     -------
     ndarray of float64
-        Cross-section [m^2], pi R1 R2 with the principal radii of curvature at the specular point.
+        Cross-section [m^2] by geometric optics, pi R1 R2 with the principal radii of curvature at
+        the specular point.
 
     Raises
     ------
@@ -46,8 +47,6 @@ def ellipsoid(
     cos^2(theta))^2, from Mahafza, *Radar Systems Analysis and Design Using MATLAB*, eq. 2.39. Code
     published with the paper writes c cos^2(theta) in the denominator, whose unit does not fit and
     which is 14 to 26 dB low end-on.
-
-    Equation :eq:`rcs-ellipsoid` of the theory page.
     """
     a, b, c, theta, phi = (np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
     if not all((axis > 0).all() for axis in (a, b, c)):
@@ -84,9 +83,7 @@ def ellipsoid_radii(
     -----
     The inverse of the shape operator on the tangent plane is the Hessian of the support function
     h(n) = sqrt(n . A^2 n); its trace and determinant there are (tr A^2 - n.A^4 n / h^2) / h and
-    (abc)^2 / h^4.
-
-    Equation :eq:`radii` of the theory page.
+    (abc)^2 / h^4 (:eq:`radii`).
     """
     a, b, c, theta, phi = np.broadcast_arrays(
         *(np.asarray(value, dtype=np.float64) for value in (a, b, c, theta, phi))
@@ -115,8 +112,8 @@ def sphere(
     radius, frequency : array_like
         Radius of the sphere [m], and frequency of the wave [Hz]; the two broadcast.
     method : {"go", "po", "mie"}
-        Geometric optics: sqrt(pi) a exp(2jka). Physical optics: the closed form of its integral
-        over the lit half. Mie: the exact series.
+        Geometric optics (:eq:`sphere-go`), physical optics, the closed form of its integral over
+        the lit half (:eq:`sphere-po`), or Mie's exact series (:eq:`sphere-mie`).
 
     Returns
     -------
@@ -131,9 +128,6 @@ def sphere(
     Notes
     -----
     Mie series of a conductor: Harrington, *Time-Harmonic Electromagnetic Fields*, section 6-9.
-    Physical optics: F = jk / sqrt(pi) times the integral of (n.s) exp(2jk s.r) over the lit half.
-
-    Equations :eq:`sphere-go`, :eq:`sphere-po` and :eq:`sphere-mie` of the theory page.
     """
     radius, frequency = np.broadcast_arrays(
         np.asarray(radius, np.float64), np.asarray(frequency, np.float64)

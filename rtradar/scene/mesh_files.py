@@ -106,14 +106,9 @@ class Triangles:
         return float(np.linalg.norm(nearest - point, axis=1).min())
 
 
-def meshes_folder() -> Path:
-    """Find the meshes of rtradar."""
-    return shipped_folder("meshes")
-
-
 def mesh_names() -> tuple[str, ...]:
     """List the meshes that come with rtradar."""
-    return tuple(sorted(file.stem for file in meshes_folder().glob("*.ply")))
+    return tuple(sorted(file.stem for file in shipped_folder("meshes").glob("*.ply")))
 
 
 def read_mesh(path: Path) -> Triangles:
@@ -183,10 +178,7 @@ def _check_glb_header(where: str, content: bytes) -> None:
     # An accessor without data is filled with as many zeros as it names, and one whose rows overlap
     # grows.
     if count > _NUMBERS_A_FACE * MOST_FACES:
-        raise InputError(
-            f"{where} promises more data than the {MOST_FACES} triangles that are allowed could "
-            "have"
-        )
+        raise InputError(f"{where} promises more data than the {MOST_FACES} triangles allowed have")
 
 
 def _in_ascii(content: bytes, ending: str) -> bytes:
@@ -293,8 +285,7 @@ def checked_triangles(
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
         raise InputError(
-            f"{where}: its triangles do not agree which side is outside; make their normals "
-            "consistent"
+            f"{where}: its triangles do not agree which side is outside; mend their normals"
         )
     if closed:
         faces = _outward(where, mesh)

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from rtradar.errors import InputError
 from rtradar.scene.materials import Material
-from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
+from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, read_mesh
 from rtradar.system.checks import Vector, brief, check_number, check_text, check_vector
+from rtradar.system.files import shipped_folder
 
 ROOM_SIDES = ("near", "far", "right", "left", "floor", "ceiling")
 """Sides at the least x, largest x, least y, largest y, z = 0 and the top."""
@@ -89,8 +90,7 @@ class Wall:
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
                 raise InputError(
-                    f"{where}: {key} = {brief(getattr(self, key))}; an edge must be {_SHORTEST_M} "
-                    "m long or more"
+                    f"{where}: {key} = {brief(getattr(self, key))}; the least is {_SHORTEST_M} m"
                 )
         u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
         if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):
@@ -290,7 +290,7 @@ class Furniture:
     @property
     def path(self) -> Path:
         """File of the mesh."""
-        return meshes_folder() / f"{self.mesh}.ply" if self._built_in else Path(self.mesh)
+        return shipped_folder("meshes") / f"{self.mesh}.ply" if self._built_in else Path(self.mesh)
 
     def triangles(self) -> Triangles:
         """Read the mesh, and move it to its position in the scene.

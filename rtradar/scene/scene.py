@@ -136,7 +136,15 @@ class Scene:
             Where there is no such scene, the file is not TOML, or anything in it has no meaning;
             the message names the file, the table and key, the value, and what is allowed.
         """
-        return load_scene(source)
+        path = Path(source) if Path(source).suffix == ".toml" else _named(str(source))
+        table = read_toml(path, "scene", "give a TOML file or the name of a scene")
+        try:
+            scene = cls(**_fields(table, path))
+            for piece in scene.furniture:
+                piece.triangles()  # refuses a mesh that cannot be used
+        except InputError as error:
+            raise InputError(f"scene file '{path}': {error}") from None
+        return scene
 
     @property
     def materials(self) -> tuple[Material, ...]:
@@ -197,30 +205,16 @@ class Scene:
         return placed
 
 
-def scenes_folder() -> Path:
-    """Find the scenes of rtradar."""
-    return shipped_folder("scenes")
-
-
-def load_scene(source: str | Path) -> Scene:
-    """Load a scene by its name under ``scenes/``, or from a TOML file (`Scene.load`)."""
-    path = Path(source) if Path(source).suffix == ".toml" else _named(str(source))
-    table = read_toml(path, "scene", "give a TOML file or the name of a scene")
-    try:
-        scene = Scene(**_fields(table, path))
-        for piece in scene.furniture:
-            piece.triangles()  # refuses a mesh that cannot be used
-    except InputError as error:
-        raise InputError(f"scene file '{path}': {error}") from None
-    return scene
+def scene_files() -> dict[str, Path]:
+    """Find the scenes that come with rtradar, by name."""
+    return {file.stem: file for file in sorted(shipped_folder("scenes").glob("*.toml"))}
 
 
 def _named(name: str) -> Path:
-    known = {file.stem: file for file in sorted(scenes_folder().glob("*.toml"))}
+    known = scene_files()
     if name not in known:
         raise InputError(
-            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or the path of a TOML "
-            "file"
+            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or a TOML file"
         )
     return known[name]
 
@@ -307,8 +301,7 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
         raise InputError(f"{where}mesh = {brief(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
     if inside(folder, text) is None:
         raise InputError(
-            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put the mesh beside "
-            "it or below"
+            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put it there"
         )
     return folder / text
 

@@ -23,7 +23,7 @@ Polarization = Literal["te", "tm"]
 def reflection(
     eta: ArrayLike, cos_incidence: ArrayLike, polarization: Polarization
 ) -> NDArray[np.complex128]:
-    """Compute the Fresnel reflection of a plane wave in air by a half-space.
+    """Compute the Fresnel reflection of a plane wave in air by a half-space (:eq:`half-space`).
 
     Parameters
     ----------
@@ -43,10 +43,6 @@ def reflection(
     ------
     InputError
         Where a cosine, a permittivity or the polarisation has no meaning.
-
-    Notes
-    -----
-    Equation :eq:`half-space` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
     return np.where(conducts, _perfect(polarization), _face(eta, cosine, polarization)[0])
@@ -61,7 +57,7 @@ def slab(
 ) -> tuple[NDArray[np.complex128], NDArray[np.complex128]]:
     """Compute the reflection and transmission of a plane wave by a slab in air.
 
-    All reflections inside the slab are summed.
+    All reflections inside the slab are summed (:eq:`slab`).
 
     Parameters
     ----------
@@ -89,10 +85,6 @@ def slab(
     ------
     InputError
         Where a value has no meaning.
-
-    Notes
-    -----
-    Equation :eq:`slab` of the theory page.
     """
     eta, cosine, conducts = _checked(eta, cos_incidence, polarization)
     for key, values in (("thickness_m", thickness_m), ("frequency_hz", frequency_hz)):

@@ -16,7 +16,7 @@ from rtradar.scatter import build_model
 from rtradar.scatter.inside_walls import Inside
 from rtradar.scatter.link_budget import link_budget
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene import scenes_folder
+from rtradar.scene.scene import scene_files
 
 RADAR = rt.Radar(
     name="small",
@@ -146,7 +146,7 @@ def test_the_summary_tells(tmp_path: Path) -> None:
     assert "head" not in told["message"]
 
 
-@pytest.mark.parametrize("name", sorted(path.stem for path in scenes_folder().glob("*.toml")))
+@pytest.mark.parametrize("name", scene_files())
 @pytest.mark.parametrize("activity", ["walk", "kick", "punch", "jumping_jack"])
 def test_nobody_stands_in_anything_in_the_scenes_that_come_along(name: str, activity: str) -> None:
     scene = Scene.load(name)

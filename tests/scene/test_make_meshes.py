@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from rtradar.scene.mesh_files import mesh_names, meshes_folder, read_mesh
+from rtradar.scene.mesh_files import mesh_names, read_mesh
+from rtradar.system.files import shipped_folder
 
 SHEETS = ("dihedral", "trihedral")
 FURNITURE = [name for name in mesh_names() if name not in SHEETS]
@@ -18,7 +19,9 @@ FURNITURE = [name for name in mesh_names() if name not in SHEETS]
 
 @pytest.fixture(scope="module")
 def make() -> ModuleType:
-    found = importlib.util.spec_from_file_location("make_meshes", meshes_folder() / "make.py")
+    found = importlib.util.spec_from_file_location(
+        "make_meshes", shipped_folder("meshes") / "make.py"
+    )
     assert found is not None
     assert found.loader is not None
     module = importlib.util.module_from_spec(found)
@@ -31,14 +34,14 @@ def test_made_again_they_are_the_same(make: ModuleType, tmp_path: Path) -> None:
     assert sorted(file.stem for file in tmp_path.iterdir()) == list(mesh_names())
     for name in mesh_names():
         assert (tmp_path / f"{name}.ply").read_bytes() == (
-            meshes_folder() / f"{name}.ply"
+            shipped_folder("meshes") / f"{name}.ply"
         ).read_bytes(), name
 
 
 @pytest.mark.parametrize("name", FURNITURE)
 def test_furniture_is_closed_with_normals_outward(name: str) -> None:
     # By trimesh alone, as the file stands.
-    mesh = trimesh.load_mesh(meshes_folder() / f"{name}.ply", process=False)
+    mesh = trimesh.load_mesh(shipped_folder("meshes") / f"{name}.ply", process=False)
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.volume > 0
@@ -52,14 +55,14 @@ def test_furniture_is_closed_with_normals_outward(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name in FURNITURE if name not in ("door", "radiator")])
 def test_furniture_stands_centred_on_the_floor(name: str) -> None:
-    low, high = trimesh.load_mesh(meshes_folder() / f"{name}.ply", process=False).bounds
+    low, high = trimesh.load_mesh(shipped_folder("meshes") / f"{name}.ply", process=False).bounds
     assert low[2] == 0
     # Handles and seats stand out by 3 cm.
     np.testing.assert_allclose((low + high)[:2] / 2, 0, atol=0.03)
 
 
 def test_volumes_by_hand(make: ModuleType) -> None:
-    tub = read_mesh(meshes_folder() / "bathtub.ply")
+    tub = read_mesh(shipped_folder("meshes") / "bathtub.ply")
     assert trimesh.Trimesh(tub.vertices, tub.faces).volume == pytest.approx(
         0.75 * 1.7 * 0.58 - 0.61 * 1.54 * 0.44
     )
@@ -71,7 +74,7 @@ def test_volumes_by_hand(make: ModuleType) -> None:
 
 @pytest.mark.parametrize("name", SHEETS)
 def test_corner_reflectors(name: str) -> None:
-    mesh = read_mesh(meshes_folder() / f"{name}.ply")
+    mesh = read_mesh(shipped_folder("meshes") / f"{name}.ply")
     assert not mesh.closed
     a, b, c = (mesh.corners[:, k] for k in range(3))
     normals = np.cross(b - a, c - a)

@@ -15,7 +15,8 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.scene import mesh_files
-from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, meshes_folder, read_mesh
+from rtradar.scene.mesh_files import MESH_ENDINGS, Triangles, mesh_names, read_mesh
+from rtradar.system.files import shipped_folder
 
 
 def cube() -> trimesh.Trimesh:
@@ -367,7 +368,7 @@ def test_distance_to_a_mesh(tmp_path: Path) -> None:
         ((0.49, 0, 0), 0.0),
     ):
         assert mesh.distance_m(np.array(point, dtype=float)) == pytest.approx(distance, abs=1e-12)
-    sheet = read_mesh(meshes_folder() / "trihedral.ply")
+    sheet = read_mesh(shipped_folder("meshes") / "trihedral.ply")
     assert sheet.distance_m(np.array([0.0, 0.0, 0.0])) == pytest.approx(0.0, abs=1e-12)
     assert sheet.distance_m(np.array([-2.0, 0.0, 0.0])) == pytest.approx(2.0)
 

@@ -14,7 +14,7 @@ import rtradar
 from rtradar.errors import InputError
 from rtradar.radar import Radar
 from rtradar.scene import Furniture, Scene, Wall, material
-from rtradar.scene.scene import scenes_folder
+from rtradar.scene.scene import scene_files
 
 
 def refusal(source: str | Path) -> str:
@@ -37,7 +37,7 @@ def test_free_space_is_the_default() -> None:
     assert "nothing but the person" in scene.description
 
 
-@pytest.mark.parametrize("file", sorted(scenes_folder().glob("*.toml")), ids=lambda file: file.stem)
+@pytest.mark.parametrize("file", scene_files().values(), ids=scene_files())
 def test_every_scene_that_comes_along_loads_by_its_name(file: Path) -> None:
     assert Scene.load(file.stem) == Scene.load(file) == Scene.load(str(file))
 

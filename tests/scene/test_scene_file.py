@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from rtradar.errors import InputError
 from rtradar.scene import Scene
-from rtradar.scene.scene import scenes_folder
+from rtradar.scene.scene import scene_files
 
 ROOM = """
 [room]
@@ -333,7 +333,7 @@ def test_any_table_gives_a_scene_or_one_line(tmp_path: Path, table: dict[str, An
 )
 @given(data=st.data())
 def test_any_damage_gives_a_scene_or_one_line(tmp_path: Path, data: st.DataObject) -> None:
-    whole = bytearray((scenes_folder() / "bathroom.toml").read_bytes())
+    whole = bytearray(scene_files()["bathroom"].read_bytes())
     for _ in range(data.draw(st.integers(1, 5))):
         at = data.draw(st.integers(0, len(whole) - 1))
         whole[at : at + data.draw(st.integers(0, 6))] = data.draw(st.binary(max_size=4))

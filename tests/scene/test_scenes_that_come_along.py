@@ -8,9 +8,9 @@ import pytest
 from rtradar.radar import Radar
 from rtradar.scene import Scene
 from rtradar.scene.objects import ROOM_SIDES
-from rtradar.scene.scene import scenes_folder
+from rtradar.scene.scene import scene_files
 
-NAMES = sorted(file.stem for file in scenes_folder().glob("*.toml"))
+NAMES = list(scene_files())
 ROOMS = [name for name in NAMES if Scene.load(name).walls]
 
 # Walks keep within 1.5 m of the origin along x; an arm reaches 0.4 m ahead and 0.5 m to the side.

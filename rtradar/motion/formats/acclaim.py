@@ -96,13 +96,11 @@ def load_skeleton(path: Path) -> Skeleton:
                     _hierarchy_line(words, bones, text)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
         raise InputError(
-            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be cut "
-            "off"
+            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); it may be cut off"
         )
     if not bones["root"].dof:
         raise InputError(
-            f"{path}: the root has no order; give TX TY TZ RX RY RZ under :root, in the order of "
-            "the AMC"
+            f"{path}: the root has no order; give TX TY TZ RX RY RZ in the AMC's order"
         )
     if inside:
         raise text.fail("the hierarchy does not end; the file may be cut off")
@@ -151,8 +149,7 @@ def _bone_line(
         bone.dof = tuple(word.lower() for word in words[1:])
         if not set(bone.dof) <= {"rx", "ry", "rz"}:
             raise text.fail(
-                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported (rigid "
-                "bones)"
+                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported"
             )
 
 
@@ -161,8 +158,7 @@ def _check_bone(bone: _Bone, text: TextFile) -> None:
         raise text.fail("a bone without a name ends here")
     if bone.name in ASF_JOINTS and not bone.length * np.abs(bone.direction).max() > 0:
         raise text.fail(
-            f"bone {bone.name!r} has no length; a body part hangs on it, give its length and "
-            "direction",
+            f"bone {bone.name!r} has no length; a body part hangs on it, give it one",
             bone.line,
         )
 
@@ -305,8 +301,7 @@ def _frames(text: TextFile, skeleton: Skeleton) -> Iterator[tuple[dict[str, list
             raise text.fail(f"{name[:40]!r} before the first frame number; this is not an AMC file")
         elif name not in widths:
             raise text.fail(
-                f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of this "
-                "subject"
+                f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give its ASF"
             )
         elif name in values:
             raise text.fail(f"bone {name!r} is there twice in frame {frame}")
