@@ -68,7 +68,7 @@ def text_of(module: str, name: str) -> str:
 
 
 def page(package: str) -> str:
-    """The page of a package; what stands on the first page is not told again."""
+    """The page of a package; what is on the first page is not repeated."""
     first = {id(thing) for thing in public("rtradar").values()} if package != "rtradar" else set()
     heading = f"{PACKAGES[package]}: {package}"
     lines = [heading, "=" * len(heading), "", f".. automodule:: {package}", "   :no-members:", ""]

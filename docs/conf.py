@@ -45,7 +45,7 @@ sphinx_gallery_conf = {
     "min_reported_time": 3600,
     "reset_modules": (),
 }
-# Gallery scripts write where they are told; here not into the sources.
+# Gallery scripts write into the folder that is named here, not into the sources.
 os.environ.setdefault("RTRADAR_GALLERY_OUT", str(HERE.parent / "out" / "gallery"))
 os.environ.pop("RTRADAR_MOCAP", None)
 

@@ -77,8 +77,8 @@ def summary(name: str) -> str:
     """First line of what a package says about itself."""
     folder = ROOT / "rtradar" / name
     source = folder / "__init__.py" if folder.is_dir() else folder.with_suffix(".py")
-    told = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) or ""
-    return told.splitlines()[0].replace("`", "")
+    text = ast.get_docstring(ast.parse(source.read_text(encoding="utf-8"))) or ""
+    return text.splitlines()[0].replace("`", "")
 
 
 def drawing() -> str:
