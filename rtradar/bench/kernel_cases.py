@@ -115,13 +115,6 @@ def _os_cfar(k: Any) -> Calls:
     return call, lambda: k.os_cfar_reference(power, thresholds, ranks, 2, 6)
 
 
-@kernel_case("cfar.ca_cfar_rows", "cell-averaging CFAR of a map of 256 x 133", 0)
-def _ca_cfar(k: Any) -> Calls:
-    power, _, _, counts = _map()
-    given, mask = (power, power * (counts / np.float32(4)), 2, 6), np.empty((256, 133), np.bool_)
-    return filled(k.ca_cfar_rows, 0, 256, *given, out=(mask,)), lambda: k.ca_cfar_reference(*given)
-
-
 @kernel_case("angles.beam_power", "beams of 64 cells on a line of 48, 200 sines", 1e-5)
 def _beam_power(k: Any) -> Calls:
     values, still, place = _spectra(64, 3, 96), _spectra(64, 96), np.arange(64) % 8

@@ -306,12 +306,3 @@ def _delayed_lengths(k: Any) -> Calls:
     given = antennas, tx, points, bodies, delays, 8 + rng.random((100, 8, 273))
     call = filled(k.delayed_lengths, *given, out=(np.empty((100, 8, 273)),))
     return call, lambda: k.delayed_lengths_reference(*given)
-
-
-@kernel_case("scatter.rooms.add_fading", "IF of 100 chirps, 8 receivers, 256 samples", 1e-6)
-def _fading(k: Any) -> Calls:
-    rng = np.random.default_rng(0)
-    pair = rng.normal(size=(2, 12, 8, 256, 2)).astype(np.float32).view(np.complex64)[..., 0]
-    given = *pair, rng.random(100, dtype=np.float32), rng.integers(0, 12, 100)
-    out = (np.empty((100, 8, 256), dtype=np.complex64),)
-    return filled(k.add_fading, *given, out=out, adds=True), lambda: k.add_fading_reference(*given)

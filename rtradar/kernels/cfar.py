@@ -1,4 +1,4 @@
-"""Masks of CFAR detectors on a map (range, velocity), for rows from begin to end.
+"""Mask of the order-statistic CFAR on a map (range, velocity), for rows from begin to end.
 
 The training cells of a cell are a square ring: half-width ``outer`` without half-width ``guard``,
 cut off at the edges of the map.
@@ -70,46 +70,10 @@ def os_cfar_rows(begin, end, cells, thresholds, ranks, counts, guard, outer, mas
             mask[i, j] = missing <= 0
 
 
-@compiled()
-def ca_cfar_rows(begin, end, cells, sums_wanted, guard, outer, mask):
-    """Mark the cells whose training cells sum to less than the cell allows.
-
-    Summed afresh for each cell: the rounding of running sums would drown weak cells beside a strong
-    one.
-    """
-    n_range, n_velocity = cells.shape
-    for i in range(begin, end):
-        top, bottom = max(i - outer, 0), min(i + outer, n_range - 1)
-        for j in range(n_velocity):
-            left, right = max(j - outer, 0), min(j + outer, n_velocity - 1)
-            inner_left, inner_right = max(j - guard, 0), min(j + guard, n_velocity - 1)
-            total = 0.0
-            for a in range(top, bottom + 1):
-                if a < i - guard or a > i + guard:
-                    for b in range(left, right + 1):
-                        total += cells[a, b]
-                else:
-                    for b in range(left, inner_left):
-                        total += cells[a, b]
-                    for b in range(inner_right + 1, right + 1):
-                        total += cells[a, b]
-            mask[i, j] = total < sums_wanted[i, j]
-
-
-def _training_cells(cells, guard, outer):
-    """Training cells (range, velocity, cell); NaN beyond the map."""
+def os_cfar_reference(cells, thresholds, ranks, guard, outer):
+    """Mask of `os_cfar_rows`, by NumPy."""
     padded, width = np.pad(cells, outer, constant_values=np.nan), 2 * outer + 1
     ring = np.ones((width, width), dtype=bool)
     ring[outer - guard : outer + guard + 1, outer - guard : outer + guard + 1] = False
-    return np.lib.stride_tricks.sliding_window_view(padded, (width, width))[:, :, ring]
-
-
-def os_cfar_reference(cells, thresholds, ranks, guard, outer):
-    """Mask of `os_cfar_rows`, by NumPy."""
-    below = _training_cells(cells, guard, outer) < thresholds[..., None]
-    return below.sum(axis=2) >= ranks
-
-
-def ca_cfar_reference(cells, sums_wanted, guard, outer):
-    """Mask of `ca_cfar_rows`, by NumPy."""
-    return np.nansum(_training_cells(cells, guard, outer), axis=2, dtype=float) < sums_wanted
+    training = np.lib.stride_tricks.sliding_window_view(padded, (width, width))[:, :, ring]
+    return (training < thresholds[..., None]).sum(axis=2) >= ranks

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from rtradar.echoes import Echoes
 from rtradar.kernels.elementary import smoothstep
-from rtradar.kernels.scatter.rooms import Shadow, add_fading
+from rtradar.kernels.scatter.rooms import Shadow
 from rtradar.radar import Radar
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.signal.synthesis import synthesize
@@ -129,7 +129,8 @@ class RoomIf:
                 for first, second in ((self._whole, before), (before, after))
             )
             some = samples[inside[0] : inside[-1] + 1]
-            add_fading(kept, changed, fraction.astype(np.float32), tx[inside], some)
+            some += kept[tx[inside]]
+            some += fraction.astype(np.float32)[:, None, None] * changed[tx[inside]]
 
     def _occluded(self, keyframe: int) -> _Samples:
         """IF of one cycle of what the body occludes at a keyframe, (tx, rx, sample)."""

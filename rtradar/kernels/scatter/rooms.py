@@ -1,4 +1,4 @@
-"""Kernels of rooms: amplitudes and lengths of echoes over walls, and the fading of clutter."""
+"""Kernels of rooms: amplitudes and lengths of echoes over walls; the record of a shadow."""
 
 from __future__ import annotations
 
@@ -229,24 +229,3 @@ class Shadow(NamedTuple):
 
     echo: Indices
     fraction: Array
-
-
-@compiled(parallel=True)
-def add_fading(kept, changed, fraction, tx, out):
-    """Add ``kept + fraction * changed`` to IF samples ``out (chirp, rx, sample)``.
-
-    ``kept`` and ``changed (tx, rx, sample)`` are those of one cycle, ``tx (chirp,)`` says which of
-    them is meant, and ``fraction (chirp,)`` how much of the change has come.
-    """
-    for chirp in prange(len(out)):
-        own, more, part = kept[tx[chirp]], changed[tx[chirp]], fraction[chirp]
-        for receiver in range(out.shape[1]):
-            for sample in range(out.shape[2]):
-                out[chirp, receiver, sample] += (
-                    own[receiver, sample] + part * more[receiver, sample]
-                )
-
-
-def add_fading_reference(kept, changed, fraction, tx):
-    """What `add_fading` adds, in plain NumPy."""
-    return kept[tx] + fraction[:, None, None] * changed[tx]
