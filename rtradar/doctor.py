@@ -10,7 +10,6 @@ import sys
 import warnings
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from rtradar.errors import BackendError
 from rtradar.kernels.jit import CacheWarning, try_cache
@@ -57,10 +56,6 @@ class DoctorReport:
     def exit_status(self) -> int:
         """0 where a backend works, else 1."""
         return 0 if self.chosen else 1
-
-    def as_dict(self) -> dict[str, Any]:
-        """The fields by their names."""
-        return dataclasses.asdict(self)
 
 
 def examine() -> DoctorReport:
@@ -169,7 +164,7 @@ def report(json_path: str | Path | None = None) -> int:
     found = examine()
     print(report_text(found))
     if json_path is not None:
-        write_json(json_path, found.as_dict())
+        write_json(json_path, dataclasses.asdict(found))
     return found.exit_status
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
@@ -105,9 +106,9 @@ def test_the_report_goes_to_the_terminal_and_to_json(
     _machine(monkeypatch, LIBRARIES)
     assert doctor.report(tmp_path / "doctor.json") == 0
     assert "Cores" in capsys.readouterr().out
-    assert json.loads(
-        (tmp_path / "doctor.json").read_text()
-    ) == doctor.examine().as_dict() | _memory(tmp_path / "doctor.json")
+    assert json.loads((tmp_path / "doctor.json").read_text()) == dataclasses.asdict(
+        doctor.examine()
+    ) | _memory(tmp_path / "doctor.json")
     with pytest.raises(InputError, match="cannot write"):
         doctor.report(tmp_path / "no" / "doctor.json")
 

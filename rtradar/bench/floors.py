@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from rtradar.bench.runs import ELSEWHERE
 from rtradar.kernels.prime_factor_dft import prime_factor_dft
-from rtradar.process import angle_grid, measured_angles, measures_angle, window_cycles
+from rtradar.process import angle_grid, measured_angles, window_cycles
 from rtradar.radar import Radar
 
 _SAMPLE = 8  # bytes of a complex64
@@ -56,7 +56,7 @@ def measure_rates(radar: Radar) -> Rates:
     """Measure all, the best of some, with the lengths of this radar's transforms; takes seconds."""
     multiply_adds, dft = _multiply_adds(), prime_factor_dft(radar.cycles_per_frame)
     own_ffts = multiply_adds / dft.multiply_adds if dft is not None else 0.0
-    directions = len(angle_grid(radar)) if measures_angle(radar) else 1
+    directions = len(angle_grid(radar)) if measured_angles(radar) else 1
     return Rates(
         copied_bytes=_copied_bytes(),
         random_words=_random_words(),

@@ -90,9 +90,8 @@ class Ellipsoids:
     semi_axes: NDArray[np.float64]
 
     def __init__(self, centres: ArrayLike, frames: ArrayLike, semi_axes: ArrayLike) -> None:
-        centre_array, frame_array, axis_array = (
-            np.asarray(value, dtype=np.float64) for value in (centres, frames, semi_axes)
-        )
+        given = (centres, frames, semi_axes)
+        centre_array, frame_array, axis_array = (np.asarray(value, np.float64) for value in given)
         parts = centre_array.shape[:1]
         for name, array, shape in (
             ("centres", centre_array, (*parts, 3)),

@@ -145,12 +145,10 @@ def median_heading(headings: NDArray[np.float64]) -> NDArray[np.float64]:
 def walk_direction(
     roots: NDArray[np.float64], headings: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """Direction (2,) of a walk, or None where it is none.
+    """Direction (2,) of a walk by its roots (frame, 3), or None where it is none.
 
-    It is one where the root (frame, 3) gets at least `WALK_DISTANCE_M` from its first place, on a
-    path not longer than 1 / `WALK_STRAIGHTNESS` times the straight line to the farthest point,
-    along the ``headings`` (frame, 2) of the hips. The direction is that of the farthest point, so a
-    walk there and back counts, and goes there first.
+    The direction is that of the farthest point, so a walk there and back counts, and goes there
+    first.
     """
     away = roots[:, :2] - roots[0, :2]
     last = int(np.argmax(np.linalg.norm(away, axis=1)))

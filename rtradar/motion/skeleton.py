@@ -60,11 +60,10 @@ NODE_PARENTS: tuple[int, ...] = (-1, *(NODES.index(parent) for parent in NODE_PA
 
 @dataclass(frozen=True)
 class Convention:
-    """Joint names of one kind of skeleton by node, as `plain` gives them.
+    """Joint names of one kind of skeleton by node, as `plain` gives them; the first counts.
 
-    ``lowerback`` and ``upperback`` are not named: they are found along the chain from root to
-    thorax. The first name that is there counts. Where ``open_ended``, hands, head and toes may lack
-    an end and are then extended.
+    Nodes between root and thorax are found along the chain. Where ``open_ended``, hands, head and
+    toes may lack an end and are then extended.
     """
 
     name: str
@@ -154,11 +153,7 @@ class _Bone:
 
 
 def to_nodes(motion: Motion) -> Motion:
-    """Retarget a motion to the 22-node skeleton, a rigid tree whose 21 bones are the body parts.
-
-    An `InputError` is raised where the skeleton is of no known kind, naming the joint that is
-    missing, or a part would have no length.
-    """
+    """Retarget a motion to the 22 nodes; an `InputError` names a joint that is missing."""
     if motion.joints == NODES:
         return motion
     convention, joints = _recognise(motion)
@@ -175,9 +170,8 @@ def to_nodes(motion: Motion) -> Motion:
         bones["head"] = _extended(motion, bones["head"], joints["neck"], length)
     for node, parent in NODE_PARENT.items():
         if bones[node].length < MINIMUM_PART_M:
-            ends = " to ".join(
-                motion.joints[joints[end]] for end in (parent, node) if end in joints
-            )
+            known = [joints[end] for end in (parent, node) if end in joints]
+            ends = " to ".join(motion.joints[joint] for joint in known)
             raise InputError(
                 f"{motion.name}: the part that ends in {node!r} is {bones[node].length * 1e3:.3g} "
                 f"mm long ({ends}); every body part needs at least {MINIMUM_PART_M * 1e3:.0f} mm, "

@@ -22,7 +22,7 @@ from rtradar.process import (
     build_detector,
     cell_spectra,
     clutter_removal,
-    measures_angle,
+    measured_angles,
     power_map,
 )
 from rtradar.process.window_functions import DEFAULT_WINDOWS
@@ -163,7 +163,7 @@ class CloudMaker:
             with stages.time("cloud"):
                 self._rdt.push(mask, middle)
             angles = None
-            if measures_angle(radar):
+            if measured_angles(radar):
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
                     found = spatial_points(angles, radar, middle)

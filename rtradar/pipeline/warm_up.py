@@ -19,7 +19,7 @@ from rtradar.kernels.tone_sum import add_tones
 from rtradar.pipeline.capture import chirps_of
 from rtradar.pipeline.processing import frame_angles
 from rtradar.process import (
-    measures_angle,
+    measured_angles,
     os_cfar,
     power_map,
     range_azimuth,
@@ -43,7 +43,7 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
     frame = np.ones((radar.cycles_per_frame, radar.n_tx, radar.n_rx, 1), dtype=np.complex64)
     power_map(frame, radar)
     os_cfar(np.ones((16, 16), dtype=np.float32), looks=radar.n_channels)
-    if measures_angle(radar):
+    if measured_angles(radar):
         spectra = frame_angles(frame, np.arange(radar.cycles_per_frame)[None, :] == 0, radar)
         spatial_points(spectra, radar, 0.0)
         if spectra.y is not None:

@@ -25,7 +25,7 @@ from rtradar.process.power_maps import power_map
 from rtradar.process.range_time import SlidingRangeTime, range_time
 from rtradar.process.spectra import RangeDoppler, cell_spectra, range_doppler, range_spectrum
 from rtradar.process.spectrogram import SlidingSpectrogram, Spectrogram, spectrogram, window_cycles
-from rtradar.process.steering import measured_angles, measures_angle
+from rtradar.process.steering import measured_angles
 from rtradar.process.window_functions import WindowFunctions
 
 __all__ = [
@@ -51,7 +51,6 @@ __all__ = [
     "clutter_map_scale",
     "clutter_removal",
     "measured_angles",
-    "measures_angle",
     "os_cfar",
     "os_scale",
     "power_map",

@@ -241,5 +241,5 @@ def _scale_after(
 
 
 def _windows_apart(radar: Radar) -> int:
-    """Number of frames after which one shares no chirp with this one; both begin with a cycle."""
+    """Number of frames after which one shares no chirp with this one."""
     return math.ceil(radar.cycles_per_frame / radar.hop_cycles * (1 - 1e-12))

@@ -1,8 +1,7 @@
 """Micro-Doppler: short-time Fourier transform of one virtual channel over slow time.
 
-One channel is sampled once a TDM cycle, at the middle of its own chirp, so its slow-time rate is
-1 / cycle, and its Doppler axis ends where that of the range-Doppler map does. The paper transforms
-its first channel (section 3.2.3).
+One channel is sampled once a TDM cycle, at the middle of its own chirp. The paper transforms its
+first channel (section 3.2.3).
 
 The power of all range bins is summed, not their signals: neighbouring bins of a Hann-windowed range
 spectrum differ in phase by half a turn, so their signals cancel (over all bins, to nothing), and a

@@ -65,27 +65,12 @@ def virtual_lines(radar: Radar) -> tuple[Line | None, Line | None]:
     neither.
     """
     lines = _line(radar, 1), _line(radar, 2)
-    if not measures_angle(radar):
+    if lines == (None, None):
         raise InputError(
             f"angle: radar '{radar.name}' has no line of at least 2 channels; give a Tx and 2 Rx "
             "(or 2 Tx and an Rx) along y or z"
         )
     return lines
-
-
-def measures_angle(radar: Radar) -> bool:
-    """Whether there is a line of at least two channels.
-
-    Parameters
-    ----------
-    radar : Radar
-        Radar whose array counts.
-
-    Returns
-    -------
-    bool
-    """
-    return bool(measured_angles(radar))
 
 
 def measured_angles(radar: Radar) -> tuple[str, ...]:
@@ -107,11 +92,9 @@ def measured_angles(radar: Radar) -> tuple[str, ...]:
 
 
 def _line(radar: Radar, axis: int) -> Line | None:
-    on_line = [
-        np.arange(n) < along_y
-        for n, along_y in ((radar.n_tx, radar.tx_y), (len(radar.rx), radar.rx_y))
-    ]
-    tx_there, rx_there = on_line if axis == 1 else [~there for there in on_line]
+    tx_there, rx_there = np.arange(radar.n_tx) < radar.tx_y, np.arange(len(radar.rx)) < radar.rx_y
+    if axis == 2:
+        tx_there, rx_there = ~tx_there, ~rx_there
     tx, slot = np.nonzero(tx_there[:, None] & rx_there[radar.rx_of_tx])
     if len(tx) < 2:
         return None

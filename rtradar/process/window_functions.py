@@ -15,11 +15,10 @@ from rtradar.settings import RunSettings
 WindowName = str | tuple[str, float]
 """Name of a window function, or its name and its parameter."""
 
-_WITHOUT_PARAMETER = (
-    "barthann bartlett blackman blackmanharris bohman boxcar cosine flattop hamming hann nuttall "
-    "parzen taylor triang tukey"
+NAMES = (
+    *("barthann", "bartlett", "blackman", "blackmanharris", "bohman", "boxcar", "cosine"),
+    *("flattop", "hamming", "hann", "nuttall", "parzen", "taylor", "triang", "tukey"),
 )
-NAMES = tuple(_WITHOUT_PARAMETER.split())
 """Window functions that take no parameter, as `scipy.signal.get_window` names them."""
 
 PARAMETERS = {"chebwin": (45.0, 300.0), "kaiser": (0.0, 50.0)}
@@ -84,10 +83,9 @@ def hann(n: int) -> NDArray[np.float64]:
 
 
 def noise_bandwidth_bins(window: WindowName, n: int) -> float:
-    """Compute the equivalent noise bandwidth of a window function of n samples [bins].
+    """Compute n sum(w^2) / sum(w)^2, which is 1.5 for ``hann``.
 
-    The power of a tone, summed over all bins of its spectrum, is so many times its power in the
-    bin that it is in the middle of: n sum(w^2) / sum(w)^2, which is 1.5 for ``hann``.
+    It is the power of a tone, summed over its spectrum, over that in the bin of its peak.
     """
     return n * float(np.sum(weights(window, n) ** 2))
 
@@ -105,8 +103,7 @@ def _checked(window: Any, name: str) -> WindowName:
     if isinstance(window, str) and window in NAMES:
         return window
     if isinstance(window, list | tuple) and len(window) == 2 and window[0] in PARAMETERS:
-        least, most = PARAMETERS[window[0]]
-        value = window[1]
+        (least, most), value = PARAMETERS[window[0]], window[1]
         if isinstance(value, int | float) and least <= value <= most:
             return (str(window[0]), float(value))
     with_parameter = ", ".join(

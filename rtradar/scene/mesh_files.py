@@ -112,11 +112,7 @@ def mesh_names() -> tuple[str, ...]:
 
 
 def read_mesh(path: Path) -> Triangles:
-    """Read a mesh in the units of its file; it is kept, and read again only where the file changes.
-
-    An `InputError` is raised where the file cannot be read, is too large, has no triangles, a
-    vertex that is not finite, or faces that do not agree which side is outside.
-    """
+    """Read a mesh in the units of its file; it is kept, and read again where the file changes."""
     where = f"mesh '{path}'"
     if path.suffix.lower() not in MESH_ENDINGS:
         raise InputError(f"{where}: unknown kind of file; allowed: {', '.join(MESH_ENDINGS)}")
@@ -253,9 +249,7 @@ def checked_triangles(
 ) -> Triangles:
     """Check a mesh, merge equal vertices, remove empty triangles and wind closed parts outward.
 
-    Vertices may be in any unit; ``where`` begins the messages. An `InputError` is raised where
-    there are no triangles or too many, none has an area, a vertex is not finite or does not exist,
-    or faces do not agree which side is outside.
+    Vertices may be in any unit; ``where`` begins the messages of each `InputError`.
     """
     import trimesh  # slow to import
 

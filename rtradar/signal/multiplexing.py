@@ -60,10 +60,8 @@ def separate(
     ----------
     received : (row, rx, sample) complex
         Samples from `receive`, with noise.
-    radar : Radar
-        Radar whose multiplexing is undone.
-    first_chirp : int
-        Number of the first chirp in the capture.
+    radar, first_chirp
+        What they are for `receive`.
 
     Returns
     -------

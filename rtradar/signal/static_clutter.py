@@ -38,9 +38,8 @@ class MovingShadow(Protocol):
 class _Group(NamedTuple):
     """Objects whose amplitudes are given at the same frequencies, for one sum over all of them.
 
-    ``member (object,)`` says which objects belong to it, ``first (object,)`` where their echoes
-    begin in ``echoes``. A single echo, of a wall, is a group of its own: a person is before it
-    again and again, and its IF is kept.
+    ``member (object,)`` says which belong to it, ``first (object,)`` where their echoes begin. The
+    single echo of a wall is a group of its own, whose IF is kept: a person is often before it.
     """
 
     echoes: Echoes

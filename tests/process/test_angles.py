@@ -23,7 +23,7 @@ from rtradar.process.angles import (
 )
 from rtradar.process.spectra import cell_spectra
 from rtradar.process.steering import (
-    measures_angle,
+    measured_angles,
     range_walk,
     sine_grid,
     taper_weights,
@@ -235,11 +235,11 @@ def test_one_line_alone(channels: str) -> None:
 @pytest.mark.parametrize("array", [{"tx_y": 1, "rx_y": 2}, {"tx_y": 2, "rx_y": 1}], ids=str)
 def test_two_channels_are_a_line(array: dict[str, int]) -> None:
     radar = dataclasses.replace(SHORT, tx_z=0, rx_z=0, tx_spacing_wavelengths=0.5, **array)
-    assert measures_angle(radar)
+    assert measured_angles(radar)
     line = virtual_lines(radar)[0]
     assert line is not None
     np.testing.assert_allclose(np.diff(line.tx_m + line.rx_m), [C / 12e9 / 2], rtol=1e-9)
-    assert not measures_angle(dataclasses.replace(radar, tx_y=1, rx_y=1))
+    assert not measured_angles(dataclasses.replace(radar, tx_y=1, rx_y=1))
 
 
 def test_all_channels_give_the_angles_of_the_pairs() -> None:

@@ -8,6 +8,7 @@ rotation of a last joint is kept even where its end site has no length.
 from __future__ import annotations
 
 import itertools
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -56,9 +57,8 @@ class _Joint:
 def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
     """Read a BVH file; an `InputError` names the file and the line.
 
-    Position channels of joints below the root replace the joint's offset; they must be constant but
-    for the joint that carries the whole body (Bandai-Namco: ``Hips`` under a still ``joint_Root``),
-    which becomes the root. The unit is found from the size of the person where it is not given.
+    Position channels below the root replace the joint's offset and must be constant, but for the
+    joint that carries the body (Bandai-Namco: ``Hips`` under ``joint_Root``), which becomes root.
     """
     if skeleton is not None:
         raise InputError(f"{path}: a BVH file holds its own skeleton; leave {skeleton} out")
@@ -152,18 +152,18 @@ def _read_hierarchy(text: TextFile) -> list[_Joint]:
                 raise text.fail(f"OFFSET has {len(offset)} values; it needs three")
             joints[stack[-1]].offset = np.array(offset)
         elif key == "CHANNELS" and stack:
-            joints[stack[-1]].channels = _channel_names(words, text)
+            names = tuple(word.lower() for word in words[2:])
+            whole = words[1:2] == [str(len(names))] and len(set(names)) == len(names)
+            if not whole or not all(
+                re.fullmatch("[xyz](position|rotation)", name) for name in names
+            ):
+                raise text.fail(
+                    "CHANNELS needs a count and as many different Xposition ... Zrotation"
+                )
+            joints[stack[-1]].channels = names
         else:
             raise text.fail(f"{words[0][:40]!r} is not expected in a BVH hierarchy")
     raise text.fail("no MOTION; the file may be cut off")
-
-
-def _channel_names(words: list[str], text: TextFile) -> tuple[str, ...]:
-    names = tuple(word.lower() for word in words[2:])
-    allowed = {axis + kind for axis in "xyz" for kind in ("position", "rotation")}
-    if words[1:2] != [str(len(names))] or not set(names) <= allowed or len(set(names)) < len(names):
-        raise text.fail("CHANNELS needs a count and as many different Xposition ... Zrotation")
-    return names
 
 
 def _read_header(text: TextFile) -> tuple[int, float]:
@@ -255,10 +255,7 @@ def _chain(joints: list[_Joint], joint: int) -> list[int]:
 
 
 def _carrier(joints: list[_Joint], values: NDArray[np.float64]) -> int:
-    """Find the joint that carries the body.
-
-    It is the last joint of an unbranched chain from the root whose own position moves.
-    """
+    """Find the last joint of an unbranched chain from the root whose own position moves."""
     top, carrier = 0, 0
     while True:
         children = [j for j, joint in enumerate(joints) if joint.parent == top]

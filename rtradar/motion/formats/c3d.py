@@ -40,11 +40,10 @@ _SHANK_M = (0.2, 0.7)
 
 @dataclass(frozen=True)
 class Markers:
-    """Recorded positions of some markers of a C3D file.
+    """Positions (frame, marker, 3) of some markers, world [m], NaN where one was not seen.
 
-    ``positions (frame, marker, 3) float64`` are in world axes [m], NaN where a marker was not seen;
-    ``names`` are in upper case, without the subject's prefix. ``first_frame`` is the number that
-    the file gives its first frame, and ``says_up`` tells whether it says which axis is up.
+    ``first_frame`` is the number of the first frame in the file, and ``says_up`` tells whether the
+    file says which axis is up.
     """
 
     path: Path
@@ -69,9 +68,7 @@ class _Content(NamedTuple):
 def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Motion:
     """Read a C3D file, and find the 22 joints of a rigid skeleton from its markers (`markers`).
 
-    ``unit_m`` is for files that do not say it (POINT:UNITS). An `InputError` is raised where the
-    file is none or damaged, or a marker is missing or unseen for longer than `LONGEST_GAP_S`; it
-    names the marker and the frames, by the file's numbers.
+    An `InputError` names the marker and the frames, by the file's numbers.
     """
     if skeleton is not None:
         raise InputError(
@@ -86,11 +83,7 @@ def load_c3d(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
 
 
 def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None) -> Markers:
-    """Read some markers of a C3D file, gaps and all.
-
-    An `InputError` is raised where the file cannot be read, is damaged or cut off, or a marker is
-    not in it.
-    """
+    """Read some markers of a C3D file, gaps and all."""
     try:
         with (
             _Bounded(open_regular(path).detach()) as handle,
@@ -143,11 +136,7 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
 
 
 def bridged(seen: Markers) -> NDArray[np.float64]:
-    """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines.
-
-    An `InputError` is raised where a gap is longer, or at an end of the recording, where nothing
-    lies on its other side.
-    """
+    """Positions (frame, marker, 3) with gaps up to `LONGEST_GAP_S` bridged by cubic splines."""
     positions = seen.positions.copy()
     frames = np.arange(len(positions))
     for k, name in enumerate(seen.names):

@@ -132,16 +132,12 @@ def _segments(markers: Mapping[str, Array]) -> dict[str, Array]:
         up=middle("C7", "CLAV") - middle("T10", "STRN"),
         forward=middle("CLAV", "STRN") - middle("C7", "T10"),
     )
-    frames = {
-        "thorax": thorax,
-        **{
-            name: _level(
-                middle(f"LF{end}", f"LB{end}") - middle(f"RF{end}", f"RB{end}"),
-                middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
-            )
-            for name, end in (("pelvis", "WT"), ("head", "HD"))
-        },
-    }
+    frames = {"thorax": thorax}
+    for name, end in (("pelvis", "WT"), ("head", "HD")):
+        frames[name] = _level(
+            middle(f"LF{end}", f"LB{end}") - middle(f"RF{end}", f"RB{end}"),
+            middle(f"LF{end}", f"RF{end}") - middle(f"LB{end}", f"RB{end}"),
+        )
     for side, sign in (("L", 1.0), ("R", -1.0)):
         shoulder, elbow, knee, ankle = (
             markers[side + name] for name in ("SHO", "ELB", "KNE", "ANK")
@@ -202,11 +198,9 @@ _ON_THE_PELVIS = ("lowerback", "upperback", "hip", "knee", "ankle", "toe")
 def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_hz: float) -> Motion:
     """Make the motion of a rigid skeleton whose bones point as the joints do.
 
-    A bone is as long as its joints are apart in the median, and points from one to the other in
-    every frame. Joints do not say how a bone is rotated about itself: seen from pelvis or chest it
-    takes from frame to frame the smallest rotation to its next direction, so that nothing on it
-    spins. ``centres (frame, node, 3)`` are in world axes [m], ``pelvis`` and ``thorax`` rotation
-    matrices (frame, 3, 3). An `InputError` is raised where two joints of a bone coincide.
+    A bone is as long as its joints are apart in the median. Joints do not say how a bone is rotated
+    about itself: seen from pelvis or chest it takes from frame to frame the smallest rotation to
+    its next direction, so that nothing on it spins. Arguments are those that `joint_centres` gives.
     """
     parents = [NODES.index(NODE_PARENT[node]) for node in NODES[1:]]
     bones = centres[:, 1:] - centres[:, parents]
@@ -222,15 +216,11 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
         key: sign_continuous(Rotation.from_matrix(axes).as_quat())
         for key, axes in (("pelvis", pelvis), ("thorax", thorax))
     }
-    carriers = np.stack(
-        [
-            held["pelvis" if node.split("_")[-1] in _ON_THE_PELVIS else "thorax"]
-            for node in NODES[1:]
-        ],
-        axis=1,
-    )
+    below = [node.split("_")[-1] in _ON_THE_PELVIS for node in NODES[1:]]
+    carriers = np.stack([held["pelvis" if low else "thorax"] for low in below], axis=1)
     directions = quaternion_rotate(carriers * [-1, -1, -1, 1], bones / spans[..., None])
     rotations = quaternion_multiply(carriers, _followed(directions))
+    rotations /= np.linalg.norm(rotations, axis=2, keepdims=True)
     lengths = np.median(spans, axis=0)
     return Motion(
         name=name,
@@ -238,10 +228,7 @@ def rigid_motion(name: str, centres: Array, pelvis: Array, thorax: Array, rate_h
         parents=(-1, *parents),
         offsets=np.concatenate([np.zeros((1, 3)), directions[0] * lengths[:, None]]),
         root_positions=centres[:, 0],
-        rotations=np.concatenate(
-            [held["pelvis"][:, None], rotations / np.linalg.norm(rotations, axis=2, keepdims=True)],
-            axis=1,
-        ),
+        rotations=np.concatenate([held["pelvis"][:, None], rotations], axis=1),
         rate_hz=rate_hz,
     )
 

@@ -34,9 +34,6 @@ class TextFile:
     The text is Latin-1, for every byte is a character there and only comments use more than ASCII.
     Line ends may be mixed, and a byte order mark is left out. The file is used in a ``with``
     statement, so that it is closed before an error message is written.
-
-    Iterating raises an `InputError` where the file is not there, is no regular file, is empty, is
-    binary, or is larger than 2 GB.
     """
 
     def __init__(self, path: Path, kind: str) -> None:
@@ -91,7 +88,10 @@ class TextFile:
                 if b"\0" in start:
                     raise InputError(f"{path}: binary data; expected {kind} text")
                 file.seek(len(codecs.BOM_UTF8) if start.startswith(codecs.BOM_UTF8) else 0)
-                with _progress(path, size) as bar:
+                # None shows the bar on a terminal; a bar starts a thread, for large files alone.
+                silent = None if size > _LONG_BYTES else True
+                what, units = f"reading {path.name}", {"unit": "B", "unit_scale": True}
+                with tqdm(total=size, desc=what, leave=False, disable=silent, **units) as bar:
                     behind = 0
                     while line := file.readline(_MOST_CHARACTERS + 1):
                         if "\0" in line:
@@ -114,13 +114,6 @@ class TextFile:
             ) from None
         if blank:
             raise InputError(f"{path}: empty; expected {kind} text")
-
-
-def _progress(path: Path, size: int) -> tqdm:
-    # None shows the bar on a terminal; a bar starts a thread, which small files are not worth.
-    silent = None if size > _LONG_BYTES else True
-    what = f"reading {path.name}"
-    return tqdm(total=size, desc=what, unit="B", unit_scale=True, leave=False, disable=silent)
 
 
 def _complaint(word: str) -> str:

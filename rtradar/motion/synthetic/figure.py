@@ -47,12 +47,10 @@ MAXIMUM_REACH = 0.9985
 
 @dataclass(frozen=True, kw_only=True)
 class Subject:
-    """A person's size and way of moving.
+    """A person's size and way of moving, relative to the nominal actor.
 
-    ``tempo`` and ``amplitude`` are relative to the nominal actor, with the subject's own few
-    percent. The leg or hand of the ``side``, "l" or "r", acts or steps first. ``phase``, 0 to 1, is
-    the fraction of a step, or of the first rest, at which the movement begins; ``uneven`` has the
-    strength of each side, near 1.
+    The leg or hand of the ``side``, "l" or "r", acts or steps first. ``phase`` is the fraction of a
+    step, or of the first rest, at which the movement begins; ``uneven`` is the strength by side.
     """
 
     height_m: float
