@@ -205,9 +205,10 @@ def test_numbers_that_are_no_letters(folder: Path, letter: int) -> None:
     refused(folder, "holds what is no character")
 
 
-def test_a_name_that_is_no_text_makes_no_page(folder: Path) -> None:
+def test_a_name_that_is_no_text_has_a_page_all_the_same(folder: Path) -> None:
     """JSON may hold half of a character, which no file can."""
     summary = json.loads((folder / "summary.json").read_text())
     summary["parameters"]["motion"] = "\ud800"
     (folder / "summary.json").write_text(json.dumps(summary))
     view(folder, page=folder / "view.html")
+    assert "<h1>?" in (folder / "view.html").read_text(encoding="utf-8")

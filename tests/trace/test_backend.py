@@ -291,6 +291,8 @@ def test_a_real_probe_of_a_file_that_is_no_library(empty_cache: Path, tmp_path: 
 def test_a_real_probe_of_every_library_here(empty_cache: Path) -> None:
     """LLVM 14 to 16 are never good; from 19 on all are. Nothing of it reaches this process."""
     libraries = [library for library in llvm.candidates() if library.version]
+    if not libraries:
+        pytest.skip("this machine has no libLLVM of a known version")
     for library in libraries:
         found = probe.probe_backend("llvm_ad_rgb", library)
         major = int((found.version or library.version or "0").split(".")[0])
