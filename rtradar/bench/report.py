@@ -27,39 +27,33 @@ def _blocks(found: dict[str, Any]) -> Iterator[str]:
         "echoes and IF over ours."
     )
     if models:
-        yield _rates(found["rates"])
+        own = next(iter(found["rates"].values()))
+        yield (
+            f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, "
+            f"{own['random_words'] / 1e6:.0f} million random words, "
+            f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
+        )
         yield _models(models)
-        if found["paper"]["trouble"]:
-            yield f"the paper's method was not timed: {found['paper']['trouble']}"
-        else:
-            yield _paper(found["paper"]["radars"])
+        trouble = found["paper"]["trouble"]
+        missing = f"the paper's method was not timed: {trouble}"
+        yield missing if trouble else _paper(found["paper"]["radars"])
         for radar in dict.fromkeys(row["radar"] for row in models):
             yield _stages(radar, [row for row in models if row["radar"] == radar])
     yield from _growth(found["growth"])
     if found["kernels"]:
-        yield table(
-            ["kernel", "computes", "takes", "its reference", "ratio", "differs by"],
-            [
-                [
-                    f"`{row['name']}`",
-                    row["does"],
-                    f"{1e3 * row['kernel_s']:.3g} ms",
-                    f"{1e3 * row['reference_s']:.3g} ms",
-                    f"{row['ratio']:.3g}",
-                    f"{row['difference']:.1g}",
-                ]
-                for row in found["kernels"]
-            ],
-        )
+        head = ["kernel", "computes", "takes", "its reference", "ratio", "differs by"]
+        yield table(head, [_kernel(row) for row in found["kernels"]])
 
 
-def _rates(rates: dict[str, Any]) -> str:
-    own = next(iter(rates.values()))
-    return (
-        f"A second here: {own['copied_bytes'] / 1e9:.1f} GB read and written, "
-        f"{own['random_words'] / 1e6:.0f} million random words, "
-        f"{own['multiply_adds'] / 1e9:.0f} thousand million multiply-adds."
-    )
+def _kernel(row: Row) -> list[str]:
+    times = [f"{1e3 * row[name]:.3g} ms" for name in ("kernel_s", "reference_s")]
+    return [
+        f"`{row['name']}`",
+        row["does"],
+        *times,
+        f"{row['ratio']:.3g}",
+        f"{row['difference']:.1g}",
+    ]
 
 
 def _models(models: Sequence[Row]) -> str:
@@ -86,14 +80,10 @@ def _models(models: Sequence[Row]) -> str:
 
 def _paper(radars: dict[str, Any]) -> str:
     names = dict.fromkeys(name for baseline in radars.values() for name in baseline["stages"])
-    lines = [
-        [
-            radar,
-            *(f"{baseline['stages'][name]['median']:.3f} s" for name in names),
-            _median(baseline["total"]),
-        ]
-        for radar, baseline in radars.items()
-    ]
+    lines = []
+    for radar, baseline in radars.items():
+        stages = [f"{baseline['stages'][name]['median']:.3f} s" for name in names]
+        lines.append([radar, *stages, _median(baseline["total"])])
     return table(["the paper's method in NumPy, one thread, a frame", *names, "all"], lines)
 
 
@@ -120,30 +110,19 @@ def _stages(radar: str, models: Sequence[Row]) -> str:
 
 
 def _growth(growth: dict[str, Any]) -> Iterator[str]:
-    model = f"`{growth['fidelity']}`"
-    if growth["chirps"]:
-        lines = [
-            [
-                f"{row['radar']} / {row['of_radar']}",
-                f"`{row['fidelity']}`",
-                *(f"{row[name]:.2f}" for name in ("chirps", "to_cloud", "peak_memory")),
-            ]
-            for row in growth["chirps"]
-        ]
+    lines = []
+    for row in growth["chirps"]:
+        times = [f"{row[name]:.2f}" for name in ("chirps", "to_cloud", "peak_memory")]
+        lines.append([f"{row['radar']} / {row['of_radar']}", f"`{row['fidelity']}`", *times])
+    if lines:
         yield table(["radars", "model", "chirps", "to the cloud", "peak memory"], lines)
-    if growth["duration"]:
-        seconds = [row["to_cloud_s"]["median"] / row["capture_s"] for row in growth["duration"]]
-        lines = [
-            [
-                f"{row['duration_s']:g} s",
-                _median(row["to_cloud_s"]),
-                _median(row["whole_s"]),
-                f"{own / seconds[0]:.3f}",
-                _memory(row),
-            ]
-            for row, own in zip(growth["duration"], seconds, strict=True)
-        ]
-        head = [f"recording, {model}", "to the cloud", "whole run"]
+    lines = []
+    seconds = [row["to_cloud_s"]["median"] / row["capture_s"] for row in growth["duration"]]
+    for row, own in zip(growth["duration"], seconds, strict=True):
+        times = [_median(row["to_cloud_s"]), _median(row["whole_s"]), f"{own / seconds[0]:.3f}"]
+        lines.append([f"{row['duration_s']:g} s", *times, _memory(row)])
+    if lines:
+        head = [f"recording, `{growth['fidelity']}`", "to the cloud", "whole run"]
         yield table([*head, "to the cloud a second, over the first", "peak memory"], lines)
 
 
