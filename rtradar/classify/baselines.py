@@ -68,9 +68,7 @@ def _metadata(clouds: Collection, name: str) -> list[NDArray[np.float64]]:
     except InputError:  # no sample has this entry
         return []
     try:
-        numbers = np.array(
-            [np.nan if value is None else value for value in column], dtype=np.float64
-        )
+        numbers = np.array([np.nan if value is None else value for value in column], np.float64)
     except (TypeError, ValueError):  # names, or lists of several lengths
         names = np.array([str(value) for value in column])
         return [(names == value).astype(np.float64) for value in np.unique(names)]
@@ -95,13 +93,9 @@ def _rdt(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _spatial(points: NDArray[np.float64]) -> NDArray[np.float64]:
-    number = len(points)
-    points = np.where(np.isnan(points), 0.0, points)
-    if not number:
-        points = np.zeros((1, 3))
-    return np.append(
-        _shape(points - [points[:, 0].mean(), points[:, 1].mean(), 0.0]), np.log(number + 1)
-    )
+    places = np.nan_to_num(points) if len(points) else np.zeros((1, 3))
+    middle = np.array([places[:, 0].mean(), places[:, 1].mean(), 0.0])
+    return np.append(_shape(places - middle), np.log(len(points) + 1))
 
 
 def _shape(points: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -111,9 +105,8 @@ def _shape(points: NDArray[np.float64]) -> NDArray[np.float64]:
     pairs = ((0, 1), (0, 2), (1, 2))
     correlations = [float(np.mean(unit[:, one] * unit[:, other])) for one, other in pairs]
     percentiles = np.percentile(points, _PERCENTILES, axis=0)
-    return np.concatenate(
-        [spread, points.min(axis=0), points.max(axis=0), *percentiles, correlations]
-    )
+    extremes = points.min(axis=0), points.max(axis=0)
+    return np.concatenate([spread, *extremes, *percentiles, correlations])
 
 
 def _centroid(seed: int) -> BaseEstimator:

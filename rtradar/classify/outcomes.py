@@ -20,13 +20,9 @@ HISTORY = ("rate", "train_loss", "train_accuracy", "test_loss", "test_accuracy",
 """Quantities measured in every epoch."""
 
 _MAX_CHARACTERS = 100_000_000
-_COLUMNS = {
-    "indices": np.int64,
-    "truth": np.int64,
-    "predicted": np.int64,
-    "tested_on": np.str_,
-    "recordings": np.str_,
-}
+_COLUMNS = dict.fromkeys(("indices", "truth", "predicted"), np.int64) | dict.fromkeys(
+    ("tested_on", "recordings"), np.str_
+)
 
 
 @dataclass(frozen=True)
@@ -182,13 +178,8 @@ def confusion(outcomes: Sequence[Outcome], n_classes: int) -> NDArray[np.int64]:
 
 def recordings_of(outcomes: Sequence[Outcome], n_classes: int) -> list[int]:
     """Count the independent recordings behind the test clouds of each class."""
-    found: list[set[str]] = [set() for _ in range(n_classes)]
-    for outcome in outcomes:
-        for shown, recording in zip(
-            outcome.truth.tolist(), outcome.recordings.tolist(), strict=True
-        ):
-            found[shown].add(recording)
-    return [len(names) for names in found]
+    pairs = {pair for one in outcomes for pair in zip(one.truth, one.recordings, strict=True)}
+    return np.bincount([shown for shown, _ in pairs], minlength=n_classes).tolist()
 
 
 def transfer(
@@ -259,11 +250,9 @@ def transfer_table(
     width = max(14, *(len(value) for value in values)) + 2
     lines = [f"{'trained on':<{width}}" + "".join(f"{value:>{width}}" for value in values)]
     for value, fractions, errors in zip(values, mean, spread, strict=True):
-        cells = [
-            "-"
-            if np.isnan(fraction)
-            else f"{100 * fraction:.1f}" + ("" if np.isnan(error) else f" +- {100 * error:.1f}")
-            for fraction, error in zip(fractions, errors, strict=True)
-        ]
+        cells = []
+        for fraction, error in zip(fractions, errors, strict=True):
+            spread_text = "" if np.isnan(error) else f" +- {100 * error:.1f}"
+            cells.append("-" if np.isnan(fraction) else f"{100 * fraction:.1f}{spread_text}")
         lines.append(f"{value:<{width}}" + "".join(f"{cell:>{width}}" for cell in cells))
     return "\n".join(lines)

@@ -7,15 +7,15 @@ numbers and the size of a cloud is lost. ``physical`` divides each axis by a fix
 a motion say nothing of its kind, and velocity from zero. The paper normalises clouds, but states
 neither how nor in what units.
 
-Augmented clouds resemble those of other recordings: ``physical`` shifts and stretches them as
-`Variation` says. ``rotation`` is the augmentation of the paper's own program, a rotation by a
-random angle in the plane of time and velocity, and jitter; no motion gives such clouds.
+Augmented clouds resemble those of other recordings: ``physical`` shifts them, changes their tempo
+and aspect, and adds normally distributed jitter. ``rotation`` is the augmentation of the paper's
+own program, a rotation by a random angle in the plane of time and velocity, and jitter; no motion
+gives such clouds.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -32,26 +32,10 @@ PHYSICAL_SCALES = (0.5, 0.5, 2.5)
 _ROTATION_JITTER, _ROTATION_JITTER_LIMIT = 0.02, 0.05  # those of PointNet on unit spheres
 
 
-@dataclass(frozen=True)
-class Variation:
-    """Ranges of the physical augmentation, drawn uniformly, and of its normally distributed jitter.
-
-    The shifts are the largest in either direction. ``tempo`` is the largest relative change of
-    tempo; velocity is multiplied and time divided by it. ``aspect`` is the largest relative loss of
-    radial motion, as of a person who faces another direction; range and velocity shrink alike.
-    ``jitter`` is the standard deviation of time [s], range [m] and velocity [m/s] of each point,
-    about a third of a cell of the maps.
-    """
-
-    time_shift_s: float = 0.1
-    range_shift_m: float = 0.1
-    tempo: float = 0.15
-    aspect: float = 0.15
-    jitter: tuple[float, float, float] = (0.008, 0.012, 0.035)
-
-
-VARIATION = Variation()
-"""Augmentation of the recipe ``lean``."""
+_TIME_SHIFT_S, _RANGE_SHIFT_M = 0.1, 0.1  # the largest in either direction
+_TEMPO = 0.15  # largest relative change of tempo: velocity is multiplied and time divided by it
+_ASPECT = 0.15  # largest relative loss of radial motion, as of a person who faces elsewhere
+_JITTER = (0.008, 0.012, 0.035)  # standard deviation [s, m, m/s], about a third of a map's cell
 
 
 def stack_clouds(clouds: Collection, *, seed: int = 0) -> Tensor:
@@ -116,7 +100,7 @@ def for_training(points: Tensor, augmentation: Augmentation, scaling: Scaling) -
         return _rotated(scaled(points, scaling))
     if augmentation == "none":
         return scaled(points, scaling)
-    largest = torch.tensor([VARIATION.time_shift_s, VARIATION.range_shift_m, 0.0])
+    largest = torch.tensor([_TIME_SHIFT_S, _RANGE_SHIFT_M, 0.0])
     shift = largest * _uniform(len(points), 3)
     # Shifts are added after scaling, because scaling removes the middle of the cloud.
     return scaled(_stretched(points), scaling) + (shift / torch.tensor(PHYSICAL_SCALES))[:, None]
@@ -127,11 +111,11 @@ def _uniform(*shape: int) -> Tensor:
 
 
 def _stretched(points: Tensor) -> Tensor:
-    tempo = 1 + VARIATION.tempo * _uniform(len(points))
-    aspect = 1 - VARIATION.aspect * torch.rand(len(points))
+    tempo = 1 + _TEMPO * _uniform(len(points))
+    aspect = 1 - _ASPECT * torch.rand(len(points))
     factor = torch.stack([1 / tempo, aspect, tempo * aspect], dim=1)[:, None]
     middle = points.mean(dim=1, keepdim=True) * torch.tensor([1.0, 1.0, 0.0])
-    jitter = torch.randn(points.shape) * torch.tensor(VARIATION.jitter)
+    jitter = torch.randn(points.shape) * torch.tensor(_JITTER)
     return middle + (points - middle) * factor + jitter
 
 

@@ -101,31 +101,25 @@ class Recipe:
     def __post_init__(self) -> None:
         for field, least in (("points", 1), ("batch", 2), ("epochs", 1), ("step_epochs", 1)):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or value < least:
-                raise InputError(
-                    f"recipe: {field} = {value!r}; it must be a whole number, at least {least}"
-                )
-        if not (math.isfinite(self.rate) and self.rate > 0):
-            raise InputError(
-                f"recipe: rate = {self.rate!r}; it must be a finite number above 0, such as 1e-4"
+            whole = isinstance(value, int) and not isinstance(value, bool)
+            self._demand(field, whole and value >= least, f"a whole number, at least {least}")
+        positive = math.isfinite(self.rate) and self.rate > 0
+        self._demand("rate", positive, "a finite number above 0, such as 1e-4")
+        for field in ("stop_below", "weight_decay"):
+            value = getattr(self, field)
+            self._demand(
+                field, math.isfinite(value) and value >= 0, "a finite number, not negative"
             )
-        for field, value in (("stop_below", self.stop_below), ("weight_decay", self.weight_decay)):
-            if not (math.isfinite(value) and value >= 0):
-                raise InputError(
-                    f"recipe: {field} = {value!r}; it must be a finite number, not negative"
-                )
-        if not 0 <= self.dropout < 1:
-            raise InputError(
-                f"recipe: dropout = {self.dropout!r}; it must be at least 0 and below 1"
-            )
+        self._demand("dropout", 0 <= self.dropout < 1, "at least 0 and below 1")
         words = {old: new for new, old in _FILE_VALUES.items()}
         for field, allowed in _CHOICES.items():
             value = words.get(getattr(self, field), getattr(self, field))
             object.__setattr__(self, field, value)
-            if value not in allowed:
-                raise InputError(
-                    f"recipe: {field} = {value!r}; it must be one of {', '.join(allowed)}"
-                )
+            self._demand(field, value in allowed, f"one of {', '.join(allowed)}")
+
+    def _demand(self, field: str, fulfilled: bool, wanted: str) -> None:
+        if not fulfilled:
+            raise InputError(f"recipe: {field} = {getattr(self, field)!r}; it must be {wanted}")
 
     @property
     def epochs_run(self) -> int:

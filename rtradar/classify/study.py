@@ -21,18 +21,13 @@ import torch
 from numpy.typing import NDArray
 from tqdm import tqdm
 
+from rtradar.classify import training
 from rtradar.classify.outcomes import Outcome, load_outcome, outcome_of, save_outcome
 from rtradar.classify.pointnet import PointNet
 from rtradar.classify.prepare import stack_clouds
 from rtradar.classify.recipes import Recipe
 from rtradar.classify.splits import chosen, make_splits, values_of
-from rtradar.classify.training import (
-    Examples,
-    check_points,
-    load_checkpoint,
-    predict,
-    train_network,
-)
+from rtradar.classify.training import Examples
 from rtradar.clouds.dataset_store import Collection
 from rtradar.errors import InputError
 from rtradar.system.files import atomic_file, read_json, remove_parts
@@ -208,14 +203,14 @@ def train_study(
     missing = [n for n in numbers if not (training_folder(out, n) / _OUTCOME).exists()]
     if missing:
         examples = Examples(stack_clouds(clouds, seed=seed), torch.from_numpy(truth), names)
-        check_points(examples, recipe)
+        training.check_points(examples, recipe)
     write_plan(out, plan)
     with tqdm(total=len(numbers) * recipe.epochs_run, unit="epoch", disable=None) as bar:
         bar.update((len(numbers) - len(missing)) * recipe.epochs_run)
         for number in missing:
             one, folder = splits[number], _made_folder(training_folder(out, number))
             test = examples.of(one.test)
-            network, history = train_network(
+            network, history = training.train_network(
                 examples.of(one.train),
                 test,
                 recipe,
@@ -224,7 +219,7 @@ def train_study(
                 checkpoint=folder / _CHECKPOINT,
                 on_epoch=_shown(bar, one.name),
             )
-            predicted = predict(network, test, recipe).argmax(axis=1)
+            predicted = training.predict(network, test, recipe).argmax(axis=1)
             outcome = outcome_of(clouds, one, values, truth, predicted, history)
             save_outcome(folder / _OUTCOME, outcome)
     return load_study(out)
@@ -317,7 +312,7 @@ def load_network(folder: Path, number: int = 1) -> tuple[PointNet, Recipe, tuple
     path = training_folder(folder, number - 1) / _CHECKPOINT
     network = PointNet(len(classes), recipe)
     try:
-        network.load_state_dict(load_checkpoint(path).network)
+        network.load_state_dict(training.load_checkpoint(path).network)
     except (RuntimeError, TypeError, AttributeError):
         raise InputError(
             f"'{path}' is of another network than '{folder / PLAN}' says; "

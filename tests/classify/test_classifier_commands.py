@@ -128,7 +128,7 @@ def test_what_is_done_is_not_done_again(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(
-        study, "train_network", lambda *given, **also: pytest.fail("it trains again")
+        study.training, "train_network", lambda *given, **also: pytest.fail("it trains again")
     )
     assert rtradar("train", collection, "--out", trained, *TINY) == 0
     assert "2 of 2 trained" in capsys.readouterr().out
@@ -168,7 +168,7 @@ def test_an_interrupted_command_says_how_to_go_on(
     def interrupted(*given: Any, **also: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(study, "train_network", interrupted)
+    monkeypatch.setattr(study.training, "train_network", interrupted)
     assert rtradar("train", collection, "--out", tmp_path, *TINY) == 1
     said = capsys.readouterr().err
     assert said.splitlines()[-1].startswith(

@@ -39,7 +39,7 @@ def write_evaluation(
     Returns the table for the terminal and the content of ``evaluation.json``. The other files are
     ``trainings.csv``, ``history.csv``, ``table.txt`` and ``accuracy.png``, and for each study
     ``confusion-N.png``, ``learning-N.png`` and, for the scheme ``across``, ``transfer-N.png``.
-    InputError if the studies have different classes, or the folder cannot be written.
+    ``out`` must exist. InputError if the studies have different classes.
     """
     classes = studies[0].plan["classes"]
     for study in studies:
@@ -48,12 +48,6 @@ def write_evaluation(
                 f"'{study.folder}' knows other activities than '{studies[0].folder}'; "
                 "evaluate them one by one"
             )
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"cannot write to '{out}': {error.strerror}; give a folder that can be written (--out)"
-        ) from None
     titles = _titles(studies)
     named = list(zip(titles, studies, strict=True))
     groups: list[Group] = [(title, study.outcomes) for title, study in named]
@@ -71,9 +65,7 @@ def write_evaluation(
             transfer = scores.transfer(study.outcomes)
             blocks.append(scores.transfer_table(*transfer))
             draw_transfer(out / f"transfer-{number}.png", *transfer, title)
-    draw_accuracies(
-        out / "accuracy.png", [(title, _accuracies(all_of)) for title, all_of in groups]
-    )
+    draw_accuracies(out / "accuracy.png", groups)
     text = "\n\n".join(blocks)
     content = {
         "classes": classes,
@@ -147,29 +139,16 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     }
     if any(one.trained_on for one in outcomes):
         values, mean, spread = scores.transfer(outcomes)
-        content["transfer"] = {
-            "values": values,
-            "mean": _plain(mean.tolist()),
-            "spread": _plain(spread.tolist()),
-        }
+        # None in place of NaN, which JSON lacks.
+        tables = {"mean": mean, "spread": spread}
+        plain = {key: np.where(np.isnan(all_), None, all_).tolist() for key, all_ in tables.items()}
+        content["transfer"] = {"values": values} | plain
     return content
 
 
-def _plain(rows: list[list[float]]) -> list[list[float | None]]:
-    """Replace NaN, which JSON lacks, by None."""
-    return [[value if value == value else None for value in row] for row in rows]
-
-
 def _write_csv(out: Path, groups: Sequence[Group]) -> None:
-    head = [
-        "classifier",
-        "training",
-        "trained_on",
-        "test_clouds",
-        "test_recordings",
-        "accuracy",
-        "seconds",
-    ]
+    what = ["classifier", "training"]
+    head = [*what, "trained_on", "test_clouds", "test_recordings", "accuracy", "seconds"]
     trainings, history = [], []
     for title, outcomes in groups:
         for one in outcomes:
@@ -181,7 +160,7 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
                 for epoch, row in enumerate(one.history, start=1)
             ]
     _write(out / "trainings.csv", _csv(head, trainings))
-    _write(out / "history.csv", _csv(["classifier", "training", "epoch", *HISTORY], history))
+    _write(out / "history.csv", _csv([*what, "epoch", *HISTORY], history))
 
 
 def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
@@ -195,17 +174,17 @@ def _write(path: Path, text: str) -> None:
         file.write(text.encode())
 
 
-def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:
-    """Draw a box plot of rows of name and accuracies: a box between quartiles, a dot a training."""
-    figure = new_figure(max(4.0, 1.4 + 1.1 * len(rows)), 4.2)
+def draw_accuracies(path: Path, groups: Sequence[Group]) -> None:
+    """Draw a box plot of the accuracies of each group: a box between quartiles, a dot each."""
+    figure = new_figure(max(4.0, 1.4 + 1.1 * len(groups)), 4.2)
     axes = figure.subplots()
-    percent = [100 * np.asarray(fractions) for _, fractions in rows]
+    percent = [100 * np.array(_accuracies(outcomes)) for _, outcomes in groups]
     axes.boxplot(percent, widths=0.5, showfliers=False, medianprops={"color": "C1"})
     for place, values in enumerate(percent, start=1):
         offsets = np.linspace(-0.12, 0.12, len(values)) if len(values) > 1 else np.zeros(1)
         axes.plot(place + offsets, values, ".", color="C0", alpha=0.6)
-    names = [name.replace(", ", "\n", 1) for name, _ in rows]
-    axes.set_xticks(range(1, len(rows) + 1), names, fontsize=7)
+    names = [name.replace(", ", "\n", 1) for name, _ in groups]
+    axes.set_xticks(range(1, len(groups) + 1), names, fontsize=7)
     axes.set(ylabel="Test accuracy [%]", xlabel="Classifier", title="Test accuracy")
     axes.set_ylim(min(0.0, *map(min, percent)), 102)
     axes.grid(axis="y", alpha=0.3)
