@@ -26,19 +26,21 @@ from rtradar.process import (
     range_time,
     spectrogram,
 )
-from rtradar.report import (
-    draw_before_after,
-    draw_plan,
+from rtradar.report.figures import maps, rooms
+from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
+from rtradar.report.figures.maps import (
     draw_range_angle,
-    draw_range_azimuth_with_walls,
     draw_range_doppler,
     draw_range_time,
     draw_rdt_cloud,
     draw_spatial_cloud,
     draw_spectrogram,
 )
-from rtradar.report.figures import maps, rooms
-from rtradar.report.figures.canvas import FieldUnit, new_figure, save_figure
+from rtradar.report.figures.rooms import (
+    draw_before_after,
+    draw_plan,
+    draw_range_azimuth_with_walls,
+)
 from rtradar.report.pages import comparison, evaluation
 from rtradar.report.pages.comparison import (
     draw_maps,

@@ -44,12 +44,7 @@ _QUANTITIES = {"dBm": "Received power", "dBsm": "RCS", "dB re maximum": "Power"}
 class FieldUnit:
     """Unit of power in pictures, made by `field_unit`.
 
-    Parameters
-    ----------
-    name : {"dBm", "dBsm", "dB re maximum"}
-        Name of the unit.
-    scale : float or array of float
-        Factor from power [m^2] to the linear unit, of a shape that broadcasts with the powers.
+    ``scale`` is the factor from power [m^2] to the linear unit; it broadcasts with the powers.
     """
 
     name: str

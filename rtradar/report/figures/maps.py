@@ -27,20 +27,8 @@ def draw_range_time(
 ) -> None:
     """Draw power over time and range.
 
-    Parameters
-    ----------
-    path : path
-        PNG file.
-    power : (slow_time, range)
-        Power, mean of the channels [m^2].
-    slow_time : (slow_time,)
-        Times of the rows [s], evenly spaced.
-    radar : Radar
-        Radar whose ranges are the axis.
-    title : str
-        Heading of the picture.
-    spreading : bool
-        Whether amplitudes include the spreading loss.
+    ``power`` (slow_time, range) is the mean of the channels [m^2] at evenly spaced times
+    ``slow_time`` [s]; ``spreading`` tells whether amplitudes include the spreading loss.
     """
     figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
@@ -62,16 +50,8 @@ def draw_range_doppler(
 ) -> None:
     """Draw a range-Doppler map, and beside it the map with its detections.
 
-    Parameters
-    ----------
-    power : (range, velocity)
-        Power, summed over all channels [m^2].
-    mask : (range, velocity) bool
-        True where a cell is detected.
-    radar : Radar
-        Radar whose ranges and velocities are the axes.
-    path, title, spreading
-        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
+    ``power`` (range, velocity) is summed over all channels [m^2]; ``mask`` is True where a cell is
+    detected.
     """
     figure = canvas.new_figure(11, 4.5)
     left, right = figure.subplots(1, 2, sharex=True, sharey=True)
@@ -105,20 +85,9 @@ def draw_spectrogram(
 ) -> None:
     """Draw a spectrogram, time across and velocity up.
 
-    Parameters
-    ----------
-    power : (time, velocity)
-        Power of one channel, summed over range [m^2]; at least one row.
-    time : (time,)
-        Evenly spaced times [s].
-    velocity : (velocity,)
-        Ascending velocities [m/s].
-    radar : Radar
-        Radar that received the power, which decides its unit.
-    path, title, spreading
-        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
-    window_functions : WindowFunctions
-        Window functions of the transforms that gave the power.
+    ``power`` (time, velocity), of at least one row, is that of one channel summed over range [m^2],
+    at evenly spaced times [s] and ascending velocities [m/s]. The ``window_functions`` are those of
+    the transforms that gave the power.
     """
     figure = canvas.new_figure(8, 4.5)
     axes = figure.subplots()
@@ -142,16 +111,8 @@ def draw_range_angle(
 ) -> None:
     """Draw power over range and angle, with a panel for each angle.
 
-    Parameters
-    ----------
-    maps : mapping of str to ((range, angle) float, (angle,) float64)
-        Power summed over detected cells [m^2] and the angles [rad], by the name of the angle.
-    radar : Radar
-        Radar whose ranges are the axis.
-    path, title, spreading
-        Output file, heading, and whether there is spreading loss: see `draw_range_time`.
-    window_functions : WindowFunctions
-        Window functions of the transforms that gave the power.
+    ``maps`` are power summed over detected cells (range, angle) [m^2] and the angles (angle,) [rad]
+    by the name of the angle. The ``window_functions`` are as for `draw_spectrogram`.
     """
     figure = canvas.new_figure(1 + 5 * len(maps), 4.5)
     panels = figure.subplots(1, len(maps), sharey=True, squeeze=False)[0]
@@ -178,15 +139,7 @@ def angle_label(name: str, radar: Radar) -> str:
 
 
 def draw_rdt_cloud(path: Path, points: NDArray[np.float64], title: str) -> None:
-    """Draw the range-Doppler-time cloud, coloured by velocity.
-
-    Parameters
-    ----------
-    points : (point, 3) float64
-        Time [s], range [m] and velocity [m/s] of each point.
-    path, title
-        Output file and heading: see `draw_range_time`.
-    """
+    """Draw the range-Doppler-time cloud (point, 3) [s, m, m/s], coloured by velocity."""
     figure = canvas.new_figure(8, 6.5)
     axes = figure.add_subplot(projection="3d")
     dots = rdt_points(axes, points, f"{title}\n{len(points)} points", s=4)
@@ -209,20 +162,10 @@ def rdt_points(
 def draw_spatial_cloud(
     path: Path, points: NDArray[np.float64], velocity: NDArray[np.float64], radar: Radar, title: str
 ) -> None:
-    """Draw points from the side and from above, coloured by velocity.
+    """Draw points from the side and from above, coloured by their ``velocity`` (point,) [m/s].
 
-    For a linear array only the view that it measures is drawn.
-
-    Parameters
-    ----------
-    points : (point, 3) float64
-        World coordinates [m]; NaN in a coordinate that is not measured.
-    velocity : (point,) float64
-        Velocity of each point [m/s].
-    radar : Radar
-        Radar, drawn at its position.
-    path, title
-        Output file and heading: see `draw_range_time`.
+    ``points`` (point, 3) are world coordinates [m], NaN in one that is not measured: for a linear
+    array only the view that it measures is drawn.
     """
     names = measured_angles(radar)
     views = [axis for axis, name in ((2, "elevation"), (1, "azimuth")) if name in names]

@@ -38,18 +38,8 @@ def draw_plan(
 ) -> None:
     """Draw the room from above: walls, furniture, radar, the person's track and paths of echoes.
 
-    Parameters
-    ----------
-    scene : Scene
-        Scene whose walls and furniture are drawn.
-    radar : Radar
-        Radar, drawn at its position.
-    track : (time, 2) float64
-        Positions of the person's root [m].
-    paths : mapping of str to (point, 3) float64
-        Corners of each path from Tx to Rx [m], by its name.
-    path, title
-        Output file and heading: see `draw_range_time`.
+    ``track`` (time, 2) are positions of the person's root [m], ``paths`` the corners (point, 3) of
+    each path from Tx to Rx [m] by its name.
     """
     figure = canvas.new_figure(10, 6)
     axes = figure.subplots()
@@ -61,10 +51,9 @@ def draw_plan(
         # Names are outside the room, because those of furniture are inside.
         across = np.abs(last - first) < np.abs(last - first).max()
         outward = 9 * across * np.sign(middle - corners.mean(axis=0))
-        style: dict[str, Any] = {"fontsize": 7, "color": "dimgrey", "ha": "center", "va": "center"}
-        axes.annotate(
-            name, tuple(middle), xytext=tuple(outward), textcoords="offset points", **style
-        )
+        style: dict[str, Any] = {"textcoords": "offset points", "ha": "center", "va": "center"}
+        style |= {"fontsize": 7, "color": "dimgrey"}
+        axes.annotate(name, tuple(middle), tuple(outward), **style)
     for piece in scene.furniture:
         triangles = piece.triangles()
         corners = triangles.corners[..., :2]
@@ -109,16 +98,8 @@ def draw_before_after(
 ) -> None:
     """Draw range-Doppler maps with their detections, and ghosts where they are predicted.
 
-    Parameters
-    ----------
-    maps : mapping of str to ((range, velocity) float, (range, velocity) bool)
-        Power summed over all channels [m^2], and detections, by the title of the panel.
-    ghosts : sequence of (str, float, float)
-        Path over walls, range [m] and velocity [m/s] of each ghost.
-    radar : Radar
-        Radar whose ranges and velocities are the axes.
-    path, title
-        Output file and heading: see `draw_range_time`.
+    ``maps`` are, by the title of the panel, power summed over all channels [m^2] and detections,
+    (range, velocity); ``ghosts`` path over walls, range [m] and velocity [m/s] of each ghost.
     """
     figure = canvas.new_figure(1 + 5.5 * len(maps), 5)
     panels = figure.subplots(1, len(maps), sharex=True, sharey=True, squeeze=False)[0]
@@ -160,14 +141,8 @@ def _mark(axes: Axes, ghosts: Sequence[tuple[str, float, float]], radar: Radar) 
                 place = max(place, taken + gap)
         placed.append((beside, place))
         style: dict[str, Any] = {"fontsize": 7, "color": "white", "bbox": _BOX, "va": "center"}
-        axes.annotate(
-            name,
-            (across, distance),
-            xytext=(beside, place),
-            ha="left" if toward > 0 else "right",
-            arrowprops=_ARROW,
-            **style,
-        )
+        style |= {"ha": "left" if toward > 0 else "right", "arrowprops": _ARROW}
+        axes.annotate(name, (across, distance), (beside, place), **style)
 
 
 def draw_range_azimuth_with_walls(
@@ -182,22 +157,9 @@ def draw_range_azimuth_with_walls(
 ) -> None:
     """Draw power over azimuth and range, with upright walls where they are.
 
-    Parameters
-    ----------
-    power : (range, azimuth) float
-        Power summed over detected cells [m^2].
-    azimuth : (azimuth,) float64
-        Azimuth angles of the columns [rad].
-    scene : Scene
-        Scene whose walls are drawn.
-    radar : Radar
-        Radar whose ranges are the axis, at its position in the scene.
-    ghosts : sequence of (str, float, float)
-        Path over walls, range [m] and azimuth [rad] of each ghost.
-    path, title
-        Output file and heading: see `draw_range_time`.
-    window_functions : WindowFunctions
-        Window functions of the transforms that gave the power.
+    ``power`` (range, azimuth) is summed over detected cells [m^2], ``azimuth`` are the angles of
+    its columns [rad], and ``ghosts`` path over walls, range [m] and azimuth [rad] of each ghost.
+    The ``window_functions`` are those of the transforms that gave the power.
     """
     figure = canvas.new_figure(8, 5.5)
     axes = figure.subplots()

@@ -138,36 +138,24 @@ def write_comparison(
     parts = next(iter(models.values()))["part_power_m2"]
     parameters = {key: value for key, value in summary["parameters"].items() if key != "radar"}
     columns = ["", *models]
-    times = [
-        [stage, *(_seconds(model["stages"].get(stage)) for model in models.values())]
-        for stage in stages
-    ]
-    levels = [
-        [part, *(_level(model["part_power_m2"][part], unit) for model in models.values())]
-        for part in parts
-    ]
+    times, levels = [], []
+    for stage in stages:
+        seconds = [model["stages"].get(stage) for model in models.values()]
+        times.append([stage, *("-" if value is None else f"{value:.3f}" for value in seconds)])
+    for part in parts:
+        powers = np.array([model["part_power_m2"][part] for model in models.values()])
+        shown = zip(powers, unit.level(powers), strict=True)
+        levels.append(
+            [part, *(f"{level:.1f}" if power > 0 else "occluded" for power, level in shown)]
+        )
     subtitle = f"{summary['parameters']['radar']['name']}: {', '.join(models)}"
-    shown = "\n".join(picture(title, file) for title, file in pictures.items())
-    figures = f'<div class="pictures">{shown}</div>'
+    drawn = "\n".join(picture(title, file) for title, file in pictures.items())
+    figures = f'<div class="pictures">{drawn}</div>'
+    by_part = {"parts": table(levels, columns), "unit": escape(unit.label())}
     tables = _TABLES.substitute(
-        stages=table(times, columns),
-        parts=table(levels, columns),
-        unit=escape(unit.label()),
-        parameters=mapping_table(parameters),
+        by_part, stages=table(times, columns), parameters=mapping_table(parameters)
     )
-    write_page(
-        path,
-        Titles("rtradar compare", str(summary["parameters"]["motion"]), subtitle),
-        _DIFFERENCES.substitute(
-            measures=table(rows[1:], rows[0]), reference=escape(summary["reference"])
-        ),
-        (f'<section id="maps"><h2>Side by side</h2>{figures}</section>', tables),
-    )
-
-
-def _seconds(value: float | None) -> str:
-    return "-" if value is None else f"{value:.3f}"
-
-
-def _level(power: float, unit: FieldUnit) -> str:
-    return f"{float(unit.level(power)):.1f}" if power > 0 else "occluded"
+    top = {"measures": table(rows[1:], rows[0]), "reference": escape(summary["reference"])}
+    titles = Titles("rtradar compare", str(summary["parameters"]["motion"]), subtitle)
+    body = f'<section id="maps"><h2>Side by side</h2>{figures}</section>', tables
+    write_page(path, titles, _DIFFERENCES.substitute(top), body)

@@ -18,7 +18,6 @@ from rtradar.classify.study import Study
 from rtradar.errors import InputError
 from rtradar.report.figures.canvas import new_figure, save_figure
 from rtradar.system.checks import printable
-from rtradar.system.files import atomic_file
 from rtradar.system.output_folder import OutputFiles
 
 Group = tuple[str, Sequence[Outcome]]
@@ -72,10 +71,10 @@ def write_evaluation(
         "groups": [_numbers(title, outcomes, len(classes)) for title, outcomes in groups],
         "plans": [study.plan for study in studies],
     }
-    _write(out / "table.txt", text + "\n")
+    (out / "table.txt").write_text(text + "\n", encoding="utf-8")
     _write_csv(out, groups)
     content["files"] = EVALUATION_FILES.list_of(out)
-    _write(out / "evaluation.json", json.dumps(content, indent=1) + "\n")
+    (out / "evaluation.json").write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     return text, content
 
 
@@ -139,11 +138,13 @@ def _numbers(title: str, outcomes: Sequence[Outcome], n_classes: int) -> dict[st
     }
     if any(one.trained_on for one in outcomes):
         values, mean, spread = scores.transfer(outcomes)
-        # None in place of NaN, which JSON lacks.
-        tables = {"mean": mean, "spread": spread}
-        plain = {key: np.where(np.isnan(all_), None, all_).tolist() for key, all_ in tables.items()}
-        content["transfer"] = {"values": values} | plain
+        content["transfer"] = {"values": values, "mean": _plain(mean), "spread": _plain(spread)}
     return content
+
+
+def _plain(table: NDArray[np.float64]) -> list[list[float | None]]:
+    """Replace NaN, which JSON lacks, by None."""
+    return [[None if np.isnan(value) else value for value in row] for row in table.tolist()]
 
 
 def _write_csv(out: Path, groups: Sequence[Group]) -> None:
@@ -159,19 +160,14 @@ def _write_csv(out: Path, groups: Sequence[Group]) -> None:
                 [title, one.name, epoch, *(f"{row[name]:.6g}" for name in HISTORY)]
                 for epoch, row in enumerate(one.history, start=1)
             ]
-    _write(out / "trainings.csv", _csv(head, trainings))
-    _write(out / "history.csv", _csv([*what, "epoch", *HISTORY], history))
+    (out / "trainings.csv").write_text(_csv(head, trainings), encoding="utf-8")
+    (out / "history.csv").write_text(_csv([*what, "epoch", *HISTORY], history), encoding="utf-8")
 
 
 def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([head, *rows])
     return text.getvalue()
-
-
-def _write(path: Path, text: str) -> None:
-    with atomic_file(path) as file:
-        file.write(text.encode())
 
 
 def draw_accuracies(path: Path, groups: Sequence[Group]) -> None:

@@ -131,10 +131,8 @@ def _asset(name: str) -> str:
 
 def _policy(scripts: Iterable[bytes]) -> str:
     """Content security policy that allows these scripts and embedded pictures only."""
-    none = "'none'"
-    hashes = " ".join(
-        f"'sha256-{base64.b64encode(hashlib.sha256(text).digest()).decode()}'" for text in scripts
-    )
+    none, digests = "'none'", (hashlib.sha256(text).digest() for text in scripts)
+    hashes = " ".join(f"'sha256-{base64.b64encode(digest).decode()}'" for digest in digests)
     # Plotly writes style rules of its own, and pictures for download are blobs.
     sources = f"script-src {hashes or none}; style-src 'unsafe-inline'; img-src data: blob:"
     return f"default-src {none}; {sources}; base-uri {none}; form-action {none}"
@@ -175,13 +173,11 @@ def _text(value: object, unit: str) -> str:
 def table(rows: Iterable[Sequence[str]], head: Sequence[str] = ()) -> str:
     """Make an HTML table of plain texts; the first column names the row."""
     top = "".join(f'<th scope="col">{escape(cell)}</th>' for cell in head)
-    body = "".join(
-        f'<tr><th scope="row">{escape(row[0])}</th>'
-        + "".join(f"<td>{escape(cell)}</td>" for cell in row[1:])
-        + "</tr>"
-        for row in rows
-    )
     head_row = f"<thead><tr>{top}</tr></thead>" if head else ""
+    body = ""
+    for name, *values in rows:
+        cells = "".join(f"<td>{escape(cell)}</td>" for cell in values)
+        body += f'<tr><th scope="row">{escape(name)}</th>{cells}</tr>'
     return f"<table>{head_row}<tbody>{body}</tbody></table>"
 
 

@@ -34,47 +34,23 @@ def _array(kind: str, *axes: str | int) -> Any:
 class Snapshots:
     """Snapshots of a capture at the centres of some frames, stored by field in ``view.npz``.
 
-    Parameters
-    ----------
-    times : (step,) float64
-        Centres of the frames since the start of the capture [s], ascending.
-    window : (step,) int64
-        Indices of the frames along ``time`` of ``maps.h5``.
-    part_names : (part,) str
-        Names of the body parts.
-    poses : (step, part, 4, 3) float32
-        Centre of each part, then its three semi-axes as vectors, in world coordinates [m].
-    path_names : (path,) str
-        Walls and body in the order in which the wave meets them, such as ``floor > body``; the
-        direct path is ``body``.
-    echo_path, echo_part, echo_bounces : (echo,) int64
-        Path index, part index and number of reflections of each echo.
-    range_m, velocity_mps : (step, echo) float64
-        Half the path length from Tx to Rx [m] and its rate [m/s], positive receding; means over
-        receivers weighted by power.
-    power_m2 : (step, echo) float64
-        |amplitude|^2, mean over receivers [m^2]; 0 if occluded, even just before or after.
-    corners : (step, echo, corner, 3) float32
-        Reflection points of the echo on its path from the centre of the array and back, in world
-        coordinates [m]: points in walls and the specular point on the part. NaN after the last one
-        and if the path is unknown.
-    wall_names : (wall,) str
-        Names of the walls.
-    walls : (wall, 4, 3) float64
-        Corners of their front faces, in world coordinates [m].
-    furniture_names : (piece,) str
-        Names of the pieces of furniture.
-    furniture_vertices : (vertex, 3) float32
-        Vertices of all pieces, in world coordinates [m].
-    furniture_faces : (face, 3) int64
-        Indices into the vertices.
-    furniture_piece : (vertex,) int64
-        Index of the piece that each vertex belongs to.
+    ``times`` [s] since the start of the capture ascend; ``window`` are the indices of the frames
+    along ``time`` of ``maps.h5``. ``poses`` are the centre of each part, then its three semi-axes
+    as vectors, in world coordinates [m], as all other places are.
 
-    Raises
-    ------
-    InputError
-        If the shapes do not fit each other, a value is not finite, or an index is out of range.
+    ``path_names`` are walls and body in the order in which the wave meets them, such as ``floor >
+    body``; the direct path is ``body``. ``echo_path``, ``echo_part`` and ``echo_bounces`` are path
+    index, part index and number of reflections of each echo. ``range_m`` and ``velocity_mps`` are
+    half the path length from Tx to Rx and its rate, positive receding, means over receivers
+    weighted by power; ``power_m2`` is |amplitude|^2, mean over receivers, 0 if occluded, even just
+    before or after. ``corners`` are the reflection points of the echo on its path from the centre
+    of the array and back [m]: points in walls and the specular point on the part, NaN after the
+    last one and if the path is unknown.
+
+    ``walls`` are the corners of their front faces, ``furniture_vertices`` those of all pieces,
+    ``furniture_faces`` indices into them, and ``furniture_piece`` the piece of each vertex.
+    InputError if the shapes do not fit each other, a value is not finite, or an index is out of
+    range.
     """
 
     times: NDArray[np.float64] = _array("f8", "step")
@@ -108,10 +84,8 @@ class Snapshots:
         for name, axis in _POINTS_INTO.items():
             index = getattr(self, name)
             if index.size and not (index.min() >= 0 and index.max() < sizes[axis]):
-                raise InputError(
-                    f"view: {name} points at a {axis} that is not there; "
-                    f"it must be from 0 to {sizes[axis] - 1}"
-                )
+                allowed = f"it must be from 0 to {sizes[axis] - 1}"
+                raise InputError(f"view: {name} points at a {axis} that is not there; {allowed}")
         if (np.diff(self.times) <= 0).any() or (self.power_m2 < 0).any():
             raise InputError("view: times must ascend, and power_m2 must not be negative")
 
@@ -135,16 +109,13 @@ def _checked(
     odd = array.dtype in (np.float16, np.longdouble)
     if odd or array.dtype.kind != np.dtype(kind).kind:
         raise InputError(f"view: {name} holds {array.dtype}; it must hold {np.dtype(kind).name}")
+    shape = f"view: {name} has shape {array.shape}"
     if array.ndim != len(axes):
-        raise InputError(
-            f"view: {name} has shape {array.shape}; its axes must be ({', '.join(map(str, axes))})"
-        )
+        raise InputError(f"{shape}; its axes must be ({', '.join(map(str, axes))})")
     for axis, length in zip(axes, array.shape, strict=True):
         wanted = axis if isinstance(axis, int) else sizes.setdefault(axis, length)
         if length != wanted:
-            raise InputError(
-                f"view: {name} has shape {array.shape}; its axis {axis} must have length {wanted}"
-            )
+            raise InputError(f"{shape}; its axis {axis} must have length {wanted}")
     if kind == "U":
         if not all(word.isprintable() for word in array.ravel().tolist()):
             raise InputError(f"view: {name} holds what is no line of text")

@@ -6,6 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize, to_rgba
+from matplotlib.patches import Patch
+from matplotlib.ticker import MultipleLocator
+from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
 from numpy.typing import NDArray
 
 from rtradar.body import unit_sphere
@@ -51,9 +57,6 @@ class _Paint:
     """Colours of echoes, parts and cloud points by part, power or velocity."""
 
     def __init__(self, run_view: RunView, colour: str) -> None:
-        from matplotlib import colormaps
-        from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
-
         self.colour, self._run_view = colour, run_view
         snapshots = run_view.snapshots
         self._groups = np.array(group_of_parts(snapshots.part_names.tolist()))
@@ -92,17 +95,12 @@ class _Paint:
         return self._rgba(run_view.rdt_power_db if by_power else run_view.rdt_points[:, 2])
 
     def _rgba(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        from matplotlib.colors import to_rgba
-
         rgba = np.array(self.map(self.norm(np.nan_to_num(values, nan=0.0)))).reshape(-1, 4)
         rgba[~np.isfinite(values)] = to_rgba(_HIDDEN)
         return rgba
 
     def legend(self, figure: Any, views: list[Any]) -> None:
         """Add a legend of the colours below the views."""
-        from matplotlib.cm import ScalarMappable
-        from matplotlib.patches import Patch
-
         if self.colour == "part":
             patches = [Patch(color=tint, label=name) for name, tint in GROUPS.items()]
             figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
@@ -116,9 +114,6 @@ class _Paint:
 
 
 def _draw_body(axes: Any, run_view: RunView, step: int, paint: _Paint) -> None:
-    from matplotlib.ticker import MultipleLocator
-    from mpl_toolkits.mplot3d.art3d import Line3DCollection, Poly3DCollection
-
     snapshots, radar = run_view.snapshots, run_view.radar
     vertices, faces = unit_sphere(2)
     poses = snapshots.poses[step].astype(np.float64)
@@ -178,12 +173,8 @@ def _draw_map(figure: Any, axes: Any, run_view: RunView, step: int, paint: _Pain
     rgba, velocity = paint.echoes(step), run_view.shown_velocity()[step]
     for direct in (False, True):
         own = np.flatnonzero(run_view.seen[step] & (snapshots.direct == direct))
-        style: dict[str, Any] = {
-            "marker": "D",
-            "s": 14,
-            "facecolors": "none",
-            "edgecolors": rgba[own],
-        }
+        style: dict[str, Any] = {"marker": "D", "s": 14, "facecolors": "none"}
+        style["edgecolors"] = rgba[own]
         if direct:
             style = {"marker": "o", "s": 40, "color": rgba[own], "edgecolors": "white"}
         axes.scatter(velocity[own], snapshots.range_m[step, own], linewidths=0.7, **style)
