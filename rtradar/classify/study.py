@@ -209,9 +209,9 @@ def train_study(
         bar.update((len(numbers) - len(missing)) * recipe.epochs_run)
         for number in missing:
             one, folder = splits[number], _made_folder(training_folder(out, number))
-            test = examples.of(one.test)
+            test = examples[one.test]
             network, history = training.train_network(
-                examples.of(one.train),
+                examples[one.train],
                 test,
                 recipe,
                 seed=seed,

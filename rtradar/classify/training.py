@@ -57,18 +57,7 @@ class Examples:
     classes: Tensor
     names: tuple[str, ...]
 
-    def of(self, indices: NDArray[np.int64]) -> Examples:
-        """Return a subset.
-
-        Parameters
-        ----------
-        indices : (cloud,) int64
-            Indices of the clouds.
-
-        Returns
-        -------
-        chosen : Examples
-        """
+    def __getitem__(self, indices: NDArray[np.int64]) -> Examples:
         chosen = torch.from_numpy(indices)
         return Examples(self.points[chosen], self.classes[chosen], self.names)
 
@@ -151,7 +140,7 @@ def train_network(
     if len(train.points) < 2:
         raise InputError(f"{len(train.points)} training cloud: batch norm needs at least 2")
     device = device or torch.device("cpu")
-    monitored = test.of(np.arange(0, len(test.points), -(-len(test.points) // _MAX_MONITORED)))
+    monitored = test[np.arange(0, len(test.points), -(-len(test.points) // _MAX_MONITORED))]
     # Torch's random state is restored afterwards.
     with torch.random.fork_rng(devices=[device] if device.type == "cuda" else []):
         torch.manual_seed(_number(seed, 0))

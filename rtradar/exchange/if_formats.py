@@ -134,13 +134,8 @@ def write_int16(path: Path, recording: IfRecording) -> dict[str, Any]:
     """Write (chirp, tx, rx, sample, IQ) as little-endian int16 with a JSON file beside it.
 
     The largest real or imaginary part becomes 32767, and rounding errors are at most half of
-    ``scale``.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be written, a foreign file has the name of the JSON file, or a sample is
-        not finite.
+    ``scale``. InputError if a file cannot be written, a foreign file has the name of the JSON file,
+    or a sample is not finite.
     """
     beside = path.with_suffix(".json")
     for file in (path, beside):

@@ -42,34 +42,11 @@ class SpectraSink(Protocol):
 class Capture:
     """Everything that `prepare` settles before the first echo is computed.
 
-    Parameters
-    ----------
-    motion : str
-        Name of the recording.
-    scene : Scene
-        Scene around the person.
-    settings : RunSettings
-        Settings of the run.
-    processing : Processing
-        Radar at its position in the scene, and what its range spectra go through.
-    body : Body
-        Person at their position in the scene.
-    model : EchoModel
-        Echo model of the person, and of the paths over walls if the scene has any.
-    inside : Indoors, optional
-        Room, if the scene has one.
-    survey : LinkBudget
-        Link budget of the person's parts.
-    warned : tuple of str
-        Warnings of the link budget.
-    noise : Noise
-        Noise of the IF samples.
-    n_chirps : int
-        Number of chirps, in whole TDM cycles.
-    frame_starts : (frame,) int64
-        First cycle of each frame.
-    warmup_s : float
-        Time until everything was compiled or loaded [s].
+    ``processing`` has the radar at its position in the scene, ``body`` is the person at theirs.
+    ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or None.
+    ``survey`` is the link budget of the person's parts, ``warned`` its warnings. ``n_chirps`` are
+    whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
+    the IF samples, and ``warmup_s`` the time until everything was compiled or loaded [s].
     """
 
     motion: str
@@ -110,15 +87,8 @@ class Capture:
     def stream(self, sink: SpectraSink, kept: Any = None, *, progress: bool = True) -> None:
         """Compute echoes in blocks of chirps, and from them IF samples, noise and range spectra.
 
-        Parameters
-        ----------
-        sink : SpectraSink
-            Object that receives the range spectra.
-        kept : array-like, optional
-            Array (chirp, rx, sample) that receives the IF samples with noise; with DDM it has one
-            chirp for each cycle.
-        progress : bool
-            Whether a progress bar is shown on a terminal.
+        The sink receives the range spectra. The array ``kept`` (chirp, rx, sample), if there is
+        one, receives the IF samples with noise; with DDM it has one chirp for each cycle.
         """
         radar, stages = self.radar, self.stages
         room = self.inside.room if self.inside else None
@@ -147,12 +117,9 @@ class Capture:
                     begin = first * len(received) // n
                     kept[begin : begin + len(received)] = received
             with stages.time("range"):
-                return range_spectrum(
-                    separate(received, radar, first),
-                    radar,
-                    window_functions=self.processing.window_functions,
-                    out=spectra_of[:n],
-                )
+                windows, whole = self.processing.window_functions, spectra_of[:n]
+                separated = separate(received, radar, first)
+                return range_spectrum(separated, radar, window_functions=windows, out=whole)
 
         # A function of its own: names that a loop binds would keep echoes alive while the next
         # block is computed.
@@ -172,9 +139,5 @@ class Capture:
 def chirps_of(echoes: Echoes, begin: int, end: int) -> Echoes:
     """Return the echoes of some chirps of a block."""
     chirps = slice(begin, end)
-    return dataclasses.replace(
-        echoes,
-        length=echoes.length[chirps],
-        amplitude=echoes.amplitude[:, chirps],
-        tx=echoes.tx[chirps],
-    )
+    length, amplitude = echoes.length[chirps], echoes.amplitude[:, chirps]
+    return dataclasses.replace(echoes, length=length, amplitude=amplitude, tx=echoes.tx[chirps])

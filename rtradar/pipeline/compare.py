@@ -20,13 +20,7 @@ from rtradar.pipeline.writer import files_of_runs
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
-from rtradar.report.pages.comparison import (
-    draw_maps,
-    draw_part_power,
-    draw_power_over_time,
-    draw_rdt_clouds,
-    write_comparison,
-)
+from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
@@ -150,7 +144,9 @@ def compare(
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, radar, names[-1])
         pictures, unit = _draw(results, folder, radar, names[-1])
-        write_comparison(folder / "compare.html", summary, comparison_rows(summary), pictures, unit)
+        comparison.write_comparison(
+            folder / "compare.html", summary, comparison_rows(summary), pictures, unit
+        )
         summary["files"] = kind.list_of(folder)
         text = json.dumps(summary, indent=2, allow_nan=False) + "\n"
         (folder / "compare.json").write_text(text, encoding="utf-8")
@@ -190,6 +186,7 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
     maps, overlap, spectrogram = _map_agreement(result.out, reference.out)
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
     hidden = result.survey.hidden_at
+    of_parts = hidden.mean(axis=0).tolist()
     return {
         "power_mean_db": _finite(float(power.mean())),
         "power_rms_db": _finite(float(np.sqrt((power**2).mean()))),
@@ -204,14 +201,9 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
         "rdt_chamfer_bins": _finite(chamfer(result.points, reference.points, bins)),
         "scatter_s": stages["scatter"] + stages["survey"],
         "wall_s": summary["wall_s"],
-        "real_time_factor": summary["real_time_factor"],
-        "peak_memory_mb": summary["peak_memory_mb"],
-        "stages": stages,
-        "limits": summary["limits"],
-        "part_power_m2": summary["part_power_m2"],
-        "part_hidden_share": dict(
-            zip(summary["part_power_m2"], hidden.mean(axis=0).tolist(), strict=True)
-        ),
+        **{name: summary[name] for name in ("real_time_factor", "peak_memory_mb", "stages")},
+        **{name: summary[name] for name in ("limits", "part_power_m2")},
+        "part_hidden_share": dict(zip(summary["part_power_m2"], of_parts, strict=True)),
     }
 
 
@@ -234,11 +226,13 @@ def _draw(
     surveys = {name: result.survey for name, result in results.items()}
     times = surveys[reference].times
     total = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
-    draw_power_over_time(next(paths), times, total, unit_of(total.values()), reference, title)
+    comparison.draw_power_over_time(
+        next(paths), times, total, unit_of(total.values()), reference, title
+    )
     mean = {name: survey.power_at.mean(axis=0) for name, survey in surveys.items()}
     hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
     parts, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
-    draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
+    comparison.draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
 
     with h5py.File(results[reference].out / "maps.h5") as maps:
         frame = busiest_frame(maps)
@@ -257,12 +251,16 @@ def _draw(
             levels[name] = by_range.level(maps["range_doppler"][frame] / radar.n_channels)
             spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / range_bins
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
-    draw_maps(next(paths), levels, by_range.label("mean of channels"), across, up, frame_title)
+    comparison.draw_maps(
+        next(paths), levels, by_range.label("mean of channels"), across, up, frame_title
+    )
     unit = unit_of(spectrograms.values())
     levels = {name: unit.level(power) for name, power in spectrograms.items()}
     across, up = ("Time [s]", times), (VELOCITY_LABEL, slow)
-    draw_maps(next(paths), levels, unit.label("one channel"), across, up, slow_title)
-    draw_rdt_clouds(next(paths), {name: result.points for name, result in results.items()}, title)
+    comparison.draw_maps(next(paths), levels, unit.label("one channel"), across, up, slow_title)
+    comparison.draw_rdt_clouds(
+        next(paths), {name: result.points for name, result in results.items()}, title
+    )
     return drawn, part_unit
 
 
@@ -272,12 +270,8 @@ def _draw(
 class LevelAgreement(NamedTuple):
     """Agreement of two maps in decibels.
 
-    Parameters
-    ----------
-    correlation : float
-        Pearson correlation of the decibels; NaN if a map is flat or fewer than two cells count.
-    mean_db, rms_db : float
-        Mean and root mean square of the difference, map less reference [dB]; NaN if no cell counts.
+    ``correlation`` is Pearson's, NaN if a map is flat or fewer than two cells count. ``mean_db``
+    and ``rms_db`` are those of the difference, map less reference [dB], NaN if no cell counts.
     """
 
     correlation: float
@@ -288,19 +282,9 @@ class LevelAgreement(NamedTuple):
 def level_agreement(
     power: ArrayLike, reference: ArrayLike, where: NDArray[np.bool_]
 ) -> LevelAgreement:
-    """Compare two power maps in decibels over the cells of a mask.
+    """Compare two power maps of one shape in decibels over the cells of a mask, all positive.
 
-    Parameters
-    ----------
-    power, reference : array_like of float
-        Power maps of one shape, positive in these cells.
-    where : array of bool
-        Mask of the cells to compare. Leave out noise that both share: it would make any two maps
-        alike.
-
-    Returns
-    -------
-    LevelAgreement
+    The mask should leave out noise that both share: it would make any two maps alike.
     """
     ours, other = (
         10 * np.log10(np.asarray(values)[where].astype(np.float64)) for values in (power, reference)
@@ -324,26 +308,15 @@ def above_noise(power: ArrayLike) -> NDArray[np.bool_]:
 def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: ArrayLike) -> float:
     """Compute the Chamfer distance: mean distance to the nearest point of the other cloud.
 
-    Parameters
-    ----------
-    points, reference : (n, axis), (m, axis) float64
-        Clouds.
-    bins : (axis,) array_like
-        Unit of each axis, such as the width of its bins.
-
-    Returns
-    -------
-    float
-        Average over both directions [bins]. Two samplings of one surface have half the mean
-        distance between points, not 0. Infinite if one cloud alone is empty, 0 if both are.
+    The distance between clouds (n, axis) and (m, axis), in the unit ``bins`` (axis,) of each axis,
+    is the average over both directions. Two samplings of one surface have half the mean distance
+    between points, not 0. Infinite if one cloud alone is empty, 0 if both are.
     """
     from scipy.spatial import KDTree  # slow to import
 
     if not len(points) or not len(reference):
         return 0.0 if len(points) == len(reference) else np.inf
-    ours, other = (
-        np.asarray(cloud) / np.asarray(bins, dtype=np.float64) for cloud in (points, reference)
-    )
+    ours, other = (np.divide(cloud, bins) for cloud in (points, reference))
     there, back = KDTree(other).query(ours)[0], KDTree(ours).query(other)[0]
     return float(there.mean() + back.mean()) / 2
 
@@ -359,9 +332,8 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
             cells.append([maps["range_doppler"][frame][union] for maps in (first, second)])
         power, its_power = (np.concatenate(column) for column in zip(*cells, strict=True))
         levels = level_agreement(power, its_power, np.ones(len(power), dtype=bool))
-        spectrogram, its = (
-            thinned(maps, "spectrogram", "spectrogram_time")[0] for maps in (first, second)
-        )
+        names = "spectrogram", "spectrogram_time"
+        spectrogram, its = (thinned(maps, *names)[0] for maps in (first, second))
         alike = level_agreement(spectrogram, its, above_noise(spectrogram) | above_noise(its))
         return levels, both / either if either else 1.0, alike
 

@@ -61,14 +61,10 @@ def indoors(
             "dropped": [asdict(item) for item in clutter.dropped],
         },
     }
-    return Indoors(model, room, summary, _limits(model))
-
-
-def _limits(model: RoomModel) -> tuple[Limit, ...]:
-    """Walls that are not followed over the sweep, where they matter."""
+    # Walls that are not followed over the sweep, where they matter.
     fraction = max(model.not_followed.values(), default=0.0)
     if fraction == 0:
-        return ()
+        return Indoors(model, room, summary, ())
     message = (
         f"echo power by walls whose coefficient over the sweep is not known to {FIELD_ERROR:.0%}, "
         "because they are too dispersive or transmit too little: "
@@ -76,4 +72,4 @@ def _limits(model: RoomModel) -> tuple[Limit, ...]:
     )
     limit = Limit("wall_frequency_response", fraction, message)
     warn_of(limit)
-    return (limit,)
+    return Indoors(model, room, summary, (limit,))

@@ -33,70 +33,41 @@ _GROWING = ("time", "slow_time", "spectrogram_time")
 
 class _Map(NamedTuple):
     axes: tuple[str, ...]
-    dtype: type
-    unit: str
     meaning: str
+    dtype: type = np.float32
+    unit: str = "m2"
     sparse: bool = False  # mostly zeros, which cost nothing once compressed
 
 
 _CELLS = "power summed over detected cells"
+_FRAME = ("time", "range", "velocity")
+_SLOW = ("spectrogram_time", "spectrogram_velocity")
+_COLUMNS_MEAN = "power averaged over channels and a few cycles"
 _MAPS = {
-    "range_doppler": _Map(
-        ("time", "range", "velocity"), np.float32, "m2", "power summed over all channels"
-    ),
-    "detections": _Map(
-        ("time", "range", "velocity"), np.uint8, "1", "1 where a target is detected", sparse=True
-    ),
-    "range_time": _Map(
-        ("slow_time", "range"), np.float32, "m2", "power averaged over channels and a few cycles"
-    ),
-    "spectrogram": _Map(
-        ("spectrogram_time", "spectrogram_velocity"),
-        np.float32,
-        "m2",
-        "power of one channel summed over range",
-    ),
-    "range_azimuth": _Map(("time", "range", "azimuth"), np.float32, "m2", _CELLS, sparse=True),
-    "range_elevation": _Map(("time", "range", "elevation"), np.float32, "m2", _CELLS, sparse=True),
+    "range_doppler": _Map(_FRAME, "power summed over all channels"),
+    "detections": _Map(_FRAME, "1 where a target is detected", np.uint8, "1", sparse=True),
+    "range_time": _Map(("slow_time", "range"), _COLUMNS_MEAN),
+    "spectrogram": _Map(_SLOW, "power of one channel summed over range"),
+    "range_azimuth": _Map(("time", "range", "azimuth"), _CELLS, sparse=True),
+    "range_elevation": _Map(("time", "range", "elevation"), _CELLS, sparse=True),
 }
+_BEFORE = "{} window before clutter was removed"
+_MARKED = "1 where a target is detected in range_doppler_received"
 _SINGLE = {
-    "range_doppler_received": _Map(
-        ("range", "velocity"),
-        np.float32,
-        "m2",
-        "range_doppler of one window before clutter was removed",
-    ),
-    "detections_received": _Map(
-        ("range", "velocity"),
-        np.uint8,
-        "1",
-        "1 where a target is detected in range_doppler_received",
-    ),
-    "range_azimuth_received": _Map(
-        ("range", "azimuth"),
-        np.float32,
-        "m2",
-        "range_azimuth of that window before clutter was removed",
-    ),
+    "range_doppler_received": _Map(_FRAME[1:], _BEFORE.format("range_doppler of one")),
+    "detections_received": _Map(_FRAME[1:], _MARKED, np.uint8, "1"),
+    "range_azimuth_received": _Map(("range", "azimuth"), _BEFORE.format("range_azimuth of that")),
 }
 _STEPS_A_CHUNK = 64  # time steps written together, for maps with few numbers a step
 
 
 class MapStore:
-    """HDF5 file of maps that grow along their first axis.
+    """HDF5 file of maps that grow along their first axis; an existing file is replaced.
 
-    Parameters
-    ----------
-    path : path
-        File, which is replaced if it exists.
-    fixed : mapping of str to (n,) float64
-        Axes of known values, such as ``range`` and ``velocity``. Maps with another axis that does
-        not grow are left out: a radar without a z-line has no elevation.
-    attributes : mapping
-        Attributes of the file.
-    clutter_removal : mapping of str to str, optional
-        Removal of static clutter from the maps along each growing axis, an attribute of their
-        datasets; ``none`` if left out.
+    ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
+    not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
+    growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
+    becomes an attribute of their datasets, ``attributes`` those of the file.
     """
 
     def __init__(
@@ -120,21 +91,14 @@ class MapStore:
             shape = tuple(len(fixed[axis]) for axis in kind.axes[1:])
             steps = 1 if len(shape) > 1 else _STEPS_A_CHUNK
             chunk_bytes = steps * math.prod(shape) * np.dtype(kind.dtype).itemsize
-            packed = {"compression": "gzip", "compression_opts": 1, "shuffle": True}
-            self._describe(
-                self._file.create_dataset(
-                    name,
-                    shape=(0, *shape),
-                    maxshape=(None, *shape),
-                    dtype=kind.dtype,
-                    chunks=(steps, *shape),
-                    # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
-                    rdcc_nbytes=0 if steps == 1 else chunk_bytes,
-                    **(packed if kind.sparse else {}),
-                ),
-                kind,
-                clutter_removal=(clutter_removal or {}).get(kind.axes[0], "none"),
-            )
+            options: dict[str, Any] = {"maxshape": (None, *shape), "chunks": (steps, *shape)}
+            # HDF5 would cache up to 8 MB of each map; only an unfinished chunk needs it.
+            options["rdcc_nbytes"] = 0 if steps == 1 else chunk_bytes
+            if kind.sparse:
+                options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+            data = self._file.create_dataset(name, (0, *shape), kind.dtype, **options)
+            removal = (clutter_removal or {}).get(kind.axes[0], "none")
+            self._describe(data, kind, clutter_removal=removal)
 
     def _scale(self, name: str, **options: Any) -> None:
         axis = self._file.create_dataset(name, **options)

@@ -13,17 +13,8 @@ from numpy.typing import NDArray
 from rtradar.pipeline.capture import Capture
 from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.processing import Clouds
-from rtradar.report import (
-    draw_before_after,
-    draw_plan,
-    draw_range_angle,
-    draw_range_azimuth_with_walls,
-    draw_range_doppler,
-    draw_range_time,
-    draw_rdt_cloud,
-    draw_spatial_cloud,
-    draw_spectrogram,
-)
+from rtradar.report.figures import maps as figures
+from rtradar.report.figures import rooms
 from rtradar.scatter.multipath.path_summary import ghosts
 
 _COLUMNS = 600
@@ -36,10 +27,7 @@ _TRACK_POINTS = 400
 def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, Path]:
     """Draw ``maps.h5`` of this folder, the clouds, and the room if there is one.
 
-    Returns
-    -------
-    dict of title to path
-        PNG files in the same folder, in the order in which they are best looked at.
+    Returns the PNG files by their titles, in the order in which they are best looked at.
     """
     drawn: dict[str, Path] = {}
     radar, title, spreading = capture.radar, capture.title, capture.settings.spreading
@@ -53,19 +41,19 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
         power, times = thinned(maps, "range_time", "slow_time")
         heading = title + removed(maps["range_time"])
         file = to("Range over time", "range_time.png")
-        draw_range_time(file, power, times, radar, heading, spreading=spreading)
+        figures.draw_range_time(file, power, times, radar, heading, spreading=spreading)
         if len(maps["spectrogram_time"]):
             power, times = thinned(maps, "spectrogram", "spectrogram_time")
             velocity = maps["spectrogram_velocity"][:]
             heading = title + removed(maps["spectrogram"])
             file = to("Spectrogram", "spectrogram.png")
-            draw_spectrogram(file, power, times, velocity, radar, heading, **options)
+            figures.draw_spectrogram(file, power, times, velocity, radar, heading, **options)
         frame = busiest_frame(maps)
         cleaned = removed(maps["range_doppler"])
         heading = f"{title}, window at {float(maps['time'][frame]):.2f} s{cleaned}"
         power, mask = maps["range_doppler"][frame], maps["detections"][frame].astype(bool)
         file = to("Range-Doppler map and detections", "range_doppler.png")
-        draw_range_doppler(file, power, mask, radar, heading, spreading=spreading)
+        figures.draw_range_doppler(file, power, mask, radar, heading, spreading=spreading)
         angles = {
             angle: (maps[f"range_{angle}"][frame], maps[angle][:])
             for angle in ("azimuth", "elevation")
@@ -74,15 +62,17 @@ def draw_pictures(folder: Path, capture: Capture, clouds: Clouds) -> dict[str, P
         if angles:
             panels = " and ".join(f"range-{angle}" for angle in angles).capitalize()
             file = to(panels, "range_angle.png")
-            draw_range_angle(file, angles, radar, heading, **options)
+            figures.draw_range_angle(file, angles, radar, heading, **options)
         heading = title + cleaned
-        draw_rdt_cloud(to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, heading)
+        figures.draw_rdt_cloud(
+            to("Range-Doppler-time cloud", "cloud_rdt.png"), clouds.rdt.points, heading
+        )
         if angles:
             strongest = clouds.spatial.strongest()
             every = math.ceil(max(len(strongest.points), 1) / _SPATIAL_DOTS)
             points, velocity = strongest.points[::every], strongest.velocity[::every]
             file = to("Spatial cloud", "cloud_xyz.png")
-            draw_spatial_cloud(file, points, velocity, radar, heading)
+            figures.draw_spatial_cloud(file, points, velocity, radar, heading)
         if capture.inside:
             drawn |= _draw_room(folder, capture, capture.inside, maps, frame)
     return drawn
@@ -117,21 +107,20 @@ def _draw_room(
     marked = [(walls, ghost.range_m, ghost.velocity_mps) for walls, ghost in by_walls.items()]
     name = f"Range-Doppler{' before and after' if suffix else ''}, and ghosts"
     drawn = {name: folder / "clutter_removal.png"}
-    draw_before_after(drawn[name], panels, marked, radar, heading)
+    rooms.draw_before_after(drawn[name], panels, marked, radar, heading)
     if "azimuth" in maps and "range_azimuth" + suffix in maps:
         name = "Range-azimuth with walls and ghosts"
         drawn[name] = folder / "range_azimuth_walls.png"
         places = [(ghost.path, ghost.range_m, ghost.azimuth_rad) for ghost in found]
         power, azimuth = received("range_azimuth"), maps["azimuth"][:]
         windows = capture.processing.window_functions
-        draw_range_azimuth_with_walls(
-            drawn[name], power, azimuth, scene, radar, places, heading, windows
-        )
+        axes = power, azimuth, scene, radar
+        rooms.draw_range_azimuth_with_walls(drawn[name], *axes, places, heading, windows)
     track = body.motion.at(np.linspace(0, body.duration_s, _TRACK_POINTS))[0][:, 0, :2]
     middle = body.motion.at([min(time_s, body.duration_s)])[0][0, 0]
     paths = {ghost.path: inside.model.course(ghost.path, middle) for ghost in found}
     drawn["Plan of the room, with paths"] = folder / "plan.png"
-    draw_plan(folder / "plan.png", scene, radar, track, paths, heading)
+    rooms.draw_plan(folder / "plan.png", scene, radar, track, paths, heading)
     return drawn
 
 

@@ -49,26 +49,23 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
         model = _echo_model(radar, body, scene, settings)
         echoes = model.echoes(np.arange(2 * radar.n_tx))
         # Not every model has specular points; the report shows them of all.
-        solve_specular_points(
-            Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0])), points=True
-        )
+        geometry = Geometry(radar.tx[:1], radar.rx[None, :1], *body.at([0.0]))
+        solve_specular_points(geometry, points=True)
     warm_up_processing(echoes, radar)
     warmup_s = time.perf_counter() - warm_up_start
     with warnings.catch_warnings(record=True) as caught, processing.stages.time("survey"):
         warnings.simplefilter("always", ValidityWarning)
         person = model.person if isinstance(model, RoomModel) else model
-        budget = link_budget(
-            person, radar, body, n_chirps, spreading=settings.spreading, scene=scene
-        )
+        spreading = settings.spreading
+        budget = link_budget(person, radar, body, n_chirps, spreading=spreading, scene=scene)
     for warning in caught:
         warnings.warn_explicit(warning.message, warning.category, warning.filename, warning.lineno)
     noise = _noise(radar, budget, settings)
     inside = None
     if isinstance(model, RoomModel):
         with processing.stages.time("room"):
-            inside = indoors(
-                model, radar, body, scene, settings, n_chirps, budget.power, noise.power
-            )
+            powers = budget.power, noise.power
+            inside = indoors(model, radar, body, scene, settings, n_chirps, *powers)
     return Capture(
         motion=motion.name,
         scene=scene,
@@ -88,10 +85,9 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
 
 def _placed(motion: Motion, scene: Scene, settings: RunSettings) -> Body:
     """Return the person at their position in the scene."""
+    start_s, duration_s = settings.start_s, settings.duration_s
     heading_deg = settings.heading_deg + scene.heading_deg
-    placed = place(
-        motion, start_s=settings.start_s, duration_s=settings.duration_s, heading_deg=heading_deg
-    )
+    placed = place(motion, start_s=start_s, duration_s=duration_s, heading_deg=heading_deg)
     return Body.from_motion(placed.shifted([*scene.person_position_m, 0.0]))
 
 

@@ -44,22 +44,10 @@ _MAX_BYTES = 8e6  # of IF samples: part of them stays in the cache, and all thre
 
 @dataclass(frozen=True)
 class Processing:
-    """How range spectra of one capture are processed.
+    """How range spectra of one capture are processed, with the radar at its position in the scene.
 
-    Parameters
-    ----------
-    radar : Radar
-        Radar at its position in the scene.
-    detect : Detector
-        Detector that marks the cells of a range-Doppler map.
-    removal : ClutterRemoval
-        Filter that removes static clutter before Doppler.
-    window_functions : WindowFunctions
-        Window functions of fast and slow time.
-    seed : int
-        Seed of the sampling of clouds.
-    stages : Stages
-        Record of the time that each stage takes.
+    ``detect`` marks the cells of a range-Doppler map, ``removal`` removes static clutter before
+    Doppler, ``seed`` is that of the sampling of clouds, and ``stages`` record the time.
     """
 
     radar: Radar
@@ -82,17 +70,7 @@ class Processing:
 
 
 class Clouds(NamedTuple):
-    """The clouds of a capture.
-
-    Parameters
-    ----------
-    rdt : RdtCloudResult
-        Range-Doppler-time cloud.
-    spatial : SpatialCloud
-        Points in space.
-    n_spatial : int
-        Number of points that the spatial cloud was sampled from.
-    """
+    """The clouds of a capture; the spatial one was sampled from ``n_spatial`` points."""
 
     rdt: RdtCloudResult
     spatial: SpatialCloud
@@ -100,18 +78,10 @@ class Clouds(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """One processed frame.
+    """One processed frame, centred at ``middle_s``.
 
-    Parameters
-    ----------
-    middle_s : float
-        Time of its centre [s].
-    power : (range, velocity) float32
-        Range-Doppler map [m^2].
-    mask : (range, velocity) bool
-        Detections.
-    angles : AngleSpectra, optional
-        Angle spectra of the detected cells; None if the radar measures no angle.
+    ``power`` is its map (range, velocity) [m^2], ``mask`` marks the detections, and ``angles`` are
+    the spectra of the detected cells, None if the radar measures no angle.
     """
 
     middle_s: float
@@ -123,10 +93,7 @@ class Frame(NamedTuple):
 class CloudMaker:
     """Accumulates the clouds of one capture from its range spectra.
 
-    Attributes
-    ----------
-    max_chirps : int
-        Largest number of chirps in one call of `push`, so that memory stays low.
+    So that memory stays low, `push` takes at most ``max_chirps`` chirps.
     """
 
     def __init__(self, processing: Processing) -> None:
@@ -167,9 +134,7 @@ class CloudMaker:
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
                     found = spatial_points(angles, radar, middle)
-                    self._spatial.add(
-                        np.column_stack([found.points, found.velocity, found.power, found.time])
-                    )
+                    self._spatial.add(np.column_stack(list(vars(found).values())))
             yield Frame(middle, power, mask, angles)
 
     def finish(self) -> Clouds:
@@ -198,10 +163,8 @@ def frame_angles(
         blocks.append(angle_spectra(values, radar, radar.range_m[row], velocity[column]))
     if len(blocks) == 1:
         return blocks[0]
-    joined: dict[str, Any] = {
-        name: None
-        if getattr(blocks[0], name) is None
-        else np.concatenate([getattr(block, name) for block in blocks])
-        for name in ("y", "z", "range_m", "velocity")
-    }
+    joined: dict[str, Any] = {}
+    for name in ("y", "z", "range_m", "velocity"):
+        parts = [getattr(block, name) for block in blocks]
+        joined[name] = None if parts[0] is None else np.concatenate(parts)
     return AngleSpectra(blocks[0].sines, **joined)

@@ -49,41 +49,13 @@ class _Observed(NamedTuple):
 
 
 def snapshots(capture: Capture) -> Snapshots:
-    """Return body, room and echoes of a capture at the middle of evenly chosen frames."""
-    radar, starts = capture.radar, capture.frame_starts
-    return snapshots_of(capture.model, radar, capture.body, capture.scene, starts, capture.n_chirps)
+    """Return body, room and echoes of a capture at the middle of evenly chosen frames.
 
-
-def snapshots_of(
-    model: EchoModel,
-    radar: Radar,
-    body: Body,
-    scene: Scene,
-    frame_starts: NDArray[np.int64],
-    n_chirps: int,
-) -> Snapshots:
-    """Return snapshots at the middle of frames; as many for any length of the capture.
-
-    Parameters
-    ----------
-    model : EchoModel
-        Echo model; its echoes from the Tx nearest to the middle of the array are summed by path,
-        part and number of reflections.
-    radar : Radar
-        Radar at its position in the scene.
-    body : Body
-        Person at their position in the scene.
-    scene : Scene
-        Walls and furniture.
-    frame_starts : (frame,) int64
-        First cycle of each frame.
-    n_chirps : int
-        Number of chirps in the capture.
-
-    Returns
-    -------
-    Snapshots
+    There are as many for any length of the capture. Echoes from the Tx nearest to the middle of the
+    array are summed by path, part and number of reflections.
     """
+    model, radar, body, scene = capture.model, capture.radar, capture.body, capture.scene
+    frame_starts = capture.frame_starts
     hop_s = radar.frame_hop_s
     if len(frame_starts) > 1:
         hop_s = float(np.diff(frame_starts).mean()) * radar.cycle_duration_s
@@ -92,7 +64,7 @@ def snapshots_of(
     times = np.minimum(radar.window_times(frame_starts[window]), body.duration_s)
     paths = model.paths if isinstance(model, RoomModel) else (WallPath((), ()),)
     cycles = frame_starts[window] + radar.cycles_per_frame // 2
-    keys, observed = _observe(model, radar, cycles, n_chirps // radar.n_tx)
+    keys, observed = _observe(model, radar, cycles, capture.n_chirps // radar.n_tx)
     chosen = _strongest(keys, observed.power_m2)
     keys = [keys[number] for number in chosen]
     used = sorted({path for path, _, _ in keys})
@@ -212,13 +184,10 @@ def _corners(
     out = np.full((len(times), len(keys), most, 3), np.nan)
     for number in {path for path, _, _ in keys}:
         path = paths[number]
-        _, _, point = solve_specular_points(
-            Geometry(images(path.out, centre), images(path.back, centre)[:, None], *poses),
-            points=True,
-        )
-        there, back = (
-            corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in (path.out, path.back)
-        )
+        out_and_back = images(path.out, centre), images(path.back, centre)[:, None]
+        _, _, point = solve_specular_points(Geometry(*out_and_back, *poses), points=True)
+        legs = path.out, path.back
+        there, back = (corners(leg, centre[:, None], point[:, 0])[0][1:] for leg in legs)
         course = np.stack([*there, *reversed(back[:-1])], axis=2)
         for echo, (other, part, bounces) in enumerate(keys):
             if other == number and bounces == path.order + 1:
@@ -228,11 +197,8 @@ def _corners(
 
 def _furniture(scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int64], NDArray[np.int64]]:
     """Return vertices (vertex, 3), faces (face, 3) and the piece of each vertex (vertex,)."""
-    vertices, faces, piece = (
-        [np.zeros((0, 3))],
-        [np.zeros((0, 3), dtype=np.int64)],
-        [np.zeros(0, dtype=np.int64)],
-    )
+    vertices, piece = [np.zeros((0, 3))], [np.zeros(0, dtype=np.int64)]
+    faces = [np.zeros((0, 3), dtype=np.int64)]
     for number, one in enumerate(scene.furniture):
         triangles = one.triangles()
         if len(triangles.faces) > MAX_FACES:

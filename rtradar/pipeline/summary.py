@@ -17,9 +17,8 @@ from rtradar.pipeline.timing import peak_memory_mb
 from rtradar.scatter import account_of
 
 _PACKAGES = (
-    *("rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba"),
-    *("scikit-image", "trimesh", "torch"),
-)
+    "rtradar", "mitsuba", "drjit", "numpy", "scipy", "numba", "scikit-image", "trimesh", "torch",
+)  # fmt: skip
 
 
 def cost(capture: Capture, started_s: float) -> dict[str, Any]:
@@ -39,6 +38,8 @@ def cost(capture: Capture, started_s: float) -> dict[str, Any]:
 def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, Any]:
     """Return the summary of a run that started at ``started_s``, see `cost`."""
     settings, radar, survey = capture.settings, capture.radar, capture.survey
+    # A model may trace nothing yet, and would if a part came near a line of sight.
+    traces = capture.model.variant is not None or getattr(capture.model, "traces", False)
     summary = {
         "parameters": {
             "motion": capture.motion,
@@ -51,7 +52,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "versions": {"python": platform.python_version(), **_versions()},
         "fidelity": settings.fidelity,
         "variant": capture.model.variant,
-        "occlusion": "mitsuba" if _traces(capture) else "none",
+        "occlusion": "mitsuba" if traces else "none",
         **cost(capture, started_s),
         "windows": len(capture.frame_starts),
         "chirps": capture.n_chirps,
@@ -87,19 +88,12 @@ def plain(value: object) -> Any:
     raise TypeError(f"a {type(value).__name__} has no place in summary.json")
 
 
-def _traces(capture: Capture) -> bool:
-    """Whether the model asks Mitsuba, or would if a part came near a line of sight."""
-    return capture.model.variant is not None or getattr(capture.model, "traces", False)
-
-
 def _limits(capture: Capture) -> list[dict[str, Any]]:
     of_room = capture.inside.limits if capture.inside else ()
     limits = [dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)]
     if not capture.survey.visible:
-        limits += [
-            {"name": "nobody_visible", "share": 0.0, "message": message}
-            for message in capture.warned
-        ]
+        invisible = {"name": "nobody_visible", "share": 0.0}
+        limits += [invisible | {"message": message} for message in capture.warned]
     return limits
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -56,32 +57,13 @@ def view(
     time_s: float | None = None,
     colour: str = "part",
 ) -> dict[str, Any]:
-    """Show what `run` left in a folder: a page that moves, a still, or both.
+    """Show what `run` left in a folder: a page that moves (HTML), a still (PNG), or both.
 
-    Parameters
-    ----------
-    folder : path
-        Folder of a run.
-    page : path, optional
-        HTML file to write, which needs no other file.
-    still : path, optional
-        PNG file to draw.
-    time_s : float, optional
-        Time of the still [s], taken from the nearest frame; the middle of the capture if left out.
-    colour : {"part", "power", "velocity"}
-        Quantity that colours show, on the page until the reader chooses another.
-
-    Returns
-    -------
-    dict
-        Numbers of ``windows`` and ``echoes`` shown, times ``first_s`` and ``last_s`` of the
-        windows, and path and bytes of each file.
-
-    Raises
-    ------
-    InputError
-        If a file of the folder is missing or damaged, the time lies outside of the capture, the
-        colour is unknown, or a file cannot be written.
+    The still is of the frame nearest to ``time_s`` [s], by default the middle of the capture.
+    Colours show ``colour``, one of `COLOURS`, on the page until the reader chooses another. Returns
+    the numbers of ``windows`` and ``echoes`` shown, times ``first_s`` and ``last_s`` of the
+    windows, and path and bytes of each file. InputError if a file of the folder is missing or
+    damaged, the time lies outside of the capture, or a file cannot be written.
     """
     if colour not in COLOURS:
         raise InputError(f"colour '{colour}' is unknown; allowed: {', '.join(COLOURS)} (--colour)")
@@ -107,21 +89,15 @@ def view(
     if still is not None:
         step = run_view.snapshots.nearest(float(times.mean()) if time_s is None else time_s)
         draw_still(still, run_view, step, colour=colour)
-        shown["still"] = {
-            "path": str(still),
-            "bytes": Path(still).stat().st_size,
-            "time_s": float(times[step]),
-        }
+        size = Path(still).stat().st_size
+        shown["still"] = {"path": str(still), "bytes": size, "time_s": float(times[step])}
     return shown
 
 
 def load_run_view(folder: Path) -> RunView:
     """Read ``summary.json``, ``view.npz``, ``maps.h5`` and both clouds of a folder.
 
-    Raises
-    ------
-    InputError
-        Where one of them is missing or damaged, or they are not of one run.
+    InputError if one of them is missing or damaged, or they are not of one run.
     """
     if not os.path.isfile(folder / "summary.json"):
         raise InputError(
@@ -133,9 +109,8 @@ def load_run_view(folder: Path) -> RunView:
     spreading = parameters.get("spreading", True) is not False
     snapshots = load_snapshots(folder / "view.npz")
     rdt = _archive(folder / "cloud_rdt.npz", ("points",))
-    spatial = _archive(
-        folder / "cloud_xyz.npz", ("points", "velocity", "power", "time"), may_be_nan=("points",)
-    )
+    columns = ("points", "velocity", "power", "time")
+    spatial = _archive(folder / "cloud_xyz.npz", columns, may_be_nan=("points",))
     path = folder / "maps.h5"
     try:
         with open_regular(path) as raw, h5py.File(raw) as file:
@@ -149,20 +124,16 @@ def load_run_view(folder: Path) -> RunView:
     except InputError:
         raise
     except _DAMAGE as error:
-        why = (
-            error.strerror
-            if isinstance(error, FileNotFoundError)
-            else "is damaged, or of another kind"
-        )
+        why: str | None = "is damaged, or of another kind"
+        if isinstance(error, FileNotFoundError):
+            why = error.strerror
         raise InputError(f"'{path}': {why}; {_MEND}") from None
     try:
         cloud = SpatialCloud(**spatial)
     except (InputError, TypeError) as error:
         raise InputError(f"'{folder / 'cloud_xyz.npz'}' is damaged ({error}); {_MEND}") from None
-    fidelity, scene = (
-        _line(summary.get("fidelity", "")),
-        _line(parameters.get("scene", "free-space")),
-    )
+    fidelity = _line(summary.get("fidelity", ""))
+    scene = _line(parameters.get("scene", "free-space"))
     removal = _line(parameters.get("clutter_removal", "none"))
     cleaned = "" if removal == "none" else f", static clutter removed: {removal}"
     return RunView(
@@ -238,16 +209,14 @@ def _powers(power: NDArray[np.floating]) -> NDArray[np.float64]:
     return power.astype(np.float64)
 
 
-def _levels(level_db: NDArray[np.float64], low_db: float, step_db: float) -> NDArray[np.uint8]:
-    return np.asarray(
-        np.clip(np.rint((level_db - low_db) / step_db), 0, MOST_LEVEL), dtype=np.uint8
-    )
-
-
-def _scale(top_db: float, noise_db: float) -> tuple[float, float]:
-    """Return the lowest level, 3 dB below the noise or 60 dB below the peak, and the step [dB]."""
+def _quantised(
+    maps_db: Iterable[NDArray[np.float64]], top_db: float, noise_db: float, **axes: Any
+) -> Levels:
+    """Quantise maps [dB] from 3 dB below the noise, or 60 dB below the peak, to the peak."""
     low = max(top_db - _DYNAMIC_RANGE_DB, min(noise_db - 3.0, top_db - 1.0))
-    return low, (top_db - low) / MOST_LEVEL
+    step = (top_db - low) / MOST_LEVEL
+    levels = [np.clip(np.rint((one - low) / step), 0, MOST_LEVEL).astype("u1") for one in maps_db]
+    return Levels(level=np.stack(levels), low_db=low, step_db=step, **axes)
 
 
 def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: bool) -> Levels:
@@ -257,12 +226,10 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
     scale = np.asarray(unit.scale) / radar.n_channels
     windows = snapshots.window.tolist()
     top = max(float((power[window] * scale).max()) for window in windows)
-    noise = [
-        float(np.median(power[window] * scale))
-        for window in windows[:: math.ceil(len(windows) / _SAMPLED)]
-    ]
+    sampled = windows[:: math.ceil(len(windows) / _SAMPLED)]
+    noise = [float(np.median(power[window] * scale)) for window in sampled]
     scaled = FieldUnit(unit.name, 1.0)
-    low_db, step_db = _scale(*scaled.level(_powers(np.array([top, np.median(noise)]))).tolist())
+    top_db, noise_db = scaled.level(_powers(np.array([top, np.median(noise)]))).tolist()
     rows, columns = math.ceil(len(distance) / _MAX_ROWS), math.ceil(len(velocity) / _MAX_COLUMNS)
 
     def pooled(values: NDArray[np.floating]) -> NDArray[np.floating]:
@@ -273,19 +240,9 @@ def _range_doppler(maps: Any, snapshots: Snapshots, radar: Radar, spreading: boo
         bin_width = float(values[1] - values[0]) if len(values) > 1 else 1.0
         return float(values[0]) + bin_width * (together - 1) / 2, bin_width * together
 
-    return Levels(
-        level=np.stack(
-            [
-                _levels(scaled.level(_powers(pooled(power[window] * scale))), low_db, step_db)
-                for window in windows
-            ]
-        ),
-        low_db=low_db,
-        step_db=step_db,
-        label=unit.label("mean of channels"),
-        across=centres(velocity, columns),
-        up=centres(distance, rows),
-    )
+    maps_db = (scaled.level(_powers(pooled(power[window] * scale))) for window in windows)
+    axes = {"across": centres(velocity, columns), "up": centres(distance, rows)}
+    return _quantised(maps_db, top_db, noise_db, label=unit.label("mean of channels"), **axes)
 
 
 def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFunctions) -> Levels:
@@ -300,17 +257,10 @@ def _spectrogram(maps: Any, radar: Radar, spreading: bool, windows: WindowFuncti
     power = _powers(found.T) / noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     unit = field_unit(radar, spreading=spreading, strongest_m2=float(power.max()))
     level_db = unit.level(power)
-    low_db, step_db = _scale(float(level_db.max()), float(np.median(level_db)))
     step_s = float(times[-1] - times[0]) / (len(times) - 1) if len(times) > 1 else 1.0
-    level, across = _levels(level_db, low_db, step_db)[None], (float(times[0]), step_s)
-    return Levels(
-        level=level,
-        low_db=low_db,
-        step_db=step_db,
-        label=unit.label("one channel"),
-        across=across,
-        up=up,
-    )
+    top_db, noise_db = float(level_db.max()), float(np.median(level_db))
+    axes = {"across": (float(times[0]), step_s), "up": up}
+    return _quantised([level_db], top_db, noise_db, label=unit.label("one channel"), **axes)
 
 
 def _at_points(

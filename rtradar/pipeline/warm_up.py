@@ -52,8 +52,17 @@ def warm_up_processing(echoes: Echoes, radar: Radar) -> None:
             range_elevation(spectra, radar)
 
 
-def warm_up_usual_processing() -> None:
-    """Compile the processing of the paper's radar; another one compiles the rest itself."""
+def compile_for_another_process() -> None:
+    """Compile the processing of the paper's radar; another one compiles the rest itself.
+
+    It ends as soon as standard input closes with the process that started this one.
+    """
+
+    def end_with_it() -> None:
+        os.read(sys.stdin.fileno(), 1)
+        os._exit(1)
+
+    threading.Thread(target=end_with_it, daemon=True).start()
     radar = Radar.preset("paper-12ghz")
     shape = 2 * radar.n_tx, radar.n_rx, 1
     echoes = Echoes(
@@ -65,17 +74,6 @@ def warm_up_usual_processing() -> None:
         bounces=np.ones(1, dtype=np.int64),
     )
     warm_up_processing(echoes, radar)
-
-
-def compile_for_another_process() -> None:
-    """Compile the usual processing, but end as soon as standard input closes with its process."""
-
-    def end_with_it() -> None:
-        os.read(sys.stdin.fileno(), 1)
-        os._exit(1)
-
-    threading.Thread(target=end_with_it, daemon=True).start()
-    warm_up_usual_processing()
 
 
 @contextmanager

@@ -47,23 +47,10 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
 
 
 class RunWriter:
-    """Makes maps and clouds from the range spectra of one capture, and writes the maps.
+    """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``path``.
 
-    Parameters
-    ----------
-    path : path
-        HDF5 file of the maps, which is replaced if it exists.
-    processing : Processing
-        Radar, and what its range spectra go through.
-    title : str
-        Title of the file.
-    received : ReceivedFrame, optional
-        Frame whose map is also kept as it was before clutter removal.
-
-    Attributes
-    ----------
-    max_chirps : int
-        Largest number of chirps in one call of `push`, so that memory stays low.
+    An existing file is replaced. Of the frame ``received`` the map is also kept as it was before
+    clutter removal. So that memory stays low, `push` takes at most ``max_chirps`` chirps.
     """
 
     def __init__(

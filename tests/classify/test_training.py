@@ -53,7 +53,7 @@ def weights(network: torch.nn.Module) -> torch.Tensor:
     ids=["lean", "paper"],
 )
 def test_eight_clouds_are_learnt_by_heart(examples: Examples, recipe: Recipe) -> None:
-    few = examples.of(np.array([0, 1, 2, 4, 5, 6, 8, 9]))
+    few = examples[np.array([0, 1, 2, 4, 5, 6, 8, 9])]
     _, history = train_network(few, few, recipe)
     assert history[-1]["train_accuracy"] == 1
     assert history[-1]["train_loss"] < 0.5 * history[0]["train_loss"]
@@ -119,7 +119,7 @@ def test_no_cloud_is_dropped_and_none_stands_alone(
         return real(points, *how)
 
     monkeypatch.setattr(training, "for_training", spy)
-    seven = examples.of(np.arange(7))
+    seven = examples[np.arange(7)]
     train_network(seven, examples, PAPER.changed(points=8, epochs=1))
     assert sizes == [4, 3]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ import rtradar as rt
 from rtradar.body import Body
 from rtradar.motion import place
 from rtradar.pipeline import snapshots as module
-from rtradar.pipeline.snapshots import snapshots_of
+from rtradar.pipeline.snapshots import snapshots
 from rtradar.scatter import build_model
 from rtradar.scene import Furniture, Scene, Wall, material
 
@@ -50,7 +51,11 @@ def look(
     body: Body, model: Any, scene: Scene | None = None, windows: NDArray[np.int64] | None = None
 ) -> Any:
     chosen = RADAR.window_starts(N_CHIRPS) if windows is None else windows
-    return snapshots_of(model, RADAR, body, scene or Scene(), chosen, N_CHIRPS)
+    capture: Any = SimpleNamespace(
+        model=model, radar=RADAR, body=body, scene=scene or Scene(),
+        frame_starts=chosen, n_chirps=N_CHIRPS,
+    )  # fmt: skip
+    return snapshots(capture)
 
 
 def test_a_path_to_a_sphere_ends_where_the_line_to_its_centre_leaves_it(spheres: Body) -> None:
