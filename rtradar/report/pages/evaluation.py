@@ -64,7 +64,8 @@ def write_evaluation(
             transfer = scores.transfer(study.outcomes)
             blocks.append(scores.transfer_table(*transfer))
             draw_transfer(out / f"transfer-{number}.png", *transfer, title)
-    draw_accuracies(out / "accuracy.png", groups)
+    rows = [(title, _accuracies(outcomes)) for title, outcomes in groups]
+    draw_accuracies(out / "accuracy.png", rows)
     text = "\n\n".join(blocks)
     content = {
         "classes": classes,
@@ -170,17 +171,17 @@ def _csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     return text.getvalue()
 
 
-def draw_accuracies(path: Path, groups: Sequence[Group]) -> None:
-    """Draw a box plot of the accuracies of each group: a box between quartiles, a dot each."""
-    figure = new_figure(max(4.0, 1.4 + 1.1 * len(groups)), 4.2)
+def draw_accuracies(path: Path, rows: Sequence[tuple[str, Sequence[float]]]) -> None:
+    """Draw a box plot of the accuracies in each row: a box between quartiles, a dot each."""
+    figure = new_figure(max(4.0, 1.4 + 1.1 * len(rows)), 4.2)
     axes = figure.subplots()
-    percent = [100 * np.array(_accuracies(outcomes)) for _, outcomes in groups]
+    percent = [100 * np.asarray(fractions) for _, fractions in rows]
     axes.boxplot(percent, widths=0.5, showfliers=False, medianprops={"color": "C1"})
     for place, values in enumerate(percent, start=1):
         offsets = np.linspace(-0.12, 0.12, len(values)) if len(values) > 1 else np.zeros(1)
         axes.plot(place + offsets, values, ".", color="C0", alpha=0.6)
-    names = [name.replace(", ", "\n", 1) for name, _ in groups]
-    axes.set_xticks(range(1, len(groups) + 1), names, fontsize=7)
+    names = [name.replace(", ", "\n", 1) for name, _ in rows]
+    axes.set_xticks(range(1, len(rows) + 1), names, fontsize=7)
     axes.set(ylabel="Test accuracy [%]", xlabel="Classifier", title="Test accuracy")
     axes.set_ylim(min(0.0, *map(min, percent)), 102)
     axes.grid(axis="y", alpha=0.3)
