@@ -36,8 +36,8 @@ BISECTIONS = 13
 """Rays that find an edge on a side of a cell. As an edge wanders in steps of 0.002 zones, second
 differences of V are 2e-4 with 11 rays, 6e-5 with 13, and would be 5e-6 with exact edges."""
 
-_AT_ONCE = 64
-"""Zones whose rays are traced together; so many take some 20 MB."""
+_AT_ONCE = 24
+"""Zones whose rays are traced together; each takes some 1 MB with 400 shadow rays."""
 
 _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
