@@ -158,7 +158,8 @@ def _check_noise(snr_db: float | str, noise_power_m2: float | None) -> None:
             )
     elif not (-MAX_SNR_DB <= snr_db <= MAX_SNR_DB or snr_db == math.inf):
         raise InputError(
-            f"snr_db = {snr_db}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf (--snr-db)"
+            f"snr_db = {snr_db}; it must lie within +-{MAX_SNR_DB:g} dB, or be inf for no noise "
+            "(--snr-db)"
         )
     if noise_power_m2 is not None and not 0 <= noise_power_m2 < math.inf:
         raise InputError(

@@ -115,7 +115,10 @@ class Ellipsoids:
             )
         error = np.abs(np.swapaxes(frame_array, 1, 2) @ frame_array - np.eye(3)).max(initial=0.0)
         if error > 1e-6 or (np.linalg.det(frame_array) < 0).any():
-            raise InputError("Ellipsoids.frames: columns must be orthonormal and right-handed")
+            raise InputError(
+                "Ellipsoids.frames: not proper rotations; columns must be "
+                "orthonormal and right-handed"
+            )
 
     def without_repeats(self) -> Ellipsoids:
         """Leave out each part that coincides with one before it.

@@ -235,7 +235,8 @@ def angle(
     column = _nearest(velocity / step, -n_cycles / 2, n_cycles / 2)
     if column is None:
         raise InputError(
-            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} m/s"
+            f"angle: velocity = {velocity}; it must lie within +-{radar.max_velocity_mps:.3f} "
+            "m/s, the unambiguous one"
         )
     cube = spectra[: n_cycles * radar.n_tx].reshape(n_cycles, radar.n_tx, radar.n_rx, -1)
     cell = [row], [(column + n_cycles // 2) % n_cycles]

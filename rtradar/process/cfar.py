@@ -215,7 +215,8 @@ def _checked(
     if counts.size and counts.min() == 0:
         raise InputError(
             f"CFAR: in a map of {cells.shape[0]} x {cells.shape[1]} a cell has no training cells "
-            f"with guard = {guard}; each axis, or one of them, needs more than {2 * guard + 1}"
+            f"with guard = {guard}; each axis, or one of them, needs more than {2 * guard + 1} "
+            "cells"
         )
     return cells, counts
 

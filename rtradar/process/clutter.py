@@ -111,7 +111,8 @@ class ClutterRemoval:
         if self._next not in (None, first_chirp):
             raise InputError(
                 f"clutter removal: the block begins with chirp {first_chirp}, the last one ended "
-                f"before {self._next}; give the chirps without a gap, or begin another removal"
+                f"before {self._next}; give the chirps without a gap, or begin anew with "
+                "another removal"
             )
         self._next = first_chirp + len(chirps)
         cycles = chirps.reshape(-1, radar.n_tx, *chirps.shape[1:])

@@ -133,7 +133,8 @@ def _rules(r: Radar) -> Iterator[tuple[Any, str]]:
         r.carrier_step_hz is None
         or (_is_number(r.carrier_step_hz) and r.sample_rate_hz <= r.carrier_step_hz),
         f"carrier_step_hz = {brief(r.carrier_step_hz)}; bands of the IF are {r.sample_rate_hz:g} "
-        "Hz wide (samples_per_chirp / chirp_duration_s), the least between carriers",
+        "Hz wide (samples_per_chirp / chirp_duration_s), so carriers must be at least that far "
+        "apart",
     )
     yield (
         -r.tx_offset_hz[0] < r.start_frequency_hz,

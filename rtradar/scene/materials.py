@@ -173,7 +173,8 @@ class Material:
         others = sorted(name for name, other in MATERIALS.items() if other.holds(frequency_hz))
         raise InputError(
             f"material '{self.name}' at {frequency_hz / 1e9:g} GHz: {self.source} gives it for "
-            f"{limits}; known there: {', '.join(others) or 'none'}; or give one of your own"
+            f"{limits}; known there: {', '.join(others) or 'none'}; or give one of your own, "
+            "with its source"
         )
 
 
@@ -300,7 +301,10 @@ def own_material(
     where = f"material {brief(name)}"
     check_text(where, "its name", name)
     if name in MATERIALS:
-        raise InputError(f"{where}: that name belongs to {MATERIALS[name].source}; choose another")
+        raise InputError(
+            f"{where}: that name belongs to {MATERIALS[name].source}; choose another for your "
+            "own figures"
+        )
     check_text(where, "source", source)
     low = check_number(where, "low_hz", low_hz, *OWN_LIMITS["low_hz"])
     high = check_number(where, "high_hz", high_hz, low, OWN_LIMITS["high_hz"][1])

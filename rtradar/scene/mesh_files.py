@@ -174,7 +174,10 @@ def _check_glb_header(where: str, content: bytes) -> None:
     # An accessor without data is filled with as many zeros as it names, and one whose rows overlap
     # grows.
     if count > _NUMBERS_A_FACE * MOST_FACES:
-        raise InputError(f"{where} promises more data than the {MOST_FACES} triangles allowed have")
+        raise InputError(
+            f"{where} promises more data than the {MOST_FACES} triangles that are allowed could "
+            "have"
+        )
 
 
 def _in_ascii(content: bytes, ending: str) -> bytes:
@@ -279,7 +282,8 @@ def checked_triangles(
     closed = bool(mesh.is_watertight)
     if closed and not mesh.is_winding_consistent:
         raise InputError(
-            f"{where}: its triangles do not agree which side is outside; mend their normals"
+            f"{where}: its triangles do not agree which side is outside; make their normals "
+            "consistent"
         )
     if closed:
         faces = _outward(where, mesh)

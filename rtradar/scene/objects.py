@@ -90,7 +90,8 @@ class Wall:
         for key in ("edge_u_m", "edge_v_m"):
             if np.linalg.norm(getattr(self, key)) < _SHORTEST_M:
                 raise InputError(
-                    f"{where}: {key} = {brief(getattr(self, key))}; the least is {_SHORTEST_M} m"
+                    f"{where}: {key} = {brief(getattr(self, key))}; an edge must be "
+                    f"{_SHORTEST_M} m long or more"
                 )
         u, v = np.array(self.edge_u_m), np.array(self.edge_v_m)
         if abs(u @ v) > _SQUARE * np.linalg.norm(u) * np.linalg.norm(v):

@@ -214,7 +214,8 @@ def _named(name: str) -> Path:
     known = scene_files()
     if name not in known:
         raise InputError(
-            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or a TOML file"
+            f"scene {brief(name)} is unknown; allowed: {', '.join(known)}, or the path of a "
+            "TOML file"
         )
     return known[name]
 
@@ -301,7 +302,8 @@ def _mesh(where: str, value: object, folder: Path) -> str | Path:
         raise InputError(f"{where}mesh = {brief(text)}; allowed endings: {', '.join(MESH_ENDINGS)}")
     if inside(folder, text) is None:
         raise InputError(
-            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put it there"
+            f"{where}mesh = {brief(text)} leaves the folder of the scene file; put the mesh "
+            "beside it or below"
         )
     return folder / text
 

@@ -57,7 +57,8 @@ def load_motion(
     if name not in READERS:
         known = ", ".join(f".{known}" for known in READERS)
         raise InputError(
-            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known}"
+            f"{file}: unknown kind of motion file {file.suffix!r}; allowed are {known} (an .amc "
+            "with its .asf)"
         )
     # Readers of other packages may take folders, and names of what is no file; none may wait.
     if kind := special_kind(file):

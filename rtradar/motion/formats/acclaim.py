@@ -96,7 +96,8 @@ def load_skeleton(path: Path) -> Skeleton:
                     _hierarchy_line(words, bones, text)
     if not has_root or len(bones) == 1 or section != ":hierarchy":
         raise InputError(
-            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); it may be cut off"
+            f"{path}: no complete ASF skeleton (:root, :bonedata, :hierarchy); the file may be "
+            "cut off"
         )
     if not bones["root"].dof:
         raise InputError(
@@ -149,7 +150,8 @@ def _bone_line(
         bone.dof = tuple(word.lower() for word in words[1:])
         if not set(bone.dof) <= {"rx", "ry", "rz"}:
             raise text.fail(
-                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported"
+                f"dof {' '.join(words[1:])} of {bone.name!r}: only rx, ry, rz are supported "
+                "(rigid bones)"
             )
 
 
@@ -158,7 +160,8 @@ def _check_bone(bone: _Bone, text: TextFile) -> None:
         raise text.fail("a bone without a name ends here")
     if bone.name in ASF_JOINTS and not bone.length * np.abs(bone.direction).max() > 0:
         raise text.fail(
-            f"bone {bone.name!r} has no length; a body part hangs on it, give it one",
+            f"bone {bone.name!r} has no length; a body part hangs on it, give its length and "
+            "direction",
             bone.line,
         )
 
@@ -301,7 +304,8 @@ def _frames(text: TextFile, skeleton: Skeleton) -> Iterator[tuple[dict[str, list
             raise text.fail(f"{name[:40]!r} before the first frame number; this is not an AMC file")
         elif name not in widths:
             raise text.fail(
-                f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give its ASF"
+                f"bone {name[:40]!r} is not in the skeleton {skeleton.path}; give the ASF of "
+                "this subject"
             )
         elif name in values:
             raise text.fail(f"bone {name!r} is there twice in frame {frame}")
@@ -312,5 +316,5 @@ def _frames(text: TextFile, skeleton: Skeleton) -> Iterator[tuple[dict[str, list
         else:
             values[name] = text.numbers(words[1:])
     if frame is None:
-        raise InputError(f"{text.path}: no frame in this AMC file; it may be cut off")
+        raise InputError(f"{text.path}: no frame in this AMC file; the file may be cut off")
     yield complete(text.line)

@@ -81,7 +81,8 @@ def load_bvh(path: Path, *, skeleton: Path | None, unit_m: float | None) -> Moti
     for j, stretch in zip(kept, spreads * scale, strict=True):
         if stretch > _STRETCH_M:
             raise text.fail(
-                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; make it rigid",
+                f"bone to {joints[j].name!r} stretches by {stretch * 100:.1f} cm; bones must be "
+                "rigid",
                 joints[j].line,
             )
     carriers = [kept[0], *(joints[j].parent for j in kept[1:])]
@@ -216,7 +217,8 @@ def _read_frames(text: TextFile, n_frames: int, joints: list[_Joint]) -> NDArray
             rows.clear()
     if read != n_frames:
         raise InputError(
-            f"{text.path}: {read} frames where the header promises {n_frames}; it may be cut off"
+            f"{text.path}: {read} frames where the header promises {n_frames}; the file may be "
+            "cut off"
         )
     values.append(np.array(rows).reshape(-1, width))
     return values.rows()

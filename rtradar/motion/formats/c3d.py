@@ -107,12 +107,14 @@ def read_markers(path: Path, names: tuple[str, ...], unit_m: float | None = None
     for wrong, what in (
         (
             any("end of file" in str(warning.message) for warning in caught),
-            f"ends after {len(read.points)} frames where its header promises more; it is cut off",
+            f"ends after {len(read.points)} frames where its header promises more; the file is "
+            "cut off",
         ),
         (not len(read.points), "no frame of markers in this C3D file; export it again"),
         (
             not 1.0 <= read.rate_hz <= 100_000.0,
-            f"POINT:RATE is {read.rate_hz:g} frames a second; it must be 1 to 100000, mend it",
+            f"POINT:RATE is {read.rate_hz:g} frames a second; it must be 1 to 100000, mend the "
+            "file",
         ),
         (
             read.upward not in ("", "+Z", "+Y"),

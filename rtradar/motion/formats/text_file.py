@@ -67,7 +67,10 @@ class TextFile:
     def check_size(self, joints: int, frames: int = 1) -> None:
         """Refuse more than a person's motion has: 1000 joints, or 100 million poses of a joint."""
         if joints > _MOST_JOINTS:
-            raise InputError(f"{self.path}: more than {_MOST_JOINTS} joints; a person has dozens")
+            raise InputError(
+                f"{self.path}: more than {_MOST_JOINTS} joints; a person has some dozens: leave "
+                "the others out"
+            )
         if joints * frames > _MOST_POSES:
             raise InputError(
                 f"{self.path}: {frames} frames of {joints} joints; frames times joints may be "
