@@ -359,16 +359,13 @@ def independent_rows(quick: bool) -> Iterator[Row]:
                 (f"windows 2 to {old}", rates[1:old]),
                 ("all later", rates[old:]),
             ):
-                ratio = float(np.mean(counted)) / pfa
-                yield judged(
-                    claim,
-                    f"counted over asked, {part}",
-                    "",
-                    ratio,
-                    MOST_OFF,
-                    reference=1.0,
-                    says=says,
-                )
+                yield alarms_row(claim, part, float(np.mean(counted)) / pfa, says)
+
+
+def alarms_row(claim: str, part: str, ratio: float, says: str) -> Row:
+    """Row of the false alarms that were counted, over those that were asked for."""
+    what = f"counted over asked, {part}"
+    return judged(claim, what, "", ratio, MOST_OFF, reference=1.0, says=says)
 
 
 def noise_maps(radar: Radar, n_windows: int, seed: int) -> Iterator[NDArray[np.floating]]:
@@ -411,15 +408,7 @@ def overlapping_rows(radar: Radar, n_windows: int, pfas: tuple[float, ...]) -> I
                     "clutter-map CFAR on noise, frames that overlap by 75 %: "
                     "false alarms counted over those asked"
                 )
-                yield judged(
-                    claim,
-                    f"counted over asked, {part}",
-                    "",
-                    ratio,
-                    MOST_OFF,
-                    reference=1.0,
-                    says=says,
-                )
+                yield alarms_row(claim, part, ratio, says)
             else:
                 yield reported(claim, f"counted over asked, {part}", "", ratio)
 

@@ -35,12 +35,12 @@ from rtradar.bench.floors import best_s
 from rtradar.bench.kernels import CASES
 print(json.dumps({name: best_s(CASES[name].make()[0], 1.0) for name in sys.argv[2:]}))
 """
-WAYS = ("aligned", "plain", "beside")
+LAYOUTS = ("aligned", "plain", "beside")
 
 
-def measured(way: str) -> dict[str, float]:
+def measured(layout: str) -> dict[str, float]:
     """Best time of each kernel [s] in a process with aligned, plain or misaligned arrays."""
-    command = [sys.executable, "-c", CHILD, way, *KERNELS]
+    command = [sys.executable, "-c", CHILD, layout, *KERNELS]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     return dict(json.loads(done.stdout))
 
@@ -48,11 +48,11 @@ def measured(way: str) -> dict[str, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="rounds (default: 5)")
-    rounds = [{way: measured(way) for way in WAYS} for _ in range(parser.parse_args().repeats)]
-    for way in WAYS[1:]:
+    rounds = [{layout: measured(layout) for layout in LAYOUTS} for _ in range(parser.parse_args().repeats)]
+    for layout in LAYOUTS[1:]:
         for name in KERNELS:
-            ratio = median(own[way][name] / own["aligned"][name] for own in rounds)
-            print(f"{way:8} {name:36} {ratio:.2f} times as long as aligned")
+            ratio = median(own[layout][name] / own["aligned"][name] for own in rounds)
+            print(f"{layout:8} {name:36} {ratio:.2f} times as long as aligned")
     return 0
 
 
