@@ -15,7 +15,7 @@ from rtradar.pipeline.indoors import Indoors
 from rtradar.pipeline.processing import Clouds
 from rtradar.report.figures import maps as figures
 from rtradar.report.figures import rooms
-from rtradar.scatter.multipath.path_summary import ghosts
+from rtradar.scatter.multipath.ghosts import ghosts
 
 _COLUMNS = 600
 """Time steps in a picture, those of 3 s; longer maps are averaged, so that memory does not grow."""

@@ -1,4 +1,9 @@
-"""The radar: its fields, and every quantity that follows from them."""
+"""The radar: its fields, and every quantity that follows from them.
+
+A new radar with a name is a function that returns a `Radar`: one of another package is an entry
+point of the group ``rtradar.radars``, one of a running program goes to `register_radar`. A TOML
+file with the fields of `Radar` as its keys needs no code.
+"""
 
 from __future__ import annotations
 
@@ -16,6 +21,20 @@ from rtradar.antenna import Antenna
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
 from rtradar.radar.checks import check_rules, checked_fields
+from rtradar.system.checks import check_keys, printable, read_toml
+from rtradar.system.registry import Registry
+
+PRESETS = Registry(
+    "rtradar.radars",
+    "radar",
+    {
+        "paper-12ghz": "rtradar.radar.presets:paper_12ghz",
+        "paper-77ghz": "rtradar.radar.presets:paper_77ghz",
+    },
+)
+"""Radars that have a name: each is made by a function without arguments."""
+
+register_radar = PRESETS.register
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,9 +140,12 @@ class Radar:
         -------
         Radar
         """
-        from rtradar.radar.presets import make_preset  # which needs this class
-
-        return make_preset(name)
+        make = PRESETS.find(name, instead=", or the path of a TOML file")
+        with PRESETS.guarded(name):
+            radar = make()
+        if not isinstance(radar, Radar):
+            raise PRESETS.refuse(name, f"gave a {type(radar).__name__}, not a Radar")
+        return dataclasses.replace(radar, name=name)
 
     @classmethod
     def load(cls, source: str | Path) -> Radar:
@@ -143,9 +165,16 @@ class Radar:
         InputError
             Where the file cannot be read, has an unknown key, or has a value without meaning.
         """
-        from rtradar.radar.presets import load_radar  # which needs this class
-
-        return load_radar(source)
+        path = Path(source)
+        if str(source) in PRESETS or path.suffix != ".toml":
+            return cls.preset(str(source))
+        table = read_toml(path, "radar", f"give a TOML file or one of: {', '.join(PRESETS)}")
+        keys = tuple(sorted(field.name for field in dataclasses.fields(cls)))
+        try:
+            check_keys("", table, (), keys)
+            return cls(**{"name": printable(path.stem), **table})
+        except InputError as error:
+            raise InputError(f"radar file '{path}': {error}") from None
 
     # -- waveform and range (derived) --------------------------------------------------------------
 

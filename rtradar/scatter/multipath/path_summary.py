@@ -1,25 +1,18 @@
-"""What became of the echoes over each path: their power, which were kept, and where they show."""
+"""What became of the echoes over each path: their power, and which were kept."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rtradar.radar import Radar
 from rtradar.scatter.multipath.image_paths import WallPath
-
-if TYPE_CHECKING:
-    from rtradar.scatter.multipath.room_model import RoomModel
 
 MARGIN_DB = 10.0
 """Echoes of a room are left out where they are further below the noise than this [dB]."""
-
-_GHOST_STEP_CYCLES = 4
-"""TDM cycles over which the velocity of a ghost is measured."""
 
 
 @dataclass(frozen=True)
@@ -67,42 +60,3 @@ def summarize(
     over = 10 * math.log10(total / noise) if total > 0 and noise > 0 else None
     kept, dropped = names[own & keep].tolist(), names[lost].tolist()
     return PathSummary(path.name, path.order, total, over, kept, dropped, "; ".join(why))
-
-
-class Ghost(NamedTuple):
-    """Where the echoes over a path show, and their power."""
-
-    path: str
-    range_m: float
-    velocity_mps: float
-    azimuth_rad: float
-    power_m2: float
-
-
-def ghosts(model: RoomModel, radar: Radar, time_s: float) -> list[Ghost]:
-    """Find where the echoes over walls show at one time [s], path by path.
-
-    Each is the mean of its parts, weighted by their power. The azimuth is that from which the last
-    leg comes, or that of its antenna's image mirrored back.
-    """
-    cycle = round(time_s / radar.cycle_duration_s - _GHOST_STEP_CYCLES / 2)
-    chirps = (max(cycle, 0) + np.array([0, _GHOST_STEP_CYCLES])) * radar.n_tx
-    echoes = model.echoes(chirps)
-    power = (np.abs(echoes.amplitude) ** 2).mean(axis=(0, 1, 2))
-    length = echoes.length.mean(axis=1)
-    rate = (length[1] - length[0]) / (_GHOST_STEP_CYCLES * radar.cycle_duration_s)
-    # The direction follows from the slope of the lengths along the line of receivers.
-    places, azimuth = radar.rx[: radar.rx_y, 1], np.zeros(len(power))
-    if len(places) > 1:
-        slope = np.polyfit(places, echoes.length[0, : radar.rx_y], 1)[0]
-        azimuth = np.arcsin(np.clip(-slope, -1, 1))
-    values = np.stack([length.mean(axis=0) / 2, rate / 2, azimuth])
-    names = np.array(model.path_names)
-    found = []
-    for path in dict.fromkeys(model.path_names):
-        own = (names == path) & (echoes.bounces > 1) & (power > 0)
-        if own.any():
-            total = float(power[own].sum())
-            range_m, rate_mps, angle = (values[:, own] @ (power[own] / total)).tolist()
-            found.append(Ghost(path, range_m, rate_mps, angle, total))
-    return found
