@@ -1,4 +1,4 @@
-"""Cases of `rtradar.bench.kernels` for the kernels of motion, signal and processing."""
+"""Cases of `rtradar.bench.kernel_table` for the kernels of motion, signal and processing."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.bench.kernels import Calls, filled, kernel_case
+from rtradar.bench.kernel_table import Calls, filled, kernel_case
 from rtradar.kernels.tone_sum import Tones, tone_sum_reference
 
 # -- general ---------------------------------------------------------------------------------------

@@ -1,69 +1,22 @@
 """``rtradar bench --only kernels``: what each compiled kernel buys beside its plain reference.
 
-A case, as `rtradar.bench.kernel_cases` and `rtradar.bench.scatter_cases` have them, is a function
-of the module ``k`` of the kernel. It makes arguments, and returns two functions without arguments,
-which call the kernel and its reference and give the same arrays. Each kernel is held to its
-reference within the tolerance by ``tests/kernels/test_references.py``.
+Each kernel is held to its reference within the tolerance of its case by
+``tests/kernels/test_references.py``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from importlib import import_module
-from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+# These two fill the table.
+import rtradar.bench.kernel_cases
+import rtradar.bench.scatter_cases  # noqa: F401
 from rtradar.bench.floors import best_s
-
-Call = Callable[[], Any]
-"""Returns an array, or a tuple of arrays."""
-
-Calls = tuple[Call, Call]
-"""Of a kernel and of its reference."""
+from rtradar.bench.kernel_table import CASES
 
 _LEAST_S = 0.2  # of repeats of each function
-
-
-class KernelCase(NamedTuple):
-    """One kernel and what it is compared with."""
-
-    name: str  # module and function below `rtradar.kernels`
-    does: str  # what it computes, and the size of the case, in a few words
-    tolerance: float  # largest allowed difference, relative to the reference's largest magnitude
-    calls_of: Callable[[ModuleType], Calls]
-
-    def make(self) -> Calls:
-        """Make the arguments, and return the calls of the kernel and of the reference."""
-        return self.calls_of(import_module(f"rtradar.kernels.{self.name.rpartition('.')[0]}"))
-
-
-CASES: dict[str, KernelCase] = {}
-
-
-def kernel_case(name: str, does: str, tolerance: float = 1e-12) -> Callable[[Any], Any]:
-    """Register the decorated function as the case of a kernel; see `KernelCase`."""
-
-    def add(calls_of: Callable[[ModuleType], Calls]) -> Callable[[ModuleType], Calls]:
-        CASES[name] = KernelCase(name, does, tolerance, calls_of)
-        return calls_of
-
-    return add
-
-
-def filled(
-    kernel: Callable[..., Any], *arguments: Any, out: tuple[np.ndarray, ...], adds: bool = False
-) -> Call:
-    """A call of a kernel that fills its last arguments ``out``, or ``adds`` to zeros there."""
-
-    def call() -> tuple[np.ndarray, ...]:
-        for array in out if adds else ():
-            array[...] = 0
-        kernel(*arguments, *out)
-        return out
-
-    return call
 
 
 def difference(found: Any, expected: Any) -> float:
@@ -85,9 +38,6 @@ def _arrays(values: Any) -> tuple[Any, ...]:
 
 def measure_kernels() -> list[dict[str, Any]]:
     """A row for each kernel: best times [s] of both, their ratio, and the largest difference."""
-    import rtradar.bench.kernel_cases  # (fills CASES)
-    import rtradar.bench.scatter_cases  # noqa: F401
-
     rows = []
     for case in CASES.values():
         kernel, reference = case.make()

@@ -1,4 +1,4 @@
-"""Cases of `rtradar.bench.kernels` for the kernels of the tracer, of echo models and of rooms."""
+"""Cases of `rtradar.bench.kernel_table` for kernels of the tracer, of echo models and of rooms."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rtradar.bench.kernels import Calls, filled, kernel_case
+from rtradar.bench.kernel_table import Calls, filled, kernel_case
 from rtradar.kernels.scatter.facets import Views, Waves
 from rtradar.kernels.scatter.fresnel_zones import CELLS, MERIDIANS, ZoneMaps, lay_zones
 from rtradar.kernels.scatter.nearby_points import Ellipsoids

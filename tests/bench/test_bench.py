@@ -10,7 +10,6 @@ from typing import Any
 import pytest
 
 import rtradar.bench
-import rtradar.bench.kernel_cases
 from rtradar.bench import kernels, runs
 from rtradar.bench.floors import Rates
 from rtradar.bench.plan import Case

@@ -11,8 +11,6 @@ import numpy as np
 import pytest
 from numba.extending import is_jitted
 
-import rtradar.bench.kernel_cases
-import rtradar.bench.scatter_cases
 import rtradar.kernels
 from rtradar.bench.kernels import CASES, difference
 

@@ -30,7 +30,6 @@ def beside(count, like):
 
 if sys.argv[1] != "aligned":
     jit.on_cache_lines = {"plain": plain, "beside": beside}[sys.argv[1]]
-import rtradar.bench.kernel_cases
 from rtradar.bench.floors import best_s
 from rtradar.bench.kernels import CASES
 print(json.dumps({name: best_s(CASES[name].make()[0], 1.0) for name in sys.argv[2:]}))
@@ -48,7 +47,9 @@ def measured(layout: str) -> dict[str, float]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeats", type=int, default=5, help="rounds (default: 5)")
-    rounds = [{layout: measured(layout) for layout in LAYOUTS} for _ in range(parser.parse_args().repeats)]
+    rounds = [
+        {layout: measured(layout) for layout in LAYOUTS} for _ in range(parser.parse_args().repeats)
+    ]
     for layout in LAYOUTS[1:]:
         for name in KERNELS:
             ratio = median(own[layout][name] / own["aligned"][name] for own in rounds)
