@@ -9,7 +9,7 @@ the process. It needs the interpreter lock, which tracers and compiled loops rel
 from __future__ import annotations
 
 import contextlib
-import multiprocessing.util
+import multiprocessing
 import os
 import signal
 import sys
@@ -59,6 +59,13 @@ def stay_if_ending() -> None:
 def _wait(reader: int, message: Callable[[], str]) -> None:
     number = signal.Signals(os.read(reader, 1)[0])
     _ended.set()
+    terminal = "\n" if sys.stderr and sys.stderr.isatty() else ""
+    stderr = -1  # where there is none
+    with contextlib.suppress(OSError):
+        stderr = os.dup(2)
+        # Threads that miss a killed worker, and a worker that starts while its parent ends, would
+        # print tracebacks.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
     _end_children()
     # Not imported here: it takes a quarter of a second, in which a signal would show a traceback.
     # Where nothing has imported it, there is no unfinished file.
@@ -68,8 +75,8 @@ def _wait(reader: int, message: Callable[[], str]) -> None:
     flushed = threading.Thread(target=sys.stdout.flush, daemon=True)
     flushed.start()
     flushed.join(0.2)
-    with contextlib.suppress(OSError, ValueError):
-        os.write(2, ("\n" if sys.stderr.isatty() else "").encode() + line.encode(errors="replace"))
+    with contextlib.suppress(OSError):
+        os.write(stderr, (terminal + line).encode(errors="replace"))
     os._exit(1)
 
 
@@ -80,16 +87,11 @@ def _nothing() -> None:
 def _end_children() -> None:
     """Kill the processes that this one started, and theirs, and wait until they are gone."""
     # The resource tracker of multiprocessing removes semaphores when all other processes are gone.
-    # Threads that clear up after dead workers must not tell it of them, too: it would complain.
-    tracker = resource_tracker._resource_tracker
-    tracker._send = lambda *_: None  # type: ignore[attr-defined]
-    # A worker that starts while its parent ends would print that it got no instructions.
-    multiprocessing.util.spawnv_passfds = lambda *_: threading.Event().wait()
-    spared = {getattr(tracker, "_pid", None)}
+    spared = {getattr(resource_tracker._resource_tracker, "_pid", None)}
     until = time.monotonic() + _PATIENCE_S
     killed: set[int] = set()
-    # Repeated, for threads may start others by other means.
-    while (children := _descendants() - spared) - killed:
+    # Repeated, for threads may start others.
+    while (children := _descendants() - spared) - killed and time.monotonic() < until:
         for child in children:
             with contextlib.suppress(OSError):
                 os.kill(child, _KILL)
