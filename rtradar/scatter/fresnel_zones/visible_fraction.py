@@ -36,8 +36,8 @@ BISECTIONS = 13
 """Rays that find an edge on a side of a cell. As an edge wanders in steps of 0.002 zones, second
 differences of V are 2e-4 with 11 rays, 6e-5 with 13, and would be 5e-6 with exact edges."""
 
-_AT_ONCE = 24
-"""Zones whose rays are traced together; each takes some 1 MB with 400 shadow rays."""
+_AT_ONCE = 216
+"""Pairs of a zone and an antenna whose rays are traced together."""
 
 _ZONES_A_THREAD = 8
 """For fewer, waking threads costs more than the work."""
@@ -86,8 +86,9 @@ def zone_fractions(
     """
     bounds = bounds_of(shadow_rays)
     out = np.ones((len(zones.part), wavenumber.shape[1], len(pairs)), dtype=np.complex128)
-    for begin in range(0, len(out), _AT_ONCE):
-        own = slice(begin, begin + _AT_ONCE)
+    step = max(1, _AT_ONCE // zones.antennas.shape[1])
+    for begin in range(0, len(out), step):
+        own = slice(begin, begin + step)
         some = Zones._make(np.ascontiguousarray(field[own]) for field in zones)
         maps = _maps(some, poses)
         edges = _edges(tracer, some, poses, maps, bounds)

@@ -20,6 +20,7 @@ from rtradar.scatter.common.interpolation import interpolation_weights
 from rtradar.scatter.common.keyframes import KeyframeCache
 from rtradar.scatter.common.poses import BuiltInModel, ChirpPoses, EchoModel, chirp_poses
 from rtradar.scatter.fresnel_zones.keyframes import ZoneFractions
+from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.models.auto_selection import (
     ANALYTIC,
@@ -44,6 +45,10 @@ _INSTANTS_S = 25e-3
 """Time between the instants at which candidates are selected; a limb at 5 m/s goes 12 cm."""
 
 _INSTANTS_AT_ONCE = 32
+
+_POWER_RAYS = 64
+"""Shadow rays of a forecast where only power matters: at edges they leave an error of 0.035 in the
+visible fraction (``validation/other_methods/fresnel.py``)."""
 
 _MARGIN = 0.7
 """Fraction of a complex tolerance that the error budget may use: it knows neither the far ends of
@@ -235,7 +240,10 @@ class Auto(BuiltInModel):
         instants = np.arange(-1, _INSTANTS_AT_ONCE + 1) + chunk * _INSTANTS_AT_ONCE
         times = (np.maximum(instants, 0) * self._step + 0.5) * self._radar.chirp_interval_s
         poses = self._body.at(np.minimum(times, self._body.duration_s))
-        budget = error_budget(self._radar, poses, self._tracer, spreading=self._spreading)
+        rays = _POWER_RAYS if self._complex_fraction is None else SHADOW_RAYS
+        budget = error_budget(
+            self._radar, poses, self._tracer, spreading=self._spreading, shadow_rays=rays
+        )
         chosen = select_candidates(budget, self._power_fraction, self._complex_fraction)[1:-1]
         budget = ErrorBudget(**{name: array[1:-1] for name, array in budget._asdict().items()})
         # Later ones are looked at again in the next pass, and are not to count twice.

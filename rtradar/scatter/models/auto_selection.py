@@ -33,7 +33,7 @@ from rtradar.scatter.antenna_gain import leg_gain
 from rtradar.scatter.common.interpolation import array_nodes
 from rtradar.scatter.common.poses import ChirpPoses
 from rtradar.scatter.echo_models import MODELS
-from rtradar.scatter.fresnel_zones.visible_fraction import Zones, zone_fractions
+from rtradar.scatter.fresnel_zones.visible_fraction import SHADOW_RAYS, Zones, zone_fractions
 from rtradar.scatter.models.analytic import far_field_echo
 from rtradar.scatter.specular_point.solver import solve_specular_points
 from rtradar.trace.body_tracer import BodyTracer
@@ -66,11 +66,16 @@ class ErrorBudget(NamedTuple):
 
 
 def error_budget(
-    radar: Radar, poses: Poses, tracer: BodyTracer, *, spreading: bool = True
+    radar: Radar,
+    poses: Poses,
+    tracer: BodyTracer,
+    *,
+    spreading: bool = True,
+    shadow_rays: int = SHADOW_RAYS,
 ) -> ErrorBudget:
     """Estimate the errors of all candidates at some poses of the tracer's body.
 
-    With ``spreading`` powers hold 1 / (R1 R2)^2.
+    With ``spreading`` powers hold 1 / (R1 R2)^2. ``shadow_rays`` are traced to each part.
     """
     times, parts = poses.centres.shape[:2]
     wavenumber = 2 * math.pi * radar.centre_frequency_hz / SPEED_OF_LIGHT_MPS
@@ -89,7 +94,7 @@ def error_budget(
     rotated = gain * far * np.exp(1j * wavenumber * (far_length - length))
     rotated, near = (values.reshape(times, pairs, parts) for values in (rotated, gain * near))
 
-    fraction, seen, radius = _views(radar, poses, tracer, wavenumber)
+    fraction, seen, radius = _views(radar, poses, tracer, wavenumber, shadow_rays)
     free = (near**2).mean(axis=1)
     true = free * np.abs(fraction) ** 2
     power = np.zeros((times, len(CANDIDATES), parts))
@@ -110,11 +115,11 @@ def error_budget(
 
 
 def _views(
-    radar: Radar, poses: Poses, tracer: BodyTracer, wavenumber: float
+    radar: Radar, poses: Poses, tracer: BodyTracer, wavenumber: float, shadow_rays: int
 ) -> tuple[NDArray[np.complex128], NDArray[np.bool_], NDArray[np.float64]]:
     """Look at the parts (time, part) from the middle of the array.
 
-    Rerotated are V, whether the specular point is seen, and the mean radius of curvature there [m].
+    Returned are V, whether the specular point is seen, and the mean radius of curvature there [m].
     """
     times, parts = poses.centres.shape[:2]
     eye = np.concatenate([radar.tx, radar.rx]).mean(axis=0)
@@ -132,7 +137,7 @@ def _views(
     k = np.full(len(part), wavenumber)
     zones = Zones(here, here, targets, part, pose, here[:, None], k)
     pair = np.zeros((1, 2), dtype=np.int64)
-    fraction = zone_fractions(tracer, zones, poses, pair, k[:, None])[:, 0, 0]
+    fraction = zone_fractions(tracer, zones, poses, pair, k[:, None], shadow_rays)[:, 0, 0]
     shape = (times, parts)
     return fraction.reshape(shape), seen.reshape(shape), np.asarray(np.sqrt(smaller * larger))
 
