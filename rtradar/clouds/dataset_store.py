@@ -334,5 +334,10 @@ class Collection:
         (m, 3) float64
             World coordinates x, y and z [m] in the order of time; m may be 0. A coordinate that the
             radar does not measure is NaN in every point (`SpatialCloud`).
+
+        Raises
+        ------
+        InputError
+            If its file is damaged.
         """
         return np.asarray(read_sample(self._paths[index], "spatial"))

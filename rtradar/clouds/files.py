@@ -123,6 +123,11 @@ def save_spatial_npz(path: str | os.PathLike[str], cloud: SpatialCloud) -> None:
         Output file: see `save_cloud_npz`.
     cloud : SpatialCloud
         Cloud to write, which may be empty.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be written.
     """
     columns = [cloud.points, *(getattr(cloud, name)[:, None] for name in _EXTRA_UNITS)]
     names, units = (*SPATIAL_AXES, *_EXTRA_UNITS), (*SPATIAL_UNITS, *_EXTRA_UNITS.values())

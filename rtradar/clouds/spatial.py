@@ -77,7 +77,9 @@ class SpatialCloud:
     def strongest(self) -> SpatialCloud:
         """Return the points at most `SHOWN_DB` below the strongest one, for pictures."""
         kept = self.power >= self.power.max(initial=0.0) * 10 ** (-SHOWN_DB / 10)
-        return SpatialCloud(*(values[kept] for values in vars(self).values()))
+        return SpatialCloud(
+            self.points[kept], self.velocity[kept], self.power[kept], self.time[kept]
+        )
 
 
 def measured_alone(points: NDArray[np.float64]) -> bool:

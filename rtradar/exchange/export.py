@@ -97,8 +97,6 @@ def export(source: str | Path, out: str | Path) -> dict[str, Any]:
 def read_if(path: str | Path) -> IfCube:
     """Read IF samples, all at once, from a file that `export` wrote or from the folder of a run.
 
-    InputError if it cannot be read.
-
     Parameters
     ----------
     path : path
@@ -107,6 +105,11 @@ def read_if(path: str | Path) -> IfCube:
     Returns
     -------
     IfCube
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
     """
     place = Path(path)
     if os.path.isdir(place):
@@ -117,7 +120,7 @@ def read_if(path: str | Path) -> IfCube:
 
 
 def read_cloud(path: str | Path) -> CloudTable:
-    """Read a cloud of a run, or one that `export` wrote; InputError if it cannot be read.
+    """Read a cloud of a run, or one that `export` wrote.
 
     Parameters
     ----------
@@ -127,6 +130,11 @@ def read_cloud(path: str | Path) -> CloudTable:
     Returns
     -------
     CloudTable
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read.
     """
     place = Path(path)
     return cloud_files.checked(_read(place, CLOUD_FORMATS, "a cloud"), place)

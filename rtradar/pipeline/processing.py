@@ -134,7 +134,8 @@ class CloudMaker:
                 with stages.time("angle"):
                     angles = frame_angles(cube, mask, radar, window_functions)
                     found = spatial_points(angles, radar, middle)
-                    self._spatial.add(np.column_stack(list(vars(found).values())))
+                    columns = found.points, found.velocity, found.power, found.time
+                    self._spatial.add(np.column_stack(columns))
             yield Frame(middle, power, mask, angles)
 
     def finish(self) -> Clouds:

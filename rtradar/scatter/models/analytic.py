@@ -100,9 +100,18 @@ class FormulaModel(BuiltInModel, ABC):
     def conductor_echo(self, at: Geometry) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Compute the echo of each part, as if it were a perfect conductor, before given antennas.
 
-        In rooms the antennas may be images of those of the radar over walls, and the ellipsoids
-        only some of the body's. Returned are the lengths of the paths from Tx to Rx, and scattering
-        lengths, over R1 R2 with ``spreading``, both (chirp, rx, part) float64 [m].
+        Parameters
+        ----------
+        at : Geometry
+            Antennas and ellipsoids, chirp by chirp. In rooms the antennas may be images of those of
+            the radar over walls, and the ellipsoids only some of the body's.
+
+        Returns
+        -------
+        length : (chirp, rx, part) float64
+            Length of the path from Tx to Rx [m].
+        amplitude : (chirp, rx, part) float64
+            Scattering length, over R1 R2 with ``spreading`` [m].
         """
 
     def echoes(self, chirps: NDArray[np.int64]) -> Echoes:
