@@ -122,7 +122,9 @@ def kick(subject: Subject, t: Array) -> Pose:
             elbow=np.radians(105 - 25 * strike * (side == kicker)),
         )
     head = about(y=math.radians(3) * (1 - strike))
-    return Pose(root, pelvis, thorax, head, ankles, feet, arms)
+    return Pose(
+        root=root, pelvis=pelvis, thorax=thorax, head=head, ankles=ankles, feet=feet, arms=arms
+    )
 
 
 def punch(subject: Subject, t: Array) -> Pose:
@@ -166,7 +168,17 @@ def punch(subject: Subject, t: Array) -> Pose:
         arms[side] = reach_arm(thorax, side, wrist, height, math.radians(25))
     head, left = about(z=back * np.radians(4 - 6 * chest), y=math.radians(5)), pelvis.apply(LEFT)
     shrug = np.radians(2 + 5 * chest)
-    return Pose(root, pelvis, thorax, head, ankles, feet, arms, left, shrug)
+    return Pose(
+        root=root,
+        pelvis=pelvis,
+        thorax=thorax,
+        head=head,
+        ankles=ankles,
+        feet=feet,
+        arms=arms,
+        left=left,
+        shrug=shrug,
+    )
 
 
 class _Flight(NamedTuple):
@@ -287,4 +299,13 @@ def _jump(subject: Subject, all_sets: list[list[_Flight]], t: Array) -> Pose:
         )
     root, upright = xyz(0.03 * height * roll, 0.0, z), about(y=math.radians(3))
     shrug = math.radians(22) * apart
-    return Pose(root, upright, thorax, upright, ankles, feet, arms, shrug=shrug)
+    return Pose(
+        root=root,
+        pelvis=upright,
+        thorax=thorax,
+        head=upright,
+        ankles=ankles,
+        feet=feet,
+        arms=arms,
+        shrug=shrug,
+    )

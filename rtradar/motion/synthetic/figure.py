@@ -104,7 +104,7 @@ class Arm(NamedTuple):
     hand: Rotation
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class Pose:
     """Pose of the figure at n times, facing +x.
 

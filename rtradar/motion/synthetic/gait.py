@@ -169,6 +169,15 @@ def walk(duration_s: float, subject: Subject) -> PosesAt:
             )
         root, head = xyz(path[:, 0], path[:, 1], z), about(z=heading, y=math.radians(4))
         left = about(z=heading).apply(LEFT)
-        return Pose(root, pelvis, thorax, head, ankles, feet, arms, left)
+        return Pose(
+            root=root,
+            pelvis=pelvis,
+            thorax=thorax,
+            head=head,
+            ankles=ankles,
+            feet=feet,
+            arms=arms,
+            left=left,
+        )
 
     return poses
