@@ -1,0 +1,136 @@
+"""Cards of radars, motions, scenes and results: HTML for a notebook, short texts for a terminal."""
+
+from __future__ import annotations
+
+import base64
+import math
+from collections.abc import Mapping
+from html import escape
+
+from rtradar.system.checks import printable
+
+MOST_LINES, MOST_COLUMNS = 10, 100
+"""Largest size of a text; what is beyond it is cut."""
+
+# Colours of the notebook or page around the card where it names them, else of the system's theme.
+_STYLE = """\
+.rtradar-card { --rtradar-ink: #1a2230; --rtradar-faint: #5d6878; --rtradar-line: #dde2ea;
+  color: var(--jp-content-font-color1, var(--vscode-editor-foreground, \
+var(--color-foreground-primary, var(--rtradar-ink))));
+  font: 14px/1.45 system-ui, -apple-system, "Segoe UI", Roboto, Arial, sans-serif;
+  max-width: 900px; overflow-wrap: anywhere; }
+@media (prefers-color-scheme: dark) { .rtradar-card {
+  --rtradar-ink: #e4e9f1; --rtradar-faint: #9aa6b8; --rtradar-line: #303948; } }
+.rtradar-card .title { margin: 0 0 4px; font-size: 16px; }
+.rtradar-card .faint, .rtradar-card caption, .rtradar-card th {
+  color: var(--jp-content-font-color2, var(--color-foreground-secondary, var(--rtradar-faint))); }
+.rtradar-card .parts { display: flex; flex-wrap: wrap; gap: 4px 28px; align-items: flex-start; }
+.rtradar-card table { flex: 1 1 300px; max-width: 100%; margin: 0 0 6px; border: 0;
+  border-collapse: collapse; font: inherit; table-layout: auto; }
+.rtradar-card caption { padding: 2px 0; font-weight: 600; text-align: left; caption-side: top; }
+.rtradar-card tr, .rtradar-card tbody tr:nth-child(odd) { background: none; }
+.rtradar-card th, .rtradar-card td { padding: 2px 0; border: 0; text-align: left;
+  vertical-align: top; max-width: none; white-space: normal; font-weight: 400;
+  border-bottom: 1px solid var(--jp-border-color2, \
+var(--color-background-border, var(--rtradar-line))); }
+.rtradar-card th { padding-right: 14px; min-width: 8em; width: 38%; }
+.rtradar-card img { flex: 1 1 300px; min-width: 0; max-width: min(100%, 520px); height: auto; }
+.rtradar-card p { margin: 2px 0; }
+"""
+_PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+
+
+def html_card(
+    kind: str,
+    name: str,
+    tables: Mapping[str, Mapping[str, str]],
+    *,
+    picture: bytes | None = None,
+    note: str = "",
+) -> str:
+    """Make the HTML of a card, which has no script and makes no request.
+
+    Parameters
+    ----------
+    kind, name : str
+        What the card is about, such as ``Radar``, and its name.
+    tables : mapping of str to mapping of str to str
+        Rows of each table, a value for each label, by the table's heading, which may be empty.
+    picture : bytes, optional
+        Content of a PNG file that the card shows beside its tables.
+    note : str
+        Sentence below the tables.
+
+    Returns
+    -------
+    str
+        One element ``div``; all given texts are escaped.
+    """
+    parts = []
+    for heading, rows in tables.items():
+        caption = f"<caption>{escape(printable(heading))}</caption>" if heading else ""
+        body = "".join(
+            f'<tr><th scope="row">{escape(printable(label))}</th>'
+            f"<td>{escape(printable(value))}</td></tr>"
+            for label, value in rows.items()
+        )
+        parts.append(f"<table>{caption}<tbody>{body}</tbody></table>")
+    if picture is not None:
+        data = base64.b64encode(picture).decode()
+        about = escape(f"{kind} {printable(name)}")
+        parts.append(f'<img alt="{about}" src="data:image/png;base64,{data}"/>')
+    title = f'<span class="faint">{escape(kind)}</span> <b>{escape(printable(name))}</b>'
+    below = f'<p class="faint">{escape(printable(note))}</p>' if note else ""
+    return (
+        f'<div class="rtradar-card"><style>{_STYLE}</style><p class="title">{title}</p>'
+        f'<div class="parts">{"".join(parts)}</div>{below}</div>'
+    )
+
+
+def text_card(kind: str, name: str, rows: Mapping[str, str]) -> str:
+    """Make the text of a card, for ``repr``: a title, and a line for each row.
+
+    Parameters
+    ----------
+    kind, name : str
+        What the card is about, such as ``Radar``, and its name.
+    rows : mapping of str to str
+        Value for each label. Of more than nine rows the last are left out.
+
+    Returns
+    -------
+    str
+        At most `MOST_LINES` lines of at most `MOST_COLUMNS` characters.
+    """
+    width = max(map(len, rows), default=0)
+    lines = [f"{kind} {printable(name)}"]
+    lines += [f"  {label:{width}}  {printable(value)}" for label, value in rows.items()]
+    if len(lines) > MOST_LINES:
+        lines[MOST_LINES - 1 :] = ["  ..."]
+    return "\n".join(cut(line, MOST_COLUMNS) for line in lines)
+
+
+def cut(text: str, most: int) -> str:
+    """Cut a text that is longer than ``most`` characters, and end it with three dots."""
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def quantity(value: float, unit: str) -> str:
+    """Format a quantity with the prefix of its unit, such as ``62.5 µs`` or ``4 GHz``.
+
+    Parameters
+    ----------
+    value : float
+        Value in the unit without prefix.
+    unit : str
+        Symbol of a unit that takes prefixes, such as ``Hz``, ``s`` or ``m``.
+
+    Returns
+    -------
+    str
+        Four digits, and the unit.
+    """
+    value = float(f"{value:.4g}")  # 999.99 µs are 1 ms
+    power = 3 * math.floor(math.log10(abs(value)) / 3) if value and math.isfinite(value) else 0
+    power = min(max(power, min(_PREFIXES)), max(_PREFIXES))
+    return f"{value / 10.0**power:.4g} {_PREFIXES[power]}{unit}"
