@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from rtradar import classify, exchange, process, rcs, signal
     from rtradar.antenna import Antenna
     from rtradar.body import Body, Ellipsoids
+    from rtradar.clouds import Collection
     from rtradar.echoes import Echoes
     from rtradar.errors import BackendError, ExtensionError, InputError, ValidityWarning
     from rtradar.motion import Motion, load_motion, register_reader, synthetic_motion
@@ -32,6 +33,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 _NAMES = {
     "antenna": "Antenna",
     "body": "Body Ellipsoids",
+    "clouds": "Collection",
     "echoes": "Echoes",
     "errors": "BackendError ExtensionError InputError ValidityWarning",
     "motion": "Motion load_motion register_reader synthetic_motion",
@@ -49,6 +51,7 @@ __all__ = [
     "Antenna",
     "BackendError",
     "Body",
+    "Collection",
     "Comparison",
     "Echoes",
     "Ellipsoids",

@@ -18,7 +18,7 @@ import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,11 +27,19 @@ from rtradar.errors import InputError
 from rtradar.system.checks import brief
 from rtradar.system.files import atomic_file, open_regular, read_json, remove_parts
 
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from rtradar.clouds.torch_dataset import SampleDataset
+
 FORMAT = 1
 """Format number of sample files and of the index; files with another number are refused."""
 
 INDEX = "collection.json"
 """Name of the file that lists the samples of a data set."""
+
+KINDS = {"clouds": "points", "spatial": "spatial"}
+"""What a sample may hold, and the name of its array in the file."""
 
 _DIGEST = 64  # hexadecimal digits of SHA-256
 _MAX_BYTES = 200_000_000
@@ -100,6 +108,19 @@ def is_whole(path: Path) -> bool:
         return False
     digest = hashlib.sha256(content[:-_DIGEST]).hexdigest().encode()
     return len(content) > _DIGEST and digest == content[-_DIGEST:]
+
+
+def read_digest(path: Path) -> str:
+    """Read the digest at the end of a sample's file; InputError if it cannot be read."""
+    try:
+        with open_regular(path) as file:
+            file.seek(-_DIGEST, os.SEEK_END)
+            return file.read().decode("ascii")
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"sample '{path}' cannot be read ({error}); "
+            "mend the collection with: rtradar dataset build"
+        ) from None
 
 
 def read_sample(path: Path, name: str) -> Any:
@@ -271,6 +292,11 @@ class Collection:
         return Sample(self.points(index), about["label"], about["provenance"])
 
     @property
+    def classes(self) -> tuple[str, ...]:
+        """Names of the activities, ascending."""
+        return tuple(sorted({about["label"] for about in self._about}))
+
+    @property
     def labels(self) -> NDArray[np.str_]:
         """Activity of each sample, (sample,)."""
         return np.array([about["label"] for about in self._about], dtype=np.str_)
@@ -305,6 +331,78 @@ class Collection:
         column = np.empty(len(values), dtype=object)
         column[:] = values
         return column
+
+    def to_pandas(self) -> pd.DataFrame:
+        """Return what is known of every sample, without reading the clouds.
+
+        Returns
+        -------
+        DataFrame
+            One row for each sample, under its id: ``activity``, its class number ``label``, all
+            entries of the provenance, such as subject, recording, licence, radar, scene, fidelity,
+            heading_deg, snr_db and seed, the ``folder`` of the sample and the ``digest`` of its
+            file (SHA-256). What a sample lacks is NaN or None.
+
+        Raises
+        ------
+        InputError
+            If the file of a sample is not there any more.
+        """
+        import pandas as pd
+
+        number = {name: index for index, name in enumerate(self.classes)}
+        rows = [
+            {
+                "activity": about["label"],
+                "label": number[about["label"]],
+                **about["provenance"],
+                "folder": str(path.parent),
+                "digest": read_digest(path),
+            }
+            for about, path in zip(self._about, self._paths, strict=True)
+        ]
+        return pd.DataFrame(rows, index=pd.Index(self.ids, name="id"))
+
+    def torch(self, kind: str = "clouds", *, points: int = 1000) -> SampleDataset:
+        """Return the samples as a `torch.utils.data.Dataset`, for a `DataLoader`.
+
+        All items have one size, so that they can be batched as they are. They follow from the
+        samples alone: the same item is the same in every epoch, worker and session.
+
+        Parameters
+        ----------
+        kind : str
+            Array of each sample: ``clouds`` gives (point, 3) time [s], range [m] and velocity
+            [m/s], ``spatial`` (point, 3) world coordinates [m].
+        points : int
+            Number of points of each cloud. Of larger clouds as many are taken, a random sample of
+            an RDT cloud; points of smaller ones are repeated, and an empty one becomes zeros.
+
+        Returns
+        -------
+        torch.utils.data.Dataset
+            Pairs of a float32 tensor and the class number, an index into its ``classes``.
+
+        Raises
+        ------
+        InputError
+            If torch is missing, the kind is unknown, or the number of points is not positive.
+        """
+        if kind not in KINDS:
+            raise InputError(f"kind = {brief(kind)} is unknown; allowed: {', '.join(KINDS)}")
+        if isinstance(points, bool) or not isinstance(points, int) or points < 1:
+            raise InputError(f"points = {brief(points)}; it must be a whole number from 1 on")
+        try:
+            from rtradar.clouds.torch_dataset import SampleDataset
+        except ImportError:
+            raise InputError(
+                "Collection.torch needs torch; install the extra 'learn' of rtradar, "
+                "in a checkout: pip install -e '.[learn]'"
+            ) from None
+        clouds = kind in ("clouds", "spatial")
+        return SampleDataset(
+            self._paths, self.labels.tolist(), KINDS[kind], points if clouds else None
+        )
 
     def points(self, index: int) -> NDArray[np.float64]:
         """Read the RDT cloud of a sample.
