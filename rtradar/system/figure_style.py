@@ -1,0 +1,282 @@
+"""The one style of all pictures: size, fonts, grid and colours, in a light and a dark variant.
+
+Nothing here changes Matplotlib's global settings, for pictures of a run may be drawn in several
+threads, and the user's own figures keep their style. A picture is drawn on axes of `axes_for`, in
+the colours of `theme_of`, and `dress` then sets fonts, grid and frame of these axes alone.
+
+All pictures are `WIDTH_IN` wide. Shown 420 pixels wide, a letter of the smallest font is 8 pixels
+high.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH_IN = 6.0
+"""Width of every picture [inch]."""
+
+STYLE: Mapping[str, Any] = {
+    "figure.dpi": 150,
+    "axes.titlesize": 10.5,
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.5,
+    "xtick.labelsize": 9.0,
+    "ytick.labelsize": 9.0,
+    "legend.fontsize": 8.5,
+    "font.size": 8.5,
+    "grid.linewidth": 0.6,
+    "grid.alpha": 0.5,
+    "lines.linewidth": 1.5,
+    "image.cmap": "viridis",
+}
+"""Sizes and fonts [pt], by the names of Matplotlib's settings; ``font.size`` is that of notes."""
+
+DIVERGING = "coolwarm"
+"""Colour map of velocities: blue approaches, red recedes."""
+
+
+@dataclass(frozen=True)
+class Theme:
+    """Colours of a picture."""
+
+    page: str
+    text: str
+    faint: str
+    wall: str
+    furniture: str
+    reflector: str
+    radar: str
+    person: str
+    ghost: str
+    detection: str
+    cycle: tuple[str, ...]
+
+
+LIGHT = Theme(
+    page="#ffffff",
+    text="#1b2733",
+    faint="#b8c2cc",
+    wall="#3c4854",
+    furniture="#a9713a",
+    reflector="#7b3fa0",
+    radar="#1b2733",
+    person="#d1353f",
+    ghost="#e4572e",
+    detection="#c2185b",
+    cycle=("#2b6cb0", "#dd7a00", "#2f8f4e", "#b83280", "#6b46c1", "#00838f", "#8a6d1a", "#52606d"),
+)
+"""Colours on a white page."""
+
+DARK = Theme(
+    page="#14181d",
+    text="#e6ebf0",
+    faint="#46525e",
+    wall="#c4ced8",
+    furniture="#d9a066",
+    reflector="#c792ea",
+    radar="#ffffff",
+    person="#ff6b6b",
+    ghost="#ff8a5c",
+    detection="#ff5fa2",
+    cycle=("#63b3ed", "#f6ad55", "#68d391", "#f687b3", "#b794f4", "#4dd0e1", "#d6bc5a", "#a0aec0"),
+)
+"""Colours on a dark page."""
+
+THEMES: Mapping[str, Theme] = {"light": LIGHT, "dark": DARK}
+
+
+def new_figure(height_in: float, theme: str = "light", width_in: float = WIDTH_IN) -> Figure:
+    """Make an empty figure without a window, which pyplot does not know.
+
+    Parameters
+    ----------
+    height_in : float
+        Height of the figure [inch].
+    theme : str
+        Name of the colours, ``light`` or ``dark``.
+    width_in : float
+        Width of the figure [inch].
+
+    Returns
+    -------
+    Figure
+        Figure that lays out its axes by itself.
+    """
+    from matplotlib.figure import Figure
+
+    size, colour = (width_in, height_in), THEMES[theme].page
+    return Figure(figsize=size, dpi=STYLE["figure.dpi"], facecolor=colour, layout="constrained")
+
+
+def figure_for(height_in: float) -> Figure:
+    """Make a figure of pyplot, which a notebook shows and ``pyplot.show()`` opens.
+
+    Parameters
+    ----------
+    height_in : float
+        Height of the figure [inch].
+
+    Returns
+    -------
+    Figure
+        Figure in the colours that the user has set for pyplot.
+    """
+    import matplotlib.pyplot as plt
+
+    return plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+
+
+def axes_for(ax: Axes | None, height_in: float = 4.0, **options: Any) -> Axes:
+    """Return the axes to draw on: those given, or the only ones of a new figure of pyplot.
+
+    Parameters
+    ----------
+    ax : Axes, optional
+        Axes of the user's own figure.
+    height_in : float
+        Height of a new figure [inch].
+    **options
+        Options of `matplotlib.figure.Figure.add_subplot`, such as ``projection``.
+
+    Returns
+    -------
+    Axes
+        Axes that `dress` is applied to once they are drawn on.
+    """
+    return figure_for(height_in).add_subplot(**options) if ax is None else ax
+
+
+def theme_of(axes: Axes) -> Theme:
+    """Return the colours that suit a figure: dark if its background is.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes of the figure.
+
+    Returns
+    -------
+    Theme
+        `LIGHT` or `DARK`.
+    """
+    from matplotlib.colors import to_rgba
+
+    figure: Any = axes.get_figure(root=True)
+    red, green, blue, opacity = to_rgba(figure.get_facecolor())
+    luminance = 0.2126 * red + 0.7152 * green + 0.0722 * blue
+    return DARK if opacity > 0 and luminance < 0.4 else LIGHT
+
+
+def dress(axes: Axes, *, title: str = "", note: str = "", grid: bool = True) -> None:
+    """Give axes that are drawn on their title, note, fonts, grid and colours.
+
+    Call it before a colour bar takes its room from the axes, and once more for the axes of the bar.
+
+    Parameters
+    ----------
+    axes : Axes
+        Axes that have their labels, ticks and legend.
+    title : str
+        Title, which is broken into lines that fit; no part of it is read as a formula.
+    note : str
+        Sentence in small letters below the axes, broken into lines that fit.
+    grid : bool
+        Whether to draw grid lines.
+    """
+    theme = theme_of(axes)
+    is_3d = axes.name == "3d"
+    figure: Any = axes.get_figure(root=True)
+    width_pt = 72 * axes.get_position().width * figure.get_size_inches()[0]
+    if title:
+        size, place = STYLE["axes.titlesize"], STYLE["axes.titlelocation"]
+        style: dict[str, Any] = {"fontsize": size, "color": theme.text, "loc": place}
+        axes.set_title(fit(title, width_pt, size), parse_math=False, **style)
+    for name in "xyz" if is_3d else "xy":
+        axis = getattr(axes, f"{name}axis")
+        axis.label.set(fontsize=STYLE["axes.labelsize"], color=theme.text)
+        size = STYLE[f"{'x' if name == 'x' else 'y'}tick.labelsize"]
+        axis.set_tick_params(labelsize=size, color=theme.text, labelcolor=theme.text)
+        axis.get_offset_text().set_color(theme.text)
+    for spine in axes.spines.values():
+        spine.set_edgecolor(theme.faint)
+    if is_3d or not axes.images:
+        axes.set_facecolor(theme.page)
+    if is_3d:
+        for name in "xyz":
+            getattr(axes, f"{name}axis").set_pane_color(theme.page)
+    elif grid:
+        style = {"linewidth": STYLE["grid.linewidth"], "alpha": STYLE["grid.alpha"]}
+        axes.grid(True, color=theme.faint, **style)
+        axes.set_axisbelow(True)
+    if (legend := axes.get_legend()) is not None:
+        legend.get_frame().set(facecolor=theme.page, edgecolor=theme.faint, alpha=0.85)
+        for text in legend.get_texts():
+            text.set(color=theme.text, fontsize=STYLE["legend.fontsize"], parse_math=False)
+    if note:
+        size = STYLE["font.size"]
+        lines = 1 + axes.get_xlabel().count("\n")
+        below = 22 + 1.3 * STYLE["axes.labelsize"] * lines
+        style = {"fontsize": size, "parse_math": False, "va": "top", "annotation_clip": False}
+        style |= {"xycoords": "axes fraction", "textcoords": "offset points"}
+        style |= {"color": theme.text, "xy": (0, 0), "xytext": (0, -below)}
+        lines_of_note = fit(note, width_pt, size)
+        axes.annotate(lines_of_note, alpha=0.85, in_layout=False, **style)
+        # A note is wider than its axes. Only its height may move the others, as with a title.
+        axes.annotate("\n".join("." for _ in lines_of_note.splitlines()), alpha=0, **style)
+
+
+def fit(text: str, width_pt: float, size_pt: float) -> str:
+    """Break a text into lines that are not wider than a width.
+
+    Lines break between words; a word that is longer than a line breaks after a hyphen, an
+    underscore, a slash or a dot, or anywhere if it has none.
+
+    Parameters
+    ----------
+    text : str
+        Text, whose own line breaks stay.
+    width_pt : float
+        Largest width of a line [pt].
+    size_pt : float
+        Size of the font [pt].
+
+    Returns
+    -------
+    str
+        Lines of the text.
+    """
+    import re
+
+    lines = []
+    for paragraph in text.split("\n"):
+        line = ""
+        for word in paragraph.split():
+            joined = f"{line} {word}" if line else word
+            if _width_pt(joined, size_pt) <= width_pt:
+                line = joined
+                continue
+            if line:
+                lines.append(line)
+            line = ""
+            for piece in re.findall(r"[^-_/.]*[-_/.]|[^-_/.]+", word):
+                for part in (piece,) if _width_pt(piece, size_pt) <= width_pt else piece:
+                    if line and _width_pt(line + part, size_pt) > width_pt:
+                        lines.append(line)
+                        line = ""
+                    line += part
+        lines.append(line)
+    return "\n".join(lines)
+
+
+def _width_pt(text: str, size_pt: float) -> float:
+    from matplotlib.textpath import TextPath
+
+    # A dollar sign would begin a formula; an S is as wide.
+    plain = text.replace("$", "S").strip()
+    return float(TextPath((0, 0), plain, size=size_pt).get_extents().width) if plain else 0.0
