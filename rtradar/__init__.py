@@ -86,3 +86,7 @@ def __getattr__(name: str) -> Any:
     if name in _HOME:
         return getattr(import_module(f"rtradar.{_HOME[name]}"), name)
     raise AttributeError(f"module 'rtradar' has no attribute '{name}'")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -106,12 +106,13 @@ def options_of(thing: Any) -> set[str]:
 
 
 def takes(thing: Any) -> set[str]:
-    """Names of the parameters of a function or class; none for protocols, exceptions and tuples."""
+    """Public parameters of a function or class; none for protocols, exceptions and tuples."""
     if isinstance(thing, type) and (
         getattr(thing, "_is_protocol", False) or issubclass(thing, Exception | tuple)
     ):
         return set()
-    return set(inspect.signature(thing).parameters) - {"self", "cls"} if callable(thing) else set()
+    names = inspect.signature(thing).parameters if callable(thing) else ()
+    return {name for name in names if not name.startswith("_")} - {"self", "cls"}
 
 
 def test_there_is_something_to_look_at() -> None:

@@ -44,7 +44,7 @@ class Capture:
 
     ``processing`` has the radar at its position in the scene, ``body`` is the person at theirs.
     ``model`` includes the paths over walls if the scene has any; ``inside`` is the room, or None.
-    ``survey`` is the link budget of the person's parts, ``warned`` its warnings. ``n_chirps`` are
+    ``link_budget`` is that of the person's parts, ``warned`` its warnings. ``n_chirps`` are
     whole TDM cycles, ``frame_starts`` (frame,) the first cycle of each frame, ``noise`` is that of
     the IF samples, and ``warmup_s`` the time until everything was compiled or loaded [s].
     """
@@ -56,7 +56,7 @@ class Capture:
     body: Body
     model: EchoModel
     inside: Indoors | None
-    survey: LinkBudget
+    link_budget: LinkBudget
     warned: tuple[str, ...]
     noise: Noise
     n_chirps: int

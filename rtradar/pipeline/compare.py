@@ -15,13 +15,15 @@ from numpy.typing import ArrayLike, NDArray
 from rtradar.errors import InputError
 from rtradar.motion import Motion
 from rtradar.pipeline.pictures import busiest_frame, removed, thinned
-from rtradar.pipeline.run import Result, simulate
+from rtradar.pipeline.result import Result
+from rtradar.pipeline.run import run_into
 from rtradar.pipeline.writer import files_of_runs
 from rtradar.process.window_functions import WindowFunctions, noise_bandwidth_bins
 from rtradar.radar import Radar
 from rtradar.report.figures.canvas import VELOCITY_LABEL, FieldUnit, field_unit
 from rtradar.report.pages import comparison
 from rtradar.scatter import MODELS
+from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
@@ -139,7 +141,7 @@ def compare(
         results: dict[str, Result] = {}
         for name in names:
             own = replace(settings, fidelity=name)
-            results[name] = simulate(motion, radar, scene or Scene(), own, folder / name)
+            results[name] = run_into(folder / name, motion, radar, scene or Scene(), own)
             # The noise of the first model is that of all.
             settings = replace(settings, noise_power_m2=results[name].summary["noise_power_m2"])
         summary = _summary(results, radar, names[-1])
@@ -183,9 +185,9 @@ def _figures(result: Result, reference: Result, radar: Radar) -> dict[str, Any]:
     """Return the figures of one model; differences of the reference from itself are zero."""
     summary, stages = result.summary, result.summary["stages"]
     power = _total_db(result) - _total_db(reference)
-    maps, overlap, spectrogram = _map_agreement(result.out, reference.out)
+    maps, overlap, spectrogram = _map_agreement(_maps_of(result), _maps_of(reference))
     bins = (radar.frame_hop_s, radar.range_bin_m, radar.velocity_bin_mps)
-    hidden = result.survey.hidden_at
+    hidden = _budget(result).hidden_at
     of_parts = hidden.mean(axis=0).tolist()
     return {
         "power_mean_db": _finite(float(power.mean())),
@@ -223,18 +225,18 @@ def _draw(
         strongest = max(float(power.max()) for power in powers)
         return field_unit(radar, spreading=spreading, strongest_m2=strongest)
 
-    surveys = {name: result.survey for name, result in results.items()}
-    times = surveys[reference].times
-    total = {name: survey.power_at.sum(axis=1) for name, survey in surveys.items()}
+    budgets = {name: _budget(result) for name, result in results.items()}
+    times = budgets[reference].times
+    total = {name: budget.power_at.sum(axis=1) for name, budget in budgets.items()}
     comparison.draw_power_over_time(
         next(paths), times, total, unit_of(total.values()), reference, title
     )
-    mean = {name: survey.power_at.mean(axis=0) for name, survey in surveys.items()}
-    hidden = {name: survey.hidden_at.mean(axis=0) for name, survey in surveys.items()}
+    mean = {name: budget.power_at.mean(axis=0) for name, budget in budgets.items()}
+    hidden = {name: budget.hidden_at.mean(axis=0) for name, budget in budgets.items()}
     parts, part_unit = list(results[reference].summary["part_power_m2"]), unit_of(mean.values())
     comparison.draw_part_power(next(paths), parts, mean, hidden, part_unit, title)
 
-    with h5py.File(results[reference].out / "maps.h5") as maps:
+    with h5py.File(_maps_of(results[reference])) as maps:
         frame = busiest_frame(maps)
         velocity, slow = maps["velocity"][:], maps["spectrogram_velocity"][:]
         times = thinned(maps, "spectrogram", "spectrogram_time")[1]
@@ -247,7 +249,7 @@ def _draw(
     range_bins = noise_bandwidth_bins(windows.range, radar.samples_per_chirp)
     levels, spectrograms = {}, {}
     for name, result in results.items():
-        with h5py.File(result.out / "maps.h5") as maps:
+        with h5py.File(_maps_of(result)) as maps:
             levels[name] = by_range.level(maps["range_doppler"][frame] / radar.n_channels)
             spectrograms[name] = thinned(maps, "spectrogram", "spectrogram_time")[0].T / range_bins
     across, up = (VELOCITY_LABEL, velocity), ("Range [m]", radar.range_m)
@@ -323,7 +325,7 @@ def chamfer(points: NDArray[np.float64], reference: NDArray[np.float64], bins: A
 
 def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, LevelAgreement]:
     """Compare range-Doppler maps over cells that either detects, detections, and spectrograms."""
-    with h5py.File(ours / "maps.h5") as first, h5py.File(reference / "maps.h5") as second:
+    with h5py.File(ours) as first, h5py.File(reference) as second:
         cells, both, either = [], 0, 0
         for frame in range(len(first["time"])):
             mask, other = (maps["detections"][frame].astype(bool) for maps in (first, second))
@@ -339,8 +341,18 @@ def _map_agreement(ours: Path, reference: Path) -> tuple[LevelAgreement, float, 
 
 
 def _total_db(result: Result) -> NDArray[np.float64]:
-    power = result.survey.power_at.sum(axis=1)
+    power = _budget(result).power_at.sum(axis=1)
     return np.asarray(10 * np.log10(np.maximum(power, np.finfo(np.float64).tiny)))
+
+
+def _budget(result: Result) -> LinkBudget:
+    assert result.link_budget is not None  # every run has one
+    return result.link_budget
+
+
+def _maps_of(result: Result) -> Path:
+    assert result.out is not None
+    return result.out / "maps.h5"
 
 
 def _finite(value: float) -> float | None:

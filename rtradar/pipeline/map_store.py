@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, BinaryIO, NamedTuple
 
 import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.errors import InputError
 from rtradar.system.files import LastingFile
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 _SINCE = "since the start of the capture"
 _AXES = {
@@ -64,6 +68,7 @@ _STEPS_A_CHUNK = 64  # time steps written together, for maps with few numbers a 
 class MapStore:
     """HDF5 file of maps that grow along their first axis; an existing file is replaced.
 
+    The file is a path, or an object such as `io.BytesIO`, which is left open.
     ``fixed`` are the axes (n,) of known values, such as ``range``. Maps with another axis that does
     not grow are left out: a radar without a z-line has no elevation. ``clutter_removal`` says, by
     growing axis, how static clutter was removed from the maps along it; ``none`` if left out. It
@@ -72,13 +77,14 @@ class MapStore:
 
     def __init__(
         self,
-        path: Path,
+        file: Path | BinaryIO,
         fixed: Mapping[str, NDArray[np.float64]],
         attributes: Mapping[str, Any],
         clutter_removal: Mapping[str, str] | None = None,
     ) -> None:
         # The newest format indexes growing data in constant memory.
-        self._raw = LastingFile(path.open("w+b"))
+        self._owned = isinstance(file, Path)
+        self._raw = LastingFile(file.open("w+b") if isinstance(file, Path) else file)
         self._file = h5py.File(self._raw, "w", libver="latest")
         self._file.attrs.update(attributes)
         for name in _GROWING:
@@ -129,4 +135,21 @@ class MapStore:
     def close(self) -> None:
         """Write what is buffered and close the file; may be called again."""
         self._file.close()
-        self._raw.close()
+        if self._owned:
+            self._raw.close()
+
+
+def open_maps(file: Path | BinaryIO) -> xr.Dataset:
+    """Open what a `MapStore` has written; values are read when they are needed.
+
+    An `InputError` is raised if the file is not there any more, or is damaged.
+    """
+    import xarray as xr  # slow to import
+
+    try:
+        # Values as they are stored: times are numbers of seconds, and 0 is no missing power.
+        return xr.open_dataset(file, engine="h5netcdf", decode_cf=False)
+    except (OSError, ValueError, KeyError) as error:
+        raise InputError(
+            f"'{file}' cannot be read as the maps of a run ({error}); make it anew with rt.run"
+        ) from None

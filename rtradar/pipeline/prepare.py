@@ -74,7 +74,7 @@ def prepare(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -
         body=body,
         model=model,
         inside=inside,
-        survey=budget,
+        link_budget=budget,
         warned=tuple(str(warning.message) for warning in caught),
         noise=noise,
         n_chirps=n_chirps,

@@ -5,20 +5,20 @@ from __future__ import annotations
 import json
 import time
 import warnings
-from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Any, Unpack
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, BinaryIO, Unpack
 
 from rtradar.clouds import save_cloud_npz, save_ply, save_spatial_npz
-from rtradar.errors import ValidityWarning
+from rtradar.errors import InputError, ValidityWarning
 from rtradar.motion import Motion
 from rtradar.pipeline.capture import Capture
+from rtradar.pipeline.map_store import open_maps
+from rtradar.pipeline.memory import refuse_large_maps
 from rtradar.pipeline.pictures import draw_pictures
 from rtradar.pipeline.prepare import prepare
 from rtradar.pipeline.processing import CloudMaker, Clouds
+from rtradar.pipeline.result import Result
 from rtradar.pipeline.snapshots import snapshots
 from rtradar.pipeline.summary import cost, plain, summary_of
 from rtradar.pipeline.timing import forget_peak_memory
@@ -26,33 +26,10 @@ from rtradar.pipeline.writer import RUN_FILES, ReceivedFrame, RunWriter, if_arra
 from rtradar.radar import Radar
 from rtradar.report import write_report
 from rtradar.report.view.snapshots import save_snapshots
-from rtradar.scatter.link_budget import LinkBudget
 from rtradar.scene import Scene
 from rtradar.settings import RunOptions, RunSettings
 from rtradar.system.output_folder import atomic_folder
 from rtradar.trace.rays import rays_traced
-
-
-@dataclass(frozen=True)
-class Result:
-    """Results of a run.
-
-    Parameters
-    ----------
-    points : (point, 3) float64
-        RDT cloud: time [s], range [m], velocity [m/s].
-    summary : dict
-        Contents of ``summary.json``.
-    survey : LinkBudget
-        Echo power of each part over time, and its occluded fraction.
-    out : path
-        Folder of the files.
-    """
-
-    points: NDArray[np.float64]
-    summary: dict[str, Any]
-    survey: LinkBudget
-    out: Path
 
 
 def run(
@@ -60,11 +37,11 @@ def run(
     radar: Radar,
     scene: Scene | None = None,
     *,
-    out: str | Path,
+    out: str | Path | None = None,
     overwrite: bool = False,
     **options: Unpack[RunOptions],
 ) -> Result:
-    """Simulate one recording and write maps, clouds, pictures and a summary into a folder.
+    """Simulate one recording: maps, clouds and a summary, in memory or in a folder.
 
     Parameters
     ----------
@@ -74,9 +51,10 @@ def run(
         Radar, which the scene puts at its position.
     scene : Scene, optional
         Walls and furniture around the person; free space if left out.
-    out : path
-        Folder, which is made if it does not exist. The files of an earlier run that its
-        ``summary.json`` lists are replaced or removed; all others stay as they are.
+    out : path, optional
+        Folder for maps, clouds, pictures, report and summary, which is made if it does not exist.
+        The files of an earlier run that its ``summary.json`` lists are replaced or removed; all
+        others stay as they are. If left out, nothing is written, and the maps are kept in memory.
     overwrite : bool
         Whether files that ``out`` holds under names of the new ones are replaced even where no
         ``summary.json`` lists them.
@@ -90,36 +68,62 @@ def run(
     Raises
     ------
     InputError
-        If a value is invalid; nothing is written then.
+        If a value is invalid, or if the maps are too large for memory and ``out`` is left out;
+        nothing is written then.
     BackendError
         If the model traces rays and no backend of the requested kind works.
     ExtensionError
         If code of another package fails.
     """
-    return simulate(motion, radar, scene or Scene(), RunSettings(**options), Path(out), overwrite)
+    settings = RunSettings(**options)
+    if out is None:
+        return _run_in_memory(motion, radar, scene or Scene(), settings)
+    return run_into(Path(out), motion, radar, scene or Scene(), settings, overwrite)
 
 
-def simulate(
+def _run_in_memory(motion: Motion, radar: Radar, scene: Scene, settings: RunSettings) -> Result:
+    if settings.save_if:
+        raise InputError(
+            "save_if = True keeps IF samples in a folder; give it, out=, or take them from "
+            "rt.simulate(...).samples"
+        )
+    refuse_large_maps(motion, radar, settings)
+    started, rays_before = _start()
+    capture = prepare(motion, radar, scene, settings)
+    file = BytesIO()
+    clouds = _stream(capture, file)
+    summary = summary_of(capture, clouds, started) | {"rays_traced": rays_traced() - rays_before}
+    with capture.stages.time("write"), open_maps(file) as maps:
+        maps.load()
+    _, summary = _finished(summary, capture, started)
+    return Result(
+        points=clouds.rdt.points,
+        spatial=clouds.spatial,
+        summary=summary,
+        radar=capture.radar,
+        link_budget=capture.link_budget,
+        _in_memory=maps,
+        _capture=capture,
+    )
+
+
+def run_into(
+    out: Path,
     motion: Motion,
     radar: Radar,
     scene: Scene,
     settings: RunSettings,
-    out: Path,
     overwrite: bool = False,
 ) -> Result:
-    """Run with these settings; see `run`."""
-    started, rays_before = time.perf_counter(), rays_traced()
-    forget_peak_memory()
+    """Run with these settings and write the files of `RUN_FILES` into a folder; see `run`."""
+    started, rays_before = _start()
     # Place the person, build the echo model, and settle link budget, noise and clutter.
     capture = prepare(motion, radar, scene, settings)
     with atomic_folder(out, RUN_FILES, overwrite=overwrite) as folder:
+        kept = if_array(folder / "if.zarr", capture) if settings.save_if else None
         # Echoes, IF samples, range spectra, clutter removal, Doppler, detection and angles.
-        clouds = _stream(capture, folder)
+        clouds = _stream(capture, folder / "maps.h5", kept)
         points = clouds.rdt.points
-        if not len(points):
-            warnings.warn(
-                "nothing was detected: the clouds are empty", ValidityWarning, stacklevel=3
-            )
         with capture.stages.time("write"):
             save_cloud_npz(folder / "cloud_rdt.npz", points)
             save_ply(folder / "cloud_rdt.ply", points)
@@ -141,23 +145,46 @@ def simulate(
                 rdt_points=points,
                 spatial=clouds.spatial,
             )
-        summary |= cost(capture, started) | {"files": RUN_FILES.list_of(folder)}
-        text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
+        summary |= {"files": RUN_FILES.list_of(folder)}
+        text, summary = _finished(summary, capture, started)
         (folder / "summary.json").write_text(text + "\n", encoding="utf-8")
-    return Result(points, json.loads(text), capture.survey, out)
+    return Result(
+        points=points,
+        spatial=clouds.spatial,
+        summary=summary,
+        radar=capture.radar,
+        link_budget=capture.link_budget,
+        out=out,
+    )
 
 
-def _stream(capture: Capture, folder: Path) -> Clouds:
-    """Stream a capture into ``maps.h5``, and ``if.zarr`` if requested; return its clouds."""
+def _start() -> tuple[float, int]:
+    """Return the time at which a run starts, and the number of rays traced before."""
+    forget_peak_memory()
+    return time.perf_counter(), rays_traced()
+
+
+def _finished(
+    summary: dict[str, Any], capture: Capture, started_s: float
+) -> tuple[str, dict[str, Any]]:
+    """Add the cost of a run; return the text of ``summary.json`` and its values."""
+    summary |= cost(capture, started_s)
+    text = json.dumps(summary, indent=2, allow_nan=False, default=plain)
+    return text, json.loads(text)
+
+
+def _stream(capture: Capture, maps: Path | BinaryIO, kept: Any = None) -> Clouds:
+    """Stream a capture into a file of maps, and IF samples into an array; return its clouds."""
     received = None
     if capture.settings.clutter_removal != "none":
         starts = capture.frame_starts
         received = ReceivedFrame(capture.radar, int(starts[len(starts) // 2]))
-    kept = if_array(folder / "if.zarr", capture) if capture.settings.save_if else None
-    path = folder / "maps.h5"
-    with RunWriter(path, capture.processing, capture.title, received) as writer:
+    with RunWriter(maps, capture.processing, capture.title, received) as writer:
         capture.stream(writer, kept)
-        return writer.finish()
+        clouds = writer.finish()
+    if not len(clouds.rdt.points):
+        warnings.warn("nothing was detected: the clouds are empty", ValidityWarning, stacklevel=4)
+    return clouds
 
 
 def clouds_of(

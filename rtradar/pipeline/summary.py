@@ -37,7 +37,7 @@ def cost(capture: Capture, started_s: float) -> dict[str, Any]:
 
 def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, Any]:
     """Return the summary of a run that started at ``started_s``, see `cost`."""
-    settings, radar, survey = capture.settings, capture.radar, capture.survey
+    settings, radar, budget = capture.settings, capture.radar, capture.link_budget
     # A model may trace nothing yet, and would if a part came near a line of sight.
     traces = capture.model.variant is not None or getattr(capture.model, "traces", False)
     summary = {
@@ -61,8 +61,8 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         "rdt_points": len(clouds.rdt.points),
         "xyz_points": len(clouds.spatial.points),
         "xyz_points_found": clouds.n_spatial,
-        "echo_power_m2": survey.power if survey.visible else 0.0,
-        "part_power_m2": survey.part_power,
+        "echo_power_m2": budget.power if budget.visible else 0.0,
+        "part_power_m2": budget.part_power,
         "noise_power_m2": capture.noise.power,
     }
     if radar.transmit_power_dbm is not None and settings.spreading:
@@ -70,7 +70,7 @@ def summary_of(capture: Capture, clouds: Clouds, started_s: float) -> dict[str, 
         scale = radar.watts_per_m2
         summary["watts"] = {
             "watts_per_m2": scale,
-            "echo_power_w": survey.power * scale,
+            "echo_power_w": budget.power * scale,
             "noise_power_w": capture.noise.power * scale,
         }
     summary["limits"] = _limits(capture)
@@ -90,8 +90,8 @@ def plain(value: object) -> Any:
 
 def _limits(capture: Capture) -> list[dict[str, Any]]:
     of_room = capture.inside.limits if capture.inside else ()
-    limits = [dataclasses.asdict(limit) for limit in (*capture.survey.limits, *of_room)]
-    if not capture.survey.visible:
+    limits = [dataclasses.asdict(limit) for limit in (*capture.link_budget.limits, *of_room)]
+    if not capture.link_budget.visible:
         invisible = {"name": "nobody_visible", "share": 0.0}
         limits += [invisible | {"message": message} for message in capture.warned]
     return limits

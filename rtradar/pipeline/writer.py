@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,14 +47,19 @@ def files_of_runs(listing: str, own: Sequence[str], folders: Sequence[str]) -> O
 
 
 class RunWriter:
-    """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``path``.
+    """Makes maps and clouds from the range spectra of one capture, and writes the maps to ``file``.
 
-    An existing file is replaced. Of the frame ``received`` the map is also kept as it was before
-    clutter removal. So that memory stays low, `push` takes at most ``max_chirps`` chirps.
+    A path, whose file is replaced, or an open file may be given. Of the frame ``received`` the map
+    is also kept as it was before clutter removal. So that memory stays low, `push` takes at most
+    ``max_chirps`` chirps.
     """
 
     def __init__(
-        self, path: Path, processing: Processing, title: str, received: ReceivedFrame | None = None
+        self,
+        file: Path | BinaryIO,
+        processing: Processing,
+        title: str,
+        received: ReceivedFrame | None = None,
     ) -> None:
         self._processing, self._received = processing, received
         radar, removal = processing.radar, processing.removal
@@ -75,7 +80,7 @@ class RunWriter:
             "slow_time": removal.description(self._range_time.window_cycles),
             "spectrogram_time": removal.description(window_cycles(radar)),
         }
-        self._store = MapStore(path, axes, {"title": title}, clutter_removal=removed)
+        self._store = MapStore(file, axes, {"title": title}, clutter_removal=removed)
 
     def __enter__(self) -> RunWriter:
         return self

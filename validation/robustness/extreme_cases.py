@@ -144,7 +144,7 @@ def chain(
             what or motion(), radar or small_radar(), out=Path(folder, "out"), **(values | options)
         )
     assert np.isfinite(result.points).all()
-    assert np.isfinite(result.survey.power_at).all()
+    assert np.isfinite(result.link_budget.power_at).all()
     return result, [str(warning.message) for warning in caught]
 
 

@@ -1,0 +1,103 @@
+"""A run without a folder: the maps of a run with one, nothing written, and a limit of memory."""
+
+from __future__ import annotations
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import rtradar as rt
+from rtradar.errors import InputError
+from rtradar.pipeline import memory
+
+RADAR = rt.Radar(
+    name="small",
+    tx_y=2,
+    tx_z=0,
+    rx_y=4,
+    rx_z=0,
+    chirp_duration_s=250e-6,
+    samples_per_chirp=128,
+    frame_duration_s=0.05,
+)
+MOTION = rt.synthetic_motion("kick", seed=1, duration_s=1.0)
+
+
+@pytest.fixture(scope="module")
+def in_memory(tmp_path_factory: pytest.TempPathFactory) -> rt.Result:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(tmp_path_factory.mktemp("empty"))
+        result = rt.run(MOTION, RADAR, fidelity="analytic", duration_s=0.3, clutter_removal="mean")
+        assert not list(Path().iterdir())
+    return result
+
+
+def test_maps_in_memory_are_those_of_the_file(in_memory: rt.Result, tmp_path: Path) -> None:
+    options = {"fidelity": "analytic", "duration_s": 0.3, "clutter_removal": "mean"}
+    written = rt.run(MOTION, RADAR, out=tmp_path / "out", **options)  # type: ignore[arg-type]
+    assert in_memory.out is None
+    assert written.out == tmp_path / "out"
+    with xr.open_dataset(tmp_path / "out" / "maps.h5", engine="h5netcdf", decode_cf=False) as maps:
+        xr.testing.assert_identical(in_memory.maps, maps)
+    xr.testing.assert_identical(in_memory.maps, written.maps)
+    np.testing.assert_array_equal(in_memory.points, written.points)
+    np.testing.assert_array_equal(in_memory.spatial.points, written.spatial.points)
+    assert in_memory.summary.keys() == written.summary.keys() - {"files"}
+    budget, other = in_memory.link_budget, written.link_budget
+    assert budget is not None
+    assert other is not None
+    np.testing.assert_array_equal(budget.power_at, other.power_at)
+
+
+def test_maps_have_named_dimensions_units_and_meanings(in_memory: rt.Result) -> None:
+    maps = in_memory.maps
+    assert maps.range_doppler.dims == ("time", "range", "velocity")
+    assert maps.range_azimuth.dims == ("time", "range", "azimuth")
+    for values in (*maps.data_vars.values(), *maps.coords.values()):
+        assert values.attrs["units"]
+        assert values.attrs["long_name"]
+    np.testing.assert_array_equal(maps.range, in_memory.radar.range_m)
+    assert maps.time.attrs["units"] == "s"
+
+
+def test_a_result_says_what_it_is_in_a_few_lines(in_memory: rt.Result) -> None:
+    lines = repr(in_memory).splitlines()
+    assert len(lines) <= 10
+    assert lines[0].startswith("Result of synthetic:kick, radar small, fidelity analytic")
+    assert max(map(len, lines)) < 100
+
+
+def test_maps_of_a_folder_that_is_gone_are_refused_in_one_line(
+    in_memory: rt.Result, tmp_path: Path
+) -> None:
+    gone = dataclasses.replace(in_memory, out=tmp_path / "gone", _in_memory=None)
+    with pytest.raises(InputError, match=r"maps.h5' cannot be read"):
+        _ = gone.maps
+    assert "gone" in repr(gone)
+
+
+def test_maps_too_large_for_memory_are_refused_before_any_work(
+    in_memory: rt.Result, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    size = sum(in_memory.maps[name].nbytes for name in in_memory.maps.data_vars)
+    known = memory.bytes_of_maps(RADAR, in_memory.summary["chirps"])
+    assert 0.8 * size < known < 1.2 * size
+    monkeypatch.setattr(memory, "MEMORY_LIMIT_BYTES", 1_000_000_000)
+    # No array of so many frames is ever made.
+    long = dataclasses.replace(MOTION, rate_hz=1e-3)
+    with pytest.raises(InputError, match=r"would take [\d.]+ GB .* 1\.0 GB are allowed; .* out="):
+        rt.run(long, RADAR)
+
+
+def test_if_samples_are_not_kept_without_a_folder() -> None:
+    with pytest.raises(InputError, match="save_if = True keeps IF samples in a folder"):
+        rt.run(MOTION, RADAR, save_if=True)
+
+
+def test_every_public_name_is_listed() -> None:
+    assert set(rt.__all__) <= set(dir(rt))
+    for name in dir(rt):
+        assert getattr(rt, name) is not None
