@@ -23,6 +23,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from rtradar.cards import html_card, text_card
+from rtradar.clouds import display
 from rtradar.errors import InputError
 from rtradar.system.checks import brief
 from rtradar.system.files import atomic_file, open_regular, read_json, remove_parts
@@ -283,6 +285,17 @@ class Collection:
                 f"{repeated} samples are in more than one of {self._name}; leave one out"
             )
         self._about = [read_sample(path, "about") for path in self._paths]
+
+    def __repr__(self) -> str:
+        lines = {label.lower(): value for label, value in self._rows.items()}
+        return text_card("Collection", self._name, lines)
+
+    def _repr_html_(self) -> str:
+        return html_card("Collection", self._name, {"": self._rows})
+
+    @property
+    def _rows(self) -> dict[str, str]:
+        return display.rows(self.labels.tolist(), [about["provenance"] for about in self._about])
 
     def __len__(self) -> int:
         return len(self.ids)

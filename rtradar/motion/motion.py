@@ -12,7 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator, PPoly
 
+from rtradar.cards import html_card, text_card
 from rtradar.errors import InputError
+from rtradar.motion import display
 from rtradar.motion.quaternions import quaternion_rotate, sign_continuous
 from rtradar.system.checks import printable
 from rtradar.system.row_files import file_backed, in_blocks, release_pages
@@ -31,7 +33,7 @@ nothing of it is left in float64."""
 _splines_lock = threading.Lock()  # not of each motion, which has to go to other processes
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Motion:
     """A recording of a rigid skeleton, in world axes.
 
@@ -120,6 +122,13 @@ class Motion:
                 f"frames from {self.first_frame_s:.6g} to {last:.6g} s do not cover 0 to "
                 f"{self.length_s} s"
             )
+
+    def __repr__(self) -> str:
+        lines = {label.lower(): value for label, value in display.rows(self).items()}
+        return text_card("Motion", self.name, lines)
+
+    def _repr_html_(self) -> str:
+        return html_card("Motion", self.name, {"": display.rows(self)})
 
     def _refusal(self, why: str) -> InputError:
         return InputError(f"Motion {self.name}: {why}")

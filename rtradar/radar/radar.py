@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rtradar.antenna import Antenna
+from rtradar.cards import html_card, text_card
 from rtradar.conventions import BOLTZMANN_J_PER_K, NOISE_FIGURE_TEMPERATURE_K, SPEED_OF_LIGHT_MPS
 from rtradar.errors import InputError
+from rtradar.radar import display
 from rtradar.radar.checks import check_rules, checked_fields
 from rtradar.system.checks import check_keys, printable, read_toml
 from rtradar.system.registry import Registry
@@ -37,7 +39,7 @@ PRESETS = Registry(
 register_radar = PRESETS.register
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Radar:
     r"""A MIMO FMCW radar with a cross of two linear arrays.
 
@@ -126,6 +128,16 @@ class Radar:
         for field, value in checked_fields(given).items():
             object.__setattr__(self, field, value)
         check_rules(self)
+
+    def __repr__(self) -> str:
+        return text_card("Radar", self.name, display.brief_rows(self))
+
+    def _repr_html_(self) -> str:
+        tables = {
+            "Settings": display.settings_rows(self),
+            "Limits that follow": display.limit_rows(self),
+        }
+        return html_card("Radar", self.name, tables)
 
     @classmethod
     def preset(cls, name: str) -> Radar:

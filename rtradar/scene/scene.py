@@ -10,9 +10,11 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from rtradar.cards import html_card, text_card
 from rtradar.conventions import MINIMUM_ANTENNA_DISTANCE_M
 from rtradar.errors import InputError
 from rtradar.radar import Radar
+from rtradar.scene import display
 from rtradar.scene.materials import MATERIALS, Material, own_material
 from rtradar.scene.mesh_files import MESH_ENDINGS
 from rtradar.scene.objects import ROOM_SIDES, Furniture, Surface, Wall, room_walls
@@ -55,7 +57,7 @@ PERSON_LIMITS: Mapping[str, tuple[float, float]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, repr=False)
 class Scene:
     """Surroundings of the person; free space has none.
 
@@ -116,6 +118,12 @@ class Scene:
         limits = PERSON_LIMITS["heading_deg"]
         heading = check_number(where, "person heading_deg", self.heading_deg, *limits)
         object.__setattr__(self, "heading_deg", heading)
+
+    def __repr__(self) -> str:
+        return text_card("Scene", self.name, display.brief_rows(self))
+
+    def _repr_html_(self) -> str:
+        return html_card("Scene", self.name, display.tables(self))
 
     @classmethod
     def load(cls, source: str | Path) -> Scene:

@@ -1,0 +1,91 @@
+"""What a radar shows of itself: its settings and limits with their units, and its array."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from rtradar.antenna import Antenna
+from rtradar.cards import quantity
+
+if TYPE_CHECKING:
+    from rtradar.radar.radar import Radar
+
+
+def brief_rows(radar: Radar) -> dict[str, str]:
+    """Return the rows of a radar's ``repr``."""
+    settings, limits = settings_rows(radar), limit_rows(radar)
+    rows = {label.lower(): settings[label] for label in ("Sweep", "Chirp", "Channels", "Frame")}
+    rows["position"] = settings["Position"]
+    for name, most in (("range", "Maximum range"), ("velocity", "Maximum velocity")):
+        rows[name] = f"{limits[most]}, resolution {limits[f'{name.capitalize()} resolution']}"
+    rows["angle"] = limits["Maximum angle"]
+    if measured_angles(radar):
+        rows["angle"] += f", resolution {limits['Angular resolution']}"
+    if radar.transmit_power_dbm is not None or radar.noise_figure_db is not None:
+        rows["power"] = settings["Power"]
+    return rows
+
+
+def settings_rows(radar: Radar) -> dict[str, str]:
+    """Return what was set, as texts with units by their labels."""
+    stop_hz = radar.start_frequency_hz + radar.bandwidth_hz
+    noise = "not stated" if radar.noise_figure_db is None else f"{radar.noise_figure_db:g} dB"
+    power = (
+        "not stated" if radar.transmit_power_dbm is None else f"{radar.transmit_power_dbm:g} dBm"
+    )
+    pairs = (
+        " (each line by itself)" if radar.channels == "pairs" and radar.tx_y * radar.tx_z else ""
+    )
+    names = {"tdm": "TDM, one Tx after the other", "fdm": "FDM, all Tx at once"}
+    names["ddm"] = f"DDM, all Tx at once in {radar.n_doppler_bands} Doppler bands"
+    return {
+        "Sweep": f"{quantity(radar.start_frequency_hz, 'Hz')} to {quantity(stop_hz, 'Hz')}, "
+        f"{'vertical' if radar.polarization == 'v' else 'horizontal'} polarisation",
+        "Chirp": f"{quantity(radar.chirp_duration_s, 's')}, {radar.samples_per_chirp} samples at "
+        f"{quantity(radar.sample_rate_hz, 'Hz')}",
+        "Transmitters": _line(radar, radar.tx_y, radar.tx_z, radar.tx_spacing_wavelengths),
+        "Receivers": _line(radar, radar.rx_y, radar.rx_z, radar.rx_spacing_wavelengths),
+        "Channels": f"{radar.n_tx} Tx × {radar.n_rx} Rx = {radar.n_channels}{pairs}",
+        "Multiplexing": names[radar.multiplexing],
+        "Frame": f"{quantity(radar.frame_duration_s, 's')} every "
+        f"{quantity(radar.frame_hop_s, 's')}: {radar.cycles_per_frame} cycles of "
+        f"{quantity(radar.cycle_duration_s, 's')}",
+        "Position": f"({', '.join(f'{value:g}' for value in radar.position_m)}) m, boresight +x",
+        "Antennas": f"Tx {_antenna(radar.tx_antenna)}, Rx {_antenna(radar.rx_antenna)}",
+        "Power": f"transmitted {power}, noise figure {noise}",
+    }
+
+
+def limit_rows(radar: Radar) -> dict[str, str]:
+    """Return the limits that follow from the settings, as texts with units by their labels."""
+    axes = measured_angles(radar)
+    beam, most = f"{radar.angle_resolution_deg:.3g}°", f"±{radar.max_angle_deg:.3g}°"
+    return {
+        "Maximum range": f"{radar.max_range_m:.4g} m",
+        "Range resolution": f"{100 * radar.range_bin_m:.4g} cm",
+        "Maximum velocity": f"±{radar.max_velocity_mps:.4g} m/s",
+        "Velocity resolution": f"{radar.velocity_bin_mps:.3g} m/s",
+        "Maximum angle": f"{most} in {axes}" if axes else "not measured",
+        "Angular resolution": f"{beam} at boresight" if axes else "not measured",
+        "Wavelength": f"{quantity(radar.wavelength_m, 'm')} at the sweep centre",
+        "Samples in a frame": f"{radar.chirps_per_frame * radar.n_rx * radar.samples_per_chirp:,}",
+    }
+
+
+def measured_angles(radar: Radar) -> str:
+    """Name the angles that the array measures, or return an empty text if it measures none."""
+    lines = {"azimuth": radar.tx_y * radar.rx_y, "elevation": radar.tx_z * radar.rx_z}
+    return " and ".join(name for name, elements in lines.items() if elements > 1)
+
+
+def _line(radar: Radar, n_y: int, n_z: int, spacing_wavelengths: float) -> str:
+    lines = [f"{count} along {axis}" for axis, count in (("y", n_y), ("z", n_z)) if count]
+    apart = quantity(spacing_wavelengths * radar.start_wavelength_m, "m")
+    return f"{' and '.join(lines)}, {apart} apart" if max(n_y, n_z) > 1 else " and ".join(lines)
+
+
+def _antenna(antenna: Antenna | None) -> str:
+    if antenna is None or antenna.pattern == "isotropic":
+        return "isotropic"
+    return f"{antenna.pattern}, peak {10 * math.log10(antenna.peak_gain):.3g} dBi"
